@@ -1,6 +1,6 @@
 """OptiSense Studio: simulate and design camera-based tactile sensors.
 
-Lengths are in mm, angles in degrees, powers in mW. Names load on first use, so that importing
+Lengths are in mm, angles in degrees, powers in mW. Names load on first use, so that the import of
 the package neither loads the renderer nor needs libLLVM.
 """
 
@@ -38,7 +38,7 @@ _HOMES = {
     "load_design": ".design",
     "objective": ".objectives",
     "save_design": ".sensors",
-    "search": ".search",  # the package; a search is `optisense.search.search(...)`
+    "search": ".search",  # the package; the function is `optisense.search.search`
     "set_value": ".design",
 }
 

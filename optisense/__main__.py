@@ -6,7 +6,7 @@ from optisense.starting import leave_on_signals
 
 
 def main() -> None:
-    """Run the command line; `optisense.cli.stopping` answers signals as soon as it is imported."""
+    """Run the command line; `optisense.cli.stopping` handles signals once it is imported."""
     leave_on_signals()
     from optisense.cli import main as run
 

@@ -1,4 +1,4 @@
-"""The errors a user can cause. Each says what is wrong, where, and what to do about it."""
+"""Errors that a user can cause. Each states the problem, its place, and the remedy."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ class OptiSenseError(Exception):
     """Base of all errors caused by input, set-up or output, never by a defect of the program.
 
     Args:
-        message: what is wrong, as a sentence without its full stop.
-        where: file and line, part name or dotted path, when there is one.
-        hint: what to do about it, as a sentence without its full stop.
+        message: problem, as a sentence without its full stop.
+        where: file and line, part name or dotted path, if there is one.
+        hint: remedy, as a sentence without its full stop.
     """
 
     def __init__(self, message: str, *, where: str | None = None, hint: str | None = None) -> None:
@@ -27,7 +27,7 @@ class OptiSenseError(Exception):
         return text
 
     def __reduce__(self) -> tuple[object, ...]:
-        """Keep `where` and `hint` when the error crosses to another process."""
+        """Keep `where` and `hint` when the error is pickled for another process."""
         return _rebuild, (type(self), self.message, self.where, self.hint)
 
 
@@ -38,52 +38,52 @@ def _rebuild(
 
 
 class DesignError(OptiSenseError):
-    """A sensor design that can't be read, or makes no sense."""
+    """A sensor design can't be read, or its values contradict each other."""
 
 
 class MeshError(OptiSenseError):
-    """A mesh that is empty, not closed, not finite or can't be read."""
+    """A mesh is empty, not closed, not finite or can't be read."""
 
 
 class ContactError(OptiSenseError):
-    """A contact that is off the sensing surface, too deep, or can't be read."""
+    """A contact is off the sensing surface, too deep, or can't be read."""
 
 
 class LibraryError(OptiSenseError):
-    """A library entry that is unknown, or a data file of it that can't be read."""
+    """A library entry is unknown, or one of its data files can't be read."""
 
 
 class RenderError(OptiSenseError):
-    """A design or a setting that can't be rendered."""
+    """A design or a setting can't be rendered."""
 
 
 class NoDerivativeError(RenderError):
-    """Chief rays have no derivative by something that moves."""
+    """Chief rays have no derivative by a part that moves."""
 
 
 class ObjectiveError(OptiSenseError):
-    """An objective that is unknown or can't be loaded, or a sensor that it can't score."""
+    """An objective is unknown, can't be loaded, or can't score a sensor."""
 
 
 class SetupError(OptiSenseError):
-    """Something missing or too old on this machine, such as libLLVM."""
+    """A component, such as libLLVM, is missing or too old on this machine."""
 
 
 class OutputError(OptiSenseError):
-    """A file or folder that can't be written."""
+    """A file or folder can't be written."""
 
 
 class FolderInUseError(OutputError):
-    """A folder that another process is writing to."""
+    """Another process is writing to a folder."""
 
 
 class TaskError(OptiSenseError):
-    """A perception task, or a dataset, that can't be made or read as asked."""
+    """A perception task or a dataset can't be made or read."""
 
 
 class CalibrationError(OptiSenseError):
-    """Photographs of a sensor that can't be read, or that a design can't be compared with."""
+    """Photographs of a sensor can't be read, or can't be compared with a design."""
 
 
 class SearchError(OptiSenseError):
-    """A search space, a method or a study that makes no sense, or can't go on."""
+    """A search space, a method or a study is invalid, or a search can't be resumed."""

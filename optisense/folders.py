@@ -1,16 +1,17 @@
-"""Folders that one process at a time writes to, and what a killed process has left in them.
+"""Locks of folders, so that one process at a time writes to them, and removal of what killed
+processes left.
 
 A command that writes into a folder takes its lock before the first byte. The lock is the file
-`.optisense.lock` in the folder, locked with `flock`: the kernel gives the lock back when the
-process ends, however it ends, so that a lock is never stale on its own machine and a process
-number that another program has got since means nothing. The file tells who holds the lock, and
-which files it is about to make; it is removed when the lock is given back. A lock file that
-nobody holds was left by a process that was killed, and the files that it names are removed by the
-next command. No other file is ever removed.
+`.optisense.lock` in the folder, locked with `flock`: the kernel releases the lock when the process
+ends, however it ends, so that a lock is never stale on its own machine, even if another process has
+the same number later. The file names the holder of the lock, and the files that it is about to
+make; it is removed when the lock is released. A lock file without a holder was left by a process
+that was killed, and the next command removes the files that it names. No other file is ever
+removed.
 
-`flock` reaches across machines only where a network file system supports it. So a lock file that
-was left by another machine is not judged: the error names the machine and how to clear it. The
-machine is recognised by its boot identifier, which containers on it share, or by its name.
+`flock` works across machines only if the network file system supports it. So a lock file of another
+machine is not judged: the error names the machine and how to clear the lock. The machine is
+recognised by its boot identifier, which containers on it share, or by its name.
 """
 
 from __future__ import annotations
@@ -48,27 +49,27 @@ SUBFOLDERS = (
     "renderings",
     "units",
 )
-"""Subfolders in which commands write temporary files, beside the folder itself."""
+"""Subfolders in which commands write temporary files, besides the folder itself."""
 
 
 class FolderLock:
-    """The right of one process to write into a folder.
+    """Exclusive right of one process to write into a folder.
 
     Attributes:
-        folder: the folder.
+        folder: path of the folder.
     """
 
     def __init__(self, folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> None:
-        """Take the lock, making the folder if need be, and clean up after killed processes.
+        """Take the lock, create the folder if needed, and clean up after killed processes.
 
         Args:
-            folder: which.
+            folder: path of the folder.
             wait: whether to wait for another process instead of failing.
-            hint: what the user may do where the folder can't be written.
+            hint: remedy if the folder can't be written.
 
         Raises:
-            FolderInUseError: another process holds it; says which.
-            OutputError: the folder can't be made or written.
+            FolderInUseError: another process holds the lock; the message names it.
+            OutputError: the folder can't be created or written.
         """
         self.folder = Path(folder)
         self._path = self.folder / LOCK_FILE
@@ -95,10 +96,10 @@ class FolderLock:
             raise
 
     def check_empty(self) -> None:
-        """Check that nothing is in the folder but the lock.
+        """Check that the folder is empty except for the lock.
 
         Raises:
-            OutputError: something is there.
+            OutputError: the folder contains something.
         """
         if not is_empty(self.folder):
             raise OutputError(
@@ -108,16 +109,16 @@ class FolderLock:
             )
 
     def will_make(self, files: Iterable[str]) -> None:
-        """Write down which new files are about to be made.
+        """Record which new files are about to be made.
 
-        If this process is killed before `is_whole`, the next one to take the lock removes them.
+        If this process is killed before `is_whole`, the next one that takes the lock removes them.
 
         Args:
-            files: paths relative to the folder; none may exist. The last is made last: where it
-                is found later, all of them are whole.
+            files: paths relative to the folder; none may exist. The last one must be made last: if
+                it exists, all of them are complete.
 
         Raises:
-            OutputError: one of them exists, or the lock file can't be written.
+            OutputError: one of the files exists, or the lock file can't be written.
         """
         names = tuple(PurePosixPath(file).as_posix() for file in files)
         for name in names:
@@ -141,22 +142,24 @@ class FolderLock:
             raise _cannot_write(self.folder, error, self._hint) from error
 
     def is_whole(self) -> None:
-        """Say that the files of `will_make` are there; from here on only `undo` removes them."""
+        """Record that the files of `will_make` are complete; from here on only `undo` removes
+        them.
+        """
         with contextlib.suppress(OSError):
             self._write(self._me)
 
     @property
     def has_made(self) -> bool:
-        """Whether there is something to undo."""
+        """True if there are files that `undo` would remove."""
         return bool(self._made_files)
 
     def undo(self) -> None:
-        """Remove the files of `will_make`, and their folders where nothing else is in them."""
+        """Remove the files of `will_make`, and their folders if these are empty then."""
         _remove(self.folder, self._made_files, self._made_subfolders)
         self._made_files = self._made_subfolders = ()
 
     def release(self) -> None:
-        """Give the lock back; a folder that was made for it and is empty is removed."""
+        """Release the lock; a folder that was created for it and is empty is removed."""
         if self._end is not None:
             self._end()
         for folder in self._made_folders:
@@ -165,13 +168,13 @@ class FolderLock:
         self._made_folders = []
 
     def _open(self, wait: bool) -> tuple[int, Holder | None]:
-        """The lock file, locked, and what a killed process has left in it."""
+        """Return the lock file, locked, and the record of a killed process in it, if any."""
         while True:
             self._make_folder()
             flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC
             try:
                 file = os.open(self._path, flags, 0o666)
-            except FileNotFoundError:  # another process has just removed the folder that it made
+            except FileNotFoundError:  # another process has removed its new folder
                 continue
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
@@ -188,7 +191,7 @@ class FolderLock:
             os.close(file)  # its holder has removed it since it was opened
 
     def _make_folder(self) -> None:
-        """Make the folder and those above it, and remember which were missing."""
+        """Create the folder and its parents, and remember which were missing."""
         missing = []
         folder = self.folder
         while not folder.exists() and folder != folder.parent:
@@ -210,17 +213,17 @@ class FolderLock:
 
 
 _held: dict[tuple[int, int, int], tuple[FolderLock, int]] = {}
-"""Locks taken by `hold`, and how often: by thread, and device and number of the folder."""
+"""Locks taken by `hold` and their counts, by thread, device and inode of the folder."""
 
 
 def hold(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> Callable[[], None]:
-    """Take the lock of a folder, or take part in the one that this thread has taken by `hold`.
+    """Take the lock of a folder, or share the one that this thread has taken by `hold`.
 
     Returns:
-        The function that gives it back.
+        Function that releases it.
 
     Raises:
-        FolderInUseError, OutputError: as `FolderLock`.
+        FolderInUseError, OutputError: see `FolderLock`.
     """
     place = Path(folder)
     key = _key(place)
@@ -243,7 +246,7 @@ def hold(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> C
 
 @contextmanager
 def held(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> Iterator[FolderLock]:
-    """`hold` for the time of a block; yields the lock."""
+    """Hold the lock of a folder for the duration of a block, and yield it."""
     give_back = hold(folder, wait=wait, hint=hint)
     try:
         key = _key(Path(folder))
@@ -255,15 +258,15 @@ def held(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> I
 
 @contextmanager
 def begun(folder: str | Path, files: Iterable[str]) -> Iterator[None]:
-    """Begin a folder: it must be empty, and a block that fails leaves nothing of its own in it.
+    """Begin a new folder: it must be empty, and a block that fails leaves none of its files in it.
 
     Args:
-        folder: made if need be.
-        files: that the block makes, relative to the folder, the last of them last.
+        folder: folder, created if needed.
+        files: files that the block makes, relative to the folder; the last one must be made last.
 
     Raises:
-        FolderInUseError: another process is writing to it.
-        OutputError: it is not empty, or can't be written.
+        FolderInUseError: another process is writing to the folder.
+        OutputError: the folder is not empty, or can't be written.
     """
     with held(folder) as lock:
         lock.check_empty()
@@ -277,12 +280,12 @@ def begun(folder: str | Path, files: Iterable[str]) -> Iterator[None]:
 
 
 def is_empty(folder: Path) -> bool:
-    """Whether nothing is in a folder but perhaps its lock."""
+    """Return whether a folder is empty except for its lock."""
     return all(each.name == LOCK_FILE for each in folder.iterdir())
 
 
 def holder_of(folder: Path) -> Holder | None:
-    """Which process writes to a folder at present; looks only, and writes nothing."""
+    """Return the process that writes to a folder at present, or None; nothing is written."""
     try:
         file = os.open(folder / LOCK_FILE, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
     except OSError:
@@ -301,7 +304,7 @@ def holder_of(folder: Path) -> Holder | None:
 
 
 def sweep(folder: Path, subfolders: Iterable[str]) -> None:
-    """Remove the temporary files of processes that have ended from a folder whose lock is held."""
+    """Remove the temporary files of ended processes from a folder whose lock is held."""
     for place in (folder, *(folder / name for name in subfolders)):
         with contextlib.suppress(OSError):
             if _leaves(folder, place) or ".." in place.parts:
@@ -321,7 +324,7 @@ def _key(folder: Path) -> tuple[int, int, int] | None:
 
 
 def _give_back(file: int, path: Path, process: int) -> None:
-    """Remove a lock file and close it, unless this is a copy of the process that took it."""
+    """Remove a lock file and close it, unless this process is a fork of the one that took it."""
     if os.getpid() == process:
         with contextlib.suppress(OSError):
             if _is_still(file, path):
@@ -331,7 +334,7 @@ def _give_back(file: int, path: Path, process: int) -> None:
 
 
 def _is_still(file: int, path: Path) -> bool:
-    """Whether an open file is the one at a path."""
+    """Return whether an open file is the one at a path."""
     try:
         there = path.lstat()
     except OSError:
@@ -341,7 +344,7 @@ def _is_still(file: int, path: Path) -> bool:
 
 
 def _remove(folder: Path, files: Iterable[str], folders: Iterable[str]) -> None:
-    """Remove files of a folder, and folders in it that are empty then; links are not followed."""
+    """Remove files of a folder, and folders in it that are then empty; links are not followed."""
     for name, remove in [
         *((name, Path.unlink) for name in files),
         *((name, Path.rmdir) for name in folders),
@@ -353,12 +356,12 @@ def _remove(folder: Path, files: Iterable[str], folders: Iterable[str]) -> None:
 
 
 def _leaves(folder: Path, place: Path) -> bool:
-    """Whether a place is outside of a folder, links followed."""
+    """Return whether a place is outside of a folder after links are resolved."""
     return not Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder))
 
 
 def _is_whole(folder: Path, left: Holder) -> bool:
-    """Whether a killed process had made all its files; the last is made last."""
+    """Return whether a killed process had made all its files; the last is made last."""
     try:
         return bool(left.making) and os.path.lexists(folder / left.making[-1])
     except ValueError:  # a name that no file can have

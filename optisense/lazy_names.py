@@ -1,6 +1,6 @@
 """Packages whose public names load on first use (PEP 562).
 
-Whoever imports such a package waits for nothing that he does not ask for.
+The import of such a package takes no longer than the names that are used.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from importlib import import_module
 def load_on_first_use(
     package: str, homes: Mapping[str, str], before: Callable[[], object] | None = None
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """A package's `__getattr__` and `__dir__`.
+    """Return a package's `__getattr__` and `__dir__`.
 
     For type checkers the package imports the same names under `TYPE_CHECKING`.
 
     Args:
-        package: its name.
-        homes: the module of each public name, relative to the package (`".model"`); one that is
-            called as the name itself is what the name stands for.
-        before: called ahead of each import.
+        package: name of the package.
+        homes: module of each public name, relative to the package (`".model"`); if the module has
+            the same name as the public name, the name stands for the module.
+        before: function that is called before each import.
     """
 
     def get(name: str) -> object:

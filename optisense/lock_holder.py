@@ -12,24 +12,27 @@ from pathlib import Path
 from typing import Any
 
 BOOT_FILE = Path("/proc/sys/kernel/random/boot_id")
-"""Identifies the running kernel on Linux; absent elsewhere."""
+"""File that identifies the running kernel on Linux; absent elsewhere."""
 
 MOST_TEXT = 1_000_000
-"""Bytes of a lock file that are read; the files of a design of 1000 parts take 40,000."""
+"""Largest number of bytes of a lock file that are read; the files of a design of 1000 parts take
+40,000.
+"""
 
 
 @dataclass(frozen=True)
 class Holder:
-    """The content of a lock file.
+    """Content of a lock file.
 
     Attributes:
-        process: number of the process that wrote it.
+        process: id of the process that wrote it.
         host: name of its machine.
-        boot: boot identifier of its machine; empty where there is none.
-        began: local time, ISO 8601.
-        command: what the process was called with.
-        making: files that it was about to make, relative to the folder; empty once they are whole.
-        folders: folders that it was about to make for them.
+        boot: boot identifier of its machine; empty if there is none.
+        began: local time of its start, ISO 8601.
+        command: command line of the process.
+        making: files that it was about to make, relative to the folder; empty once they are
+            complete.
+        folders: folders that it was about to create for them.
     """
 
     process: int
@@ -42,7 +45,7 @@ class Holder:
 
     @staticmethod
     def of_this_process() -> Holder:
-        """The holder that stands for this process."""
+        """Return the holder that stands for this process."""
         words = [Path(sys.argv[0]).name if sys.argv else "python", *sys.argv[1:2]]
         return Holder(
             process=os.getpid(),
@@ -54,7 +57,7 @@ class Holder:
 
     @property
     def is_elsewhere(self) -> bool:
-        """Whether it is on another machine, as far as can be told."""
+        """True if it is on another machine, as far as known."""
         if self.boot and self.boot == boot_identifier():
             return False
         return self.host != socket.gethostname()
@@ -64,11 +67,11 @@ class Holder:
 
 
 UNKNOWN = Holder(0, "this machine", "", "now", "unknown")
-"""Stands for a holder that has not written down yet who it is."""
+"""Holder that has not recorded its identity yet."""
 
 
 def read_holder(file: int) -> Holder | None:
-    """What a lock file says; None where it says nothing that can be read."""
+    """Return the content of a lock file, or None if it can't be parsed."""
     try:
         data: Any = json.loads(os.pread(file, MOST_TEXT, 0))
         texts = {name: str(data[name]) for name in ("host", "boot", "began", "command")}
@@ -79,7 +82,7 @@ def read_holder(file: int) -> Holder | None:
 
 
 def process_lives(process: int) -> bool:
-    """Whether a process of this machine is running."""
+    """Return whether a process of this machine is running."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -90,7 +93,7 @@ def process_lives(process: int) -> bool:
 
 
 def boot_identifier() -> str:
-    """The identifier of the running kernel; empty where there is none."""
+    """Return the identifier of the running kernel; empty if there is none."""
     try:
         return BOOT_FILE.read_text(encoding="ascii").strip()
     except OSError:

@@ -1,4 +1,4 @@
-"""Pictures in files: PNG and JPEG, as arrays of bytes."""
+"""Reading and writing of PNG and JPEG files as arrays of bytes."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from optisense.untrusted_files import COPY_AGAIN, MOST_PICTURE, read_bytes
 
 
 def read_picture(path: Path, error: type[OptiSenseError]) -> NDArray[np.uint8]:
-    """(h, w, 3) uint8 of a picture file.
+    """Read a picture file as an array (h, w, 3), uint8.
 
     Args:
-        path: of a PNG or JPEG file.
-        error: class of what is raised.
+        path: path of a PNG or JPEG file.
+        error: class of the error that is raised.
 
     Raises:
-        error: it can't be read.
+        error: the file can't be read.
     """
     return decode_picture(read_bytes(path, MOST_PICTURE, error, "the picture"), path, error)
 
 
 def decode_picture(data: bytes, path: Path, error: type[OptiSenseError]) -> NDArray[np.uint8]:
-    """(h, w, 3) uint8 of the content of a PNG or JPEG file.
+    """Decode the content of a PNG or JPEG file to an array (h, w, 3), uint8.
 
     Raises:
-        error: it is no such content; names the path.
+        error: the content is no such file; the message names the path.
     """
     try:
         with warnings.catch_warnings():
@@ -47,5 +47,5 @@ def decode_picture(data: bytes, path: Path, error: type[OptiSenseError]) -> NDAr
 
 
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
-    """Write (h, w, 3) uint8 as a PNG file."""
+    """Write an array (h, w, 3), uint8, as a PNG file."""
     Image.fromarray(picture).save(path, format="PNG")

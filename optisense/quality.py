@@ -1,4 +1,4 @@
-"""How many photons the light is traced with: one table for Python, commands and front ends.
+"""Quality levels: the numbers of photons for Python, commands and front ends, in one table.
 
 The relative RMS noise of the light on the skin of the built-in sensors is about 3 % with a million
 photons and falls with the square root of their number; docs/performance.md has the times.
@@ -9,42 +9,45 @@ from __future__ import annotations
 import math
 
 PHOTONS = {"draft": 60_000, "normal": 1_000_000, "fine": 5_000_000}
-"""Photons of each quality level.
+"""Number of photons of each quality level.
 
-draft: what follows the mouse in the studio, and a first look. normal: pictures, and the trials of
+draft: interactive editing in the studio, and a first look. normal: pictures, and the trials of
 searches. fine: scores, datasets and tasks, whose numbers are compared with one another.
 """
 
 PICTURE_PHOTONS = PHOTONS["normal"]
-"""The default of a picture."""
+"""Default number of photons of a picture; its noise is then hardly visible."""
 
 TRIAL_PHOTONS = PHOTONS["normal"]
-"""The default of a trial of a search. Another seed changes the score of a design by as much as five
-million photons do (RGB2Normal of a GelSight Mini: 0.001 to 0.002; NormDiff: 1 to 2 %), and the best
-trials are scored again with fresh seeds."""
+"""Default number of photons of a trial of a search. Another seed changes the score of a design by
+as much as five million photons do (RGB2Normal of a GelSight Mini: 0.001 to 0.002; NormDiff: 1 to 2
+%), and the best trials are scored again with fresh seeds.
+"""
 
 SCORE_PHOTONS = PHOTONS["fine"]
-"""The default of an evaluation, whose scores are compared with one another."""
+"""Default number of photons of an evaluation, whose scores are compared with one another."""
 
 SAMPLE_PHOTONS = PHOTONS["fine"]
-"""The default of what is made of many pictures: datasets, perception tasks, calibrations."""
+"""Default number of photons of results made of many pictures: datasets, perception tasks,
+calibrations.
+"""
 
 MOST_PHOTONS = 10_000_000_000
-"""Photons of an image: days of work, so more are a slip."""
+"""Largest number of photons of an image; it takes days, so more is a typing error."""
 
 LEVELS = "|".join(PHOTONS)
-"""The levels, as help texts list them."""
+"""Names of the levels, as help texts list them."""
 
 
 def photons_of(quality: int | float | str) -> int:
-    """The number of photons of a level, or a number as it is.
+    """Return the number of photons of a level, or a number as it is.
 
     Args:
-        quality: a level, or a whole number from 1 to `MOST_PHOTONS`, also as text or as a float
-            such as 2e6.
+        quality: level, or a whole number from 1 to `MOST_PHOTONS`, also as text or as a float such
+            as 2e6.
 
     Raises:
-        ValueError: it is neither.
+        ValueError: the argument is neither.
     """
     if isinstance(quality, str) and quality.strip().lower() in PHOTONS:
         return PHOTONS[quality.strip().lower()]

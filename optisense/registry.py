@@ -1,7 +1,7 @@
-"""Registries: named things of this package, of other installed packages and of a user's own code.
+"""Registries: named objects of this package, of other installed packages and of a user's own code.
 
 Indenters, sensors, search methods and file formats each have one. Other packages add to a registry
-by an entry point of its group, so that installing them is all that a user has to do.
+by an entry point of its group, so that a user only has to install them.
 """
 
 from __future__ import annotations
@@ -17,16 +17,18 @@ from optisense.near import suggestion
 T = TypeVar("T")
 
 MOST_SUGGESTED = 20
-"""Names that an error lists when none is near to a misspelt one: about two lines of a terminal."""
+"""Number of names that an error lists when none is similar to a misspelt one: about two lines of a
+terminal.
+"""
 
 
 class Registry(Generic[T]):
-    """Things of one kind by their names.
+    """Objects of one kind by their names.
 
     Attributes:
-        noun: what one of them is, for messages.
+        noun: word for one of them, for messages.
         group: entry-point group under which installed packages add one: name = "module:attribute".
-        built_in: names of the things that this package has.
+        built_in: names of the objects that this package has.
     """
 
     def __init__(
@@ -37,14 +39,16 @@ class Registry(Generic[T]):
         built_in: Mapping[str, str],
         check: Callable[[str, Any], None] = lambda name, thing: None,
     ) -> None:
-        """Name the built-in things; nothing is loaded before it is asked for.
+        """Store the names of the built-in objects; each is loaded when it is first requested.
 
         Args:
-            noun: such as "search method".
-            group: of the entry points.
-            error: the error of this noun.
-            built_in: where each thing of this package is defined ("module:attribute"), by name.
-            check: raises `error` where a thing does not fit; called with its name and itself.
+            noun: word for one of the objects, such as "search method".
+            group: group of the entry points.
+            error: class of errors about these objects.
+            built_in: place of definition of each object of this package ("module:attribute"), by
+                name.
+            check: function that is called with name and object, and raises `error` if the object
+                does not fit.
         """
         self.noun, self.group = noun, group
         self.built_in = tuple(built_in)
@@ -52,10 +56,10 @@ class Registry(Generic[T]):
         self._registered: dict[str, T] = {}
 
     def register(self, name: str, thing: T) -> T:
-        """Add a thing; the same one again (a file that was run once more) replaces itself.
+        """Add an object; the same one again (from a file that is run once more) replaces itself.
 
         Raises:
-            OptiSenseError: the name is malformed or belongs to another one, or the thing does not
+            OptiSenseError: the name is malformed or taken by another object, or the object does not
                 fit.
         """
         if name != name.strip().lower() or not name or set(name) & set(":,@/"):
@@ -73,10 +77,10 @@ class Registry(Generic[T]):
         return thing
 
     def find(self, name: str) -> T:
-        """The thing of a name.
+        """Return the object of a name.
 
         Raises:
-            OptiSenseError: there is none (the near match is named), or it can't be loaded.
+            OptiSenseError: there is none (a similar name is suggested), or it can't be loaded.
         """
         key = name.strip().lower()
         if key in self._registered:
@@ -94,14 +98,16 @@ class Registry(Generic[T]):
         )
 
     def __contains__(self, name: object) -> bool:
-        """Whether there is a thing of this name; installed packages are asked last."""
-        if not isinstance(name, str):  # of a file from a stranger
+        """Return whether there is an object of this name; installed packages are searched last."""
+        if not isinstance(name, str):  # a value from an untrusted file
             return False
         known = name in self._registered or name in self._homes
         return known or any(point.name == name for point in entry_points(group=self.group))
 
     def names(self) -> list[str]:
-        """All names: first the built-in ones in their order, then all others by the alphabet."""
+        """Return all names: first the built-in ones in their order, then all others in alphabetical
+        order.
+        """
         offered = {point.name for point in entry_points(group=self.group)}
         return [*self.built_in, *sorted((offered | set(self._registered)) - set(self.built_in))]
 
@@ -115,12 +121,12 @@ class Registry(Generic[T]):
                 where=f"{point.value}, of {package}",
                 hint="Repair or remove the package that brings it",
             ) from error
-        if point.name in self._registered:  # importing its module has registered it
+        if point.name in self._registered:  # the import of its module has registered it
             return self._registered[point.name]
         return self.register(point.name, thing)
 
 
 def _home(thing: object) -> str:
-    """Where a function or class is defined: "module:name"."""
+    """Return the place of definition of a function or class: "module:name"."""
     name = getattr(thing, "__qualname__", type(thing).__qualname__)
     return f"{getattr(thing, '__module__', '')}:{name}"

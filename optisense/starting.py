@@ -1,8 +1,8 @@
-"""The end of a process that a signal reaches while Python still imports what it needs.
+"""End of a process that a signal reaches while Python still imports modules.
 
-An exception at such a moment would come out of any line of any package: as a traceback, as an error
-of another kind, or as an abort of compiled code. So the process ends there and then, which loses
-nothing: no work has begun.
+An exception at such a moment could come out of any line of any package: as a traceback, as an error
+of another kind, or as an abort of compiled code. So the process ends at once, which loses nothing:
+no work has begun.
 """
 
 from __future__ import annotations
@@ -16,20 +16,22 @@ _begun = False
 
 
 def begin() -> None:
-    """From here on, work is done that a signal may have to wait for: called as a command begins."""
+    """Record that work has begun, for which a signal may have to wait; called as a command
+    begins.
+    """
     global _begun
     _begun = True
 
 
 def has_begun() -> bool:
-    """Whether `begin` was called."""
+    """Return whether `begin` was called."""
     return _begun
 
 
 def leave_on_signals() -> None:
-    """From here on, Ctrl-C and SIGTERM end the process with 130 or 143 and one word.
+    """Let Ctrl-C and SIGTERM end the process with 130 or 143 and one word from here on.
 
-    A signal that is ignored, as of programs that a shell runs in the background, stays so.
+    A signal that is ignored, as in programs that a shell runs in the background, stays ignored.
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) in (signal.default_int_handler, signal.SIG_DFL):

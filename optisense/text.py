@@ -1,8 +1,8 @@
-"""Text from files of others, made fit for a terminal, Markdown, HTML and spreadsheets.
+"""Escaping of text from untrusted files for a terminal, Markdown, HTML and spreadsheets.
 
 A design, a study or a library entry may come from a stranger. Its names and descriptions may hold
-characters that move the cursor or clear the screen, reverse the order of what follows, end a
-table's cell, or are HTML. Whatever shows such text asks here; nothing else escapes it.
+characters that move the cursor or clear the screen, reverse the direction of the text after them,
+end a table's cell, or are HTML. All code that shows such text escapes it with these functions.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ DIRECTIONS = frozenset("\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u
 """Characters that change the direction of the text after them."""
 
 MARKDOWN = re.compile(r"[\\`*{}\[\]#!|~$]|(?<!\w)_|_(?!\w)")
-"""Characters that mark text up in Markdown; '_' within a word does not."""
+"""Pattern of characters that have a meaning in Markdown; '_' within a word has none."""
 
 
 def visible(text: str) -> str:
-    """Text whose control characters are shown as Python writes them, such as ``\\x1b``.
+    """Return text whose control characters are shown as Python writes them, such as ``\\x1b``.
 
-    Line breaks and tabs stay. For terminals.
+    Line breaks and tabs are kept. The result is for terminals.
     """
     if text.isprintable():
         return text
@@ -32,36 +32,36 @@ def visible(text: str) -> str:
 
 
 MOST_QUOTED = 80
-"""Characters of a value that a message quotes."""
+"""Largest number of characters of a value that a message quotes; it fits a line of a terminal."""
 
 
 def brief(text: str, most: int = MOST_QUOTED) -> str:
-    """Text that a message quotes, cut off where it is long."""
+    """Return a text for quoting in a message, cut off if it is long."""
     return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def one_line(text: str) -> str:
-    """The same with single spaces for all white space."""
+    """Return a visible text with single spaces for all white space."""
     return visible(" ".join(text.split()))
 
 
 def markdown(text: str) -> str:
-    """Text in a line or a table's cell of Markdown, where nothing in it is mark-up or HTML."""
+    """Escape text for a line or a table's cell of Markdown."""
     return MARKDOWN.sub(r"\\\g<0>", html.escape(one_line(text), quote=False))
 
 
 def to_html(text: str) -> str:
-    """Text in HTML or SVG, in an element or a quoted attribute."""
+    """Escape text for HTML or SVG, in an element or a quoted attribute."""
     return html.escape(visible(text), quote=True)
 
 
 def shown_in_html(value: object) -> object:
-    """What templates that escape by themselves are to escape instead of a value."""
+    """Return a value as templates with automatic escaping shall escape it."""
     return visible(value) if type(value) is str else value
 
 
 def cell(text: str) -> str:
-    """Text in a CSV file that spreadsheets open, where it is no formula."""
+    """Escape text for a CSV file that spreadsheets open, so that it is no formula."""
     shown = visible(text)
     return f"'{shown}" if shown.startswith(("=", "+", "-", "@")) else shown
 

@@ -1,10 +1,10 @@
-"""The time that work still takes, estimated from the pieces that are finished.
+"""Time left of work, estimated from the pieces that are finished.
 
-Work is a sequence of steps, and a step is a number of like pieces: trials, sensors, photon passes.
-What is measured of a step tells how long its other pieces take. What has not begun yet is expected
-to take its usual time, longer or shorter by as much as the steps before it differed from theirs.
-The first piece of each worker also loads and compiles programs, so it says nothing about the
-others and is left out. What work usually takes stands in `optisense.usual_times`.
+Work is a sequence of steps, and a step is a number of similar pieces: trials, sensors, photon
+passes. The measured pieces of a step tell how long its other pieces take. Steps that have not begun
+are expected to take their usual time, scaled by the ratio of measured to usual time of the steps
+before. The first piece of each worker also loads and compiles programs, so it is left out. Usual
+durations are in `optisense.usual_times`.
 """
 
 from __future__ import annotations
@@ -16,32 +16,35 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 USUAL_PIECES = 0.5
-"""Pieces that the usual time of a piece counts as, where it is averaged with measured ones: enough
-to steady an estimate from a part of the first piece, little against two whole ones."""
+"""Number of measured pieces that the usual duration of a piece counts as in an average: enough to
+steady an estimate from a part of the first piece, little against two whole ones.
+"""
 
 USUAL_SHARE = 0.15
-"""Share of a step's pieces that the usual time counts as, where parts of pieces are told and that
-is more than `USUAL_PIECES`: the first ones, which compile, differ from the others."""
+"""Share of a step's pieces that the usual duration counts as, if parts of pieces are reported and
+this is more than `USUAL_PIECES`: the first pieces, which compile, differ from the others.
+"""
 
 ROUNDS = 3
-"""Pieces per worker after which the time between pieces is measured by the clock. Before that the
-pieces' own times are averaged, since pieces of several workers end in bunches."""
+"""Number of pieces per worker after which the time between pieces is measured by the clock. Before
+that the pieces' own times are averaged, since pieces of several workers end in bunches.
+"""
 
 REMEMBERED = 400
-"""Times at which pieces ended that are kept; of more, every second one is dropped."""
+"""Largest number of recorded end times of pieces; of more, every second one is dropped."""
 
 
 @dataclass
 class TimedStep:
-    """A part of the work.
+    """Part of the work.
 
     Attributes:
-        name: what it is called.
-        count: its pieces; fractions of pieces may be done.
-        seconds: a piece usually takes, all workers together; None if nobody can know beforehand.
-        warm_up: first pieces that also load and compile, and say nothing about the others.
-        gauges: whether the time it takes tells how fast this machine is; loading from a disk, say,
-            does not.
+        name: name of the step.
+        count: number of its pieces; fractions of pieces may be done.
+        seconds: usual duration of a piece, all workers together, s; None if unknown.
+        warm_up: number of first pieces that also load and compile, and are not representative.
+        gauges: whether its duration shows how fast this machine is; loading from a disk, for
+            example, does not.
     """
 
     name: str
@@ -52,10 +55,10 @@ class TimedStep:
 
 
 class TimeLeft:
-    """Estimates the time left of work in steps.
+    """Estimator of the time left of work in steps.
 
     Attributes:
-        workers: processes that pieces are spread over.
+        workers: number of processes that share the pieces.
     """
 
     def __init__(
@@ -67,9 +70,9 @@ class TimeLeft:
         """Start the clock; no step has begun.
 
         Args:
-            steps: in their order.
-            workers: processes that pieces with times of their own are spread over.
-            clock: tells seconds.
+            steps: steps in their order.
+            workers: number of processes that share pieces with times of their own.
+            clock: function that returns the time, s.
         """
         self._steps = list(steps)
         self.workers = max(1, workers)
@@ -90,16 +93,16 @@ class TimeLeft:
 
     @property
     def elapsed(self) -> float:
-        """Seconds since the clock was started."""
+        """Time since the clock was started, s."""
         return self._clock() - self._began
 
     def begin(self, name: str, count: float | None = None, done: float = 0.0) -> None:
         """Begin a step and end the one before it; steps in between are skipped.
 
         Args:
-            name: of the step, which comes after the current one.
-            count: of its pieces, if that is better known now.
-            done: pieces that were finished earlier, at no cost now.
+            name: name of the step, which comes after the current one.
+            count: number of its pieces, if it is better known now.
+            done: number of pieces that were finished earlier, at no cost now.
 
         Raises:
             ValueError: no step of this name follows.
@@ -120,8 +123,8 @@ class TimeLeft:
         seconds: float | None = None,
         gauges: bool | None = None,
     ) -> None:
-        """Correct what is expected of a step: its pieces, the seconds of a piece, or whether its
-        time tells how fast this machine is.
+        """Correct the expectations of a step: the number of its pieces, the duration of a piece, or
+        whether it shows how fast this machine is.
         """
         step = next(step for step in self._steps if step.name == name)
         step.gauges = step.gauges if gauges is None else gauges
@@ -129,13 +132,12 @@ class TimeLeft:
         step.seconds = step.seconds if seconds is None else seconds
 
     def advance(self, done: float, seconds: float | None = None, worker: str = "") -> None:
-        """Tell how many pieces of the current step are done, parts of pieces included.
+        """Report how many pieces of the current step are done, including parts of pieces.
 
         Args:
-            done: those done before `begin` included.
-            seconds: the pieces since the last call took by themselves, where several workers are
-                at work.
-            worker: that did it. The first piece of each is not used for the estimate.
+            done: number of finished pieces, including those finished before `begin`.
+            seconds: duration of the pieces since the last call, if several workers are active.
+            worker: name of the worker. The first piece of each is not used for the estimate.
         """
         now = self._clock()
         if done <= self._done and seconds is None:
@@ -145,7 +147,7 @@ class TimeLeft:
         if seconds is not None:
             if worker not in self._known_workers:
                 self._known_workers.add(worker)
-                if not self._has_own:  # the clock counts from here, too
+                if not self._has_own:  # the clock starts again here, too
                     self._ends = deque([(now, done)])
                 return
             if pieces <= 0.0:
@@ -164,18 +166,18 @@ class TimeLeft:
 
     @property
     def count(self) -> float:
-        """Pieces of the current step."""
+        """Number of pieces of the current step."""
         return self._steps[self._current].count
 
     @property
     def seconds_left(self) -> float:
-        """Until everything is done; NaN where that can't be known yet."""
+        """Time until all is done, s; NaN if unknown."""
         if not self._steps:
             return math.nan
         return sum((self.seconds_left_of(step.name) for step in self._steps), 0.0)
 
     def seconds_left_of(self, name: str) -> float:
-        """Seconds that a step will still take; NaN where that can't be known yet."""
+        """Return the remaining time of a step, s; NaN if unknown."""
         place = next(place for place, step in enumerate(self._steps) if step.name == name)
         step = self._steps[place]
         if place < self._current or step.count <= 0.0:
@@ -185,13 +187,14 @@ class TimeLeft:
         rest = max(0.0, step.count - self._done)
         if rest == 0.0:
             return 0.0
-        # Of the piece at hand `since` is over; one that takes longer may end any moment.
+        # `since` is the elapsed time of the current piece; one that takes longer may end at any
+        # moment.
         since = self._clock() - self._advanced
         return max(rest * self.pace - since, (rest - 1.0) * self.pace, 0.0)
 
     @property
     def fraction(self) -> float:
-        """The share of the whole time that has passed, 0 to 1; it never falls."""
+        """Share of the whole time that has passed, 0 to 1; it never falls."""
         left = self.seconds_left
         if math.isfinite(left):
             elapsed = self.elapsed
@@ -200,7 +203,7 @@ class TimeLeft:
 
     @property
     def pace(self) -> float:
-        """Seconds from piece to piece of the current step; NaN where that can't be known yet."""
+        """Time from piece to piece of the current step, s; NaN if unknown."""
         step = self._steps[self._current]
         usual = self._usual(step)
         if self._has_own or self._known_workers:
@@ -223,25 +226,25 @@ class TimeLeft:
         return (end - began + weight * usual) / (done - first + weight)
 
     def _window(self) -> tuple[float, float]:
-        """When the pieces that the pace is measured by began, and how many were done then.
+        """Return when the pieces that the pace is measured by began, and how many were done then.
 
-        These are the later half of those that have been done: the pace may change.
+        They are the later half of the finished ones, because the pace may change.
         """
         if len(self._ends) < 2 * ROUNDS * self.workers:
             return self._ends[0]
         return self._ends[len(self._ends) // 2]
 
     def _usual(self, step: TimedStep) -> float:
-        """Seconds that a piece usually takes, at the speed that this machine has shown."""
+        """Return the usual duration of a piece, at the measured speed of this machine, s."""
         if step.seconds is None:
             return math.nan
         return step.seconds * self._slowness
 
     @property
     def _slowness(self) -> float:
-        """Seconds that work takes here for each second of its usual time.
+        """Ratio of measured to usual duration of the work so far.
 
-        Finished parts of the step at hand count, and the rest of it once it is late.
+        Finished parts of the current step count, and the rest of it once it is late.
         """
         before = self._measured / self._expected if self._expected > 0.0 else 1.0
         step = self._steps[self._current] if self._current >= 0 else None
@@ -261,7 +264,7 @@ class TimeLeft:
         return max(before, measured / expected) if expected > 0.0 else before
 
     def _close_step(self) -> None:
-        """Compare what the current step took with what it usually takes."""
+        """Compare the duration of the current step with its usual one."""
         if self._current < 0:
             return
         step = self._steps[self._current]
@@ -271,5 +274,5 @@ class TimeLeft:
 
 
 def _steadying(step: TimedStep) -> float:
-    """Pieces that the usual time of a step's piece counts as."""
+    """Return the number of pieces that the usual duration of a step's piece counts as."""
     return max(USUAL_PIECES, USUAL_SHARE * step.count)

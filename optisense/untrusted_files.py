@@ -1,10 +1,10 @@
-"""Reading files that strangers may have made: the one door for designs, meshes, studies and more.
+"""Reader of files from untrusted sources: all designs, meshes, studies and the like are read here.
 
-A file is read in this order: it must be a regular file and no larger than a stated bound, which is
-known before anything is read; then it is parsed, with finite numbers only; then its values are
-checked against a schema. Paths that a file names must stay inside its folder, links followed.
-Whatever fails at any of these steps is an `OptiSenseError` of the caller's class, which names the
-file, the place in it, and what to do.
+A file is read in this order: it must be a regular file and no larger than a given bound, which is
+checked before it is read; then it is parsed, with finite numbers only; then its values are checked
+against a schema. Paths in a file must stay inside its folder after links are resolved. A failure at
+any step is an `OptiSenseError` of the caller's class, which names the file, the place in it, and
+the remedy.
 """
 
 from __future__ import annotations
@@ -31,42 +31,48 @@ MEBIBYTE = 2**20
 """Number of bytes of a mebibyte, in which the bounds below are given."""
 
 MOST_MESH = 128 * MEBIBYTE
-"""Bytes of a mesh file. A binary STL file of this size has 2.7 million triangles, more than a
-sensor is simulated with; the largest mesh of the built-in sensors has 4 MiB."""
+"""Largest size of a mesh file, bytes. A binary STL file of this size has 2.7 million triangles,
+more than a sensor is simulated with; the largest mesh of the built-in sensors has 4 MiB.
+"""
 
 MOST_STEP = 64 * MEBIBYTE
-"""Bytes of a STEP file: the CAD models of sensors have up to some 20 MiB."""
+"""Largest size of a STEP file, bytes: the CAD models of sensors have up to some 20 MiB."""
 
 MOST_IES = 16 * MEBIBYTE
-"""Bytes of an IES file: a lamp that was measured at every half degree has 2 MiB."""
+"""Largest size of an IES file, bytes: a lamp that was measured at every half degree has 2 MiB."""
 
 MOST_TEXT = 16 * MEBIBYTE
-"""Bytes of a file of YAML: a design whose cages have 8000 control points has 1 MiB."""
+"""Largest size of a YAML file, bytes: a design whose cages have 8000 control points has 1 MiB."""
 
 MOST_JSON = 16 * MEBIBYTE
-"""Bytes of a file of JSON: a study that varies a thousand parameters has 1 MiB."""
+"""Largest size of a JSON file, bytes: a study that varies a thousand parameters has 1 MiB."""
 
 MOST_BOARD = 16 * MEBIBYTE
-"""Bytes of a pick-and-place file: a board with 10,000 parts has 1 MiB."""
+"""Largest size of a pick-and-place file, bytes: a board with 10,000 parts has 1 MiB."""
 
 MOST_PROGRAM = 16 * MEBIBYTE
-"""Bytes of a user's Python file; such files have some KiB."""
+"""Largest size of a user's Python file, bytes; such files have some KiB."""
 
 MOST_TABLE = 512 * MEBIBYTE
-"""Bytes of a CSV table: a dataset of a million samples has 300 MiB."""
+"""Largest size of a CSV table, bytes: a dataset of a million samples has 300 MiB."""
 
 MOST_ARRAYS = 2048 * MEBIBYTE
-"""Bytes of the arrays of one file, unpacked: depth, normals and mask of a picture of 100 million
-pixels have 1.7 GB."""
+"""Largest size of the arrays of one file, unpacked, bytes: depth, normals and mask of a picture of
+100 million pixels have 1.7 GB.
+"""
 
 MOST_PICTURE = 512 * MEBIBYTE
-"""Bytes of a PNG file: a picture of 100 million pixels, the largest that is made, has less."""
+"""Largest size of a PNG file, bytes: a picture of 100 million pixels, the largest that is made, has
+less.
+"""
 
 MOST_STORE = 1024 * MEBIBYTE
-"""Bytes of a study's store: a trial has some 2 KiB, so this is half a million of them."""
+"""Largest size of a study's store, bytes: a trial has some 2 KiB, so this is half a million of
+them.
+"""
 
 LARGEST_INTEGER = 2**63 - 1
-"""The largest whole number accepted in JSON: NumPy and SQLite hold no larger one."""
+"""Largest integer that is accepted in JSON: NumPy and SQLite hold no larger one."""
 
 COPY_AGAIN = "Check that this is the right file, and copy or make it again"
 
@@ -74,19 +80,19 @@ Error = type[OptiSenseError]
 
 
 def read_bytes(path: Path, most: int, error: Error, what: str = "the file") -> bytes:
-    """The content of a regular file that is not too large.
+    """Return the content of a regular file that is not too large.
 
     Args:
-        path: of the file.
-        most: bytes it may have; one that has more is refused before it is read.
-        error: class of what is raised.
-        what: how messages call it, such as "the mesh file".
+        path: path of the file.
+        most: largest size, bytes; a larger file is refused before it is read.
+        error: class of the error that is raised.
+        what: name of the file in messages, such as "the mesh file".
 
     Raises:
-        error: the file is missing, no regular file, too large, or can't be read.
+        error: the file is missing, not regular, too large, or can't be read.
     """
     try:
-        # A pipe without a writer would wait for one.
+        # Without O_NONBLOCK, a pipe without a writer would block.
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with open(descriptor, "rb") as file:  # noqa: PTH123 - it is open already
             found = os.fstat(descriptor)
@@ -107,10 +113,10 @@ def read_bytes(path: Path, most: int, error: Error, what: str = "the file") -> b
 
 
 def check_size(path: Path, most: int, error: Error, what: str = "the file") -> None:
-    """Check that a file which another library reads is a regular file and not too large.
+    """Check that a file which another library reads is regular and not too large.
 
     Raises:
-        error: it is missing, no regular file, or too large.
+        error: the file is missing, not regular, or too large.
     """
     try:
         found = path.stat()
@@ -125,19 +131,19 @@ def check_size(path: Path, most: int, error: Error, what: str = "the file") -> N
 
 
 def read_text(path: Path, most: int, error: Error, what: str = "the file") -> str:
-    """The content of a file of UTF-8 text; a mark of the byte order at its start is dropped.
+    """Return the content of a UTF-8 text file; a byte order mark at its start is dropped.
 
     Raises:
-        error: as `read_bytes`, or it is not UTF-8.
+        error: see `read_bytes`; or the file is not UTF-8.
     """
     return as_text(read_bytes(path, most, error, what), str(path), error, what)
 
 
 def as_text(data: bytes, source: str, error: Error, what: str = "the file") -> str:
-    """Bytes as UTF-8 text.
+    """Decode bytes as UTF-8 text.
 
     Raises:
-        error: they are none; says the line.
+        error: the bytes are not UTF-8; the message names the line.
     """
     try:
         return data.decode("utf-8-sig")
@@ -149,26 +155,26 @@ def as_text(data: bytes, source: str, error: Error, what: str = "the file") -> s
 
 
 def read_json(path: Path, error: Error, most: int = MOST_JSON, what: str = "the file") -> Any:
-    """The values in a JSON file; all its numbers are finite.
+    """Return the values in a JSON file; all its numbers are finite.
 
     Raises:
-        error: as `read_text` and `parse_json`.
+        error: see `read_text` and `parse_json`.
     """
     return parse_json(read_text(path, most, error, what), str(path), error, what)
 
 
 def parse_json(text: str, source: str, error: Error, what: str = "the file") -> Any:
-    """The values in a JSON text; all its numbers are finite.
+    """Return the values in a JSON text; all its numbers are finite.
 
     Args:
-        text: JSON, where NaN and Infinity are refused, as are numbers too large for a float or
-            for an integer of 64 bits, and keys that are there twice.
-        source: names it in messages.
-        error: class of what is raised.
-        what: how messages call it.
+        text: JSON; NaN and Infinity are refused, and so are numbers too large for a float or a
+            64-bit integer, and duplicate keys.
+        source: name of the text in messages.
+        error: class of the error that is raised.
+        what: word for the text in messages.
 
     Raises:
-        error: it is no such text; says the line where that is known.
+        error: the text is not such JSON; the message names the line if it is known.
     """
     try:
         return json.loads(
@@ -191,10 +197,10 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
 
 
 def read_table(path: Path, error: Error, what: str = "the table") -> list[dict[str, str]]:
-    """The rows of a CSV file as text, by column.
+    """Return the rows of a CSV file as text, by column.
 
     Raises:
-        error: as `read_text`, or it is no such file; says the line.
+        error: see `read_text`; or the file is no CSV file; the message names the line.
     """
     text = read_text(path, MOST_TABLE, error, what)
     reader = csv.DictReader(io.StringIO(text, newline=""))
@@ -206,9 +212,10 @@ def read_table(path: Path, error: Error, what: str = "the table") -> list[dict[s
 
 
 def inside(folder: Path, relative: str) -> Path | None:
-    """The path of a file that a file of the folder names; None where it leads out of the folder.
+    """Return the path of a file that a file of the folder names, or None if it is outside of the
+    folder.
 
-    Links are followed, and one that leads back to itself stays as it is.
+    Links are resolved; a link that refers to itself stays as it is.
     """
     if "\0" in relative:
         return None
@@ -220,7 +227,7 @@ def inside(folder: Path, relative: str) -> Path | None:
 
 
 def is_file(path: Path) -> bool:
-    """Whether there is a regular file; False too where a path can't be one at all."""
+    """Return whether a path is a regular file; False also for an invalid path."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -228,7 +235,7 @@ def is_file(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is a folder; False too where a path can't be one at all."""
+    """Return whether a path is a folder; False also for an invalid path."""
     try:
         return path.is_dir()
     except (OSError, ValueError):
@@ -238,16 +245,16 @@ def is_folder(path: Path) -> bool:
 def read_arrays(
     path: Path, error: Error, most: int = MOST_ARRAYS, what: str = "the arrays"
 ) -> dict[str, NDArray[Any]]:
-    """The arrays of an NPZ file by name; nothing in it is run.
+    """Return the arrays of an NPZ file by name; pickled objects in it are refused.
 
     Args:
-        path: of the file.
-        error: class of what is raised.
-        most: bytes of all arrays together, unpacked.
-        what: how messages call them.
+        path: path of the file.
+        error: class of the error that is raised.
+        most: largest size of all arrays together, unpacked, bytes.
+        what: word for the arrays in messages.
 
     Raises:
-        error: the file is missing, cut off, changed, or too large once it is unpacked.
+        error: the file is missing, truncated, damaged, or too large once it is unpacked.
     """
     data = read_bytes(path, most, error, what)
     try:
@@ -257,7 +264,7 @@ def read_arrays(
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         for name, array in arrays.items():
-            if not isinstance(array, np.ndarray):  # NumPy returns what is no array as bytes
+            if not isinstance(array, np.ndarray):  # NumPy returns other members as bytes
                 raise ValueError(f"'{brief(name)}' is no array")
         return arrays
     except OptiSenseError:
@@ -267,10 +274,10 @@ def read_arrays(
 
 
 def read_array(path: Path, error: Error, most: int = MOST_ARRAYS) -> NDArray[Any]:
-    """The array of an NPY file; nothing in it is run.
+    """Return the array of an NPY file; pickled objects in it are refused.
 
     Raises:
-        error: the file is missing, cut off or changed.
+        error: the file is missing, truncated or damaged.
     """
     data = read_bytes(path, most, error, "the array")
     try:
@@ -286,18 +293,18 @@ def check_arrays(
     path: Path,
     error: Error,
 ) -> None:
-    """Check that arrays of a picture are there, of the right type, and all of one size.
+    """Check that all arrays of a picture exist, and have the right type and size.
 
     Args:
-        arrays: by name.
-        kinds: of each that must be there: what its type may be, as of NumPy's `dtype.kind`, and
-            the numbers of a pixel (None for one without an axis of its own).
+        arrays: arrays by name.
+        kinds: required arrays by name: the allowed types, as NumPy's `dtype.kind`, and the number
+            of channels (None for an array without a channel axis).
         size: height and width.
-        path: of their file, for messages.
-        error: class of what is raised.
+        path: path of their file, for messages.
+        error: class of the error that is raised.
 
     Raises:
-        error: one is missing, or of another type or shape.
+        error: an array is missing, or of another type or shape.
     """
     for name, (types, channels) in kinds.items():
         if name not in arrays:
@@ -314,7 +321,9 @@ def check_arrays(
 
 
 def first_problem(error: ValidationError) -> str:
-    """What is wrong first with values that a pydantic model refuses, with its place among them."""
+    """Return the first problem of values that a pydantic model refuses, with its place among
+    them.
+    """
     report = error.errors(include_url=False, include_context=False)[0]
     place = ".".join(brief(str(step)) for step in report["loc"])
     if report["type"] == "missing":
@@ -358,7 +367,7 @@ def _finite(text: str) -> float:
 
 
 def _integer(text: str) -> int:
-    # Python refuses by itself to read some thousand digits.
+    # Python itself refuses to parse integers of some thousand digits.
     value = int(text)
     if abs(value) > LARGEST_INTEGER:
         raise ValueError(f"the whole number {text[:40]} is too large")

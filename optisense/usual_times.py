@@ -1,8 +1,8 @@
 """Usual durations of pieces of work, which give the time left before any is measured.
 
-Times are stated in processor seconds on GelSight Mini, with kernels in the renderer's cache. They
-become seconds by the number of processors, by how many other processes want these, and by the size
-of the sensor. What is measured later corrects them (`optisense.time_left`).
+They are processor seconds on GelSight Mini, with kernels in the renderer's cache, and are converted
+to seconds by the number of processors, the load of the machine, and the size of the sensor. Later
+measurements correct them (`optisense.time_left`).
 """
 
 from __future__ import annotations
@@ -12,57 +12,63 @@ import time
 from dataclasses import dataclass
 
 LOADING = 1.0
-"""Seconds that loading the program and a design takes."""
+"""Time to load the program and a design, s."""
 
 BUILDING = 0.3
-"""Seconds that building the scene of a design takes."""
+"""Time to build the scene of a design, s."""
 
 PREPARING = 0.15
-"""Processor seconds to place contacts and trace chief rays for the first image, compiling too."""
+"""Processor time to place contacts and trace chief rays for the first image, with compiling, s."""
 
 PILOT = 0.25
-"""Processor seconds to trace the pilot photons, compiling too."""
+"""Processor time to trace the pilot photons, with compiling, s."""
 
 MILLION_PHOTONS = 0.62
-"""Processor seconds that tracing a million photons takes, compiled already."""
+"""Processor time to trace a million photons, without compiling, s."""
 
 SMOOTHING = 0.25
-"""Processor seconds to smooth the radiance cache."""
+"""Processor time to smooth the radiance cache, s."""
 
 COMPILING = 0.5
-"""Processor seconds that compiling, or finding kernels in the cache, takes in the first image."""
+"""Processor time to compile the kernels of the first image, or to find them in the cache, s."""
 
 PICTURE, PICTURE_PIXELS = 0.2, 0.15
-"""Processor seconds to shade a picture: in any case, and for each `USUAL_PIXELS`."""
+"""Processor time to shade a picture, s: a constant part, and a part for each `USUAL_PIXELS`."""
 
 USUAL_PIXELS = 320 * 240
-"""Number of pixels of an image for which times are stated."""
+"""Number of pixels of an image for which durations are given."""
 
 USUAL_AREA = 524.0
-"""Area in mm2 of the sensing surface of GelSight Mini, for which times are stated."""
+"""Area of the sensing surface of GelSight Mini, for which durations are given, mm2."""
 
 LARGEST_FACTOR = 3.0
-"""Larger surfaces take longer to light, up to so much: GelSight Svelte (1,478 mm2), GelSight360
-(2,989 mm2) and GelBelt (3,581 mm2) take 2.9 to 3.3 times as long as GelSight Mini."""
+"""Largest factor on the duration of the light for larger surfaces: GelSight Svelte (1,478 mm2),
+GelSight360 (2,989 mm2) and GelBelt (3,581 mm2) take 2.9 to 3.3 times as long as GelSight Mini.
+"""
 
 USUAL_GROUPS = 3
-"""Light groups of GelSight Mini; the time to shade a picture grows as their number beyond that."""
+"""Number of light groups of GelSight Mini; the time to shade a picture grows with the number beyond
+that.
+"""
 
 MOST_THREADS = 8
-"""Processors that shorten the work in proportion; more are idle between short kernels."""
+"""Largest number of processors that shorten the work in proportion; more are idle between short
+kernels.
+"""
 
 SHARED_POWER = 1.4
-"""The exponent of slowdown by other processes: where work of one thread takes k times as
-long, that of all threads takes about k to this power, since it waits for its slowest thread."""
+"""Exponent of the slowdown by other processes: if work of one thread takes k times as long, that of
+all threads takes about k to this power, since it waits for its slowest thread.
+"""
 
 _BEGAN = time.monotonic(), time.process_time()
 
 
 def crowding() -> float:
-    """How many times as long work of one thread takes since other processes want the processors.
+    """Return the factor by which other processes slow down work of one thread.
 
-    This is wall time over processor time since this module was loaded, as far as the load of the
-    machine explains it; waiting for a disk or a person does not count.
+    It is wall time divided by processor time since this module was loaded, as far as the load of
+    the machine explains it; waiting for a disk or a person does not count.
     """
     wall, busy = time.monotonic() - _BEGAN[0], time.process_time() - _BEGAN[1]
     try:
@@ -74,7 +80,7 @@ def crowding() -> float:
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
@@ -82,13 +88,13 @@ def processors() -> int:
 
 @dataclass(frozen=True)
 class UsualTimes:
-    """Usual times (seconds) of a sensor's light and pictures.
+    """Usual durations of a sensor's light and pictures, s.
 
     Attributes:
-        pace: seconds for each processor second of work that all processors share.
-        thread_pace: seconds for each processor second of work of one thread.
-        light: how many times as long the light takes as on GelSight Mini.
-        shading: how many times as long pictures take as on GelSight Mini.
+        pace: seconds per processor second of work that all processors share.
+        thread_pace: seconds per processor second of work of one thread.
+        light: duration of the light relative to GelSight Mini.
+        shading: duration of pictures relative to GelSight Mini.
     """
 
     pace: float = 0.5
@@ -98,11 +104,11 @@ class UsualTimes:
 
     @staticmethod
     def here(area: float = USUAL_AREA, groups: int = USUAL_GROUPS) -> UsualTimes:
-        """The usual times of this machine, as busy as it is now.
+        """Return the usual durations on this machine at its present load.
 
         Args:
-            area: of the sensing surfaces, mm2.
-            groups: of lights.
+            area: area of the sensing surfaces, mm2.
+            groups: number of light groups.
         """
         crowded = crowding()
         return UsualTimes(
@@ -113,29 +119,29 @@ class UsualTimes:
         )
 
     def preparing(self) -> float:
-        """Getting ready for the first image."""
+        """Return the time to prepare the first image, s."""
         return self.pace * PREPARING
 
     def pilot(self) -> float:
-        """The pilot photons."""
+        """Return the time to trace the pilot photons, s."""
         return self.pace * PILOT
 
     def tracing(self, photons: float) -> float:
-        """Seconds to trace so many photons."""
+        """Return the time to trace a number of photons, s."""
         return self.pace * self.light * MILLION_PHOTONS * photons / 1e6
 
     def smoothing(self) -> float:
-        """Smoothing the radiance cache."""
+        """Return the time to smooth the radiance cache, s."""
         return self.pace * self.light * SMOOTHING
 
     def compiling(self) -> float:
-        """What the first image takes longer than the next."""
+        """Return the time that the first image takes longer than the next, s."""
         return self.pace * COMPILING
 
     def picture(self, pixels: float) -> float:
-        """Shading a picture of so many pixels."""
+        """Return the time to shade a picture with a number of pixels, s."""
         return self.pace * self.shading * (PICTURE + PICTURE_PIXELS * pixels / USUAL_PIXELS)
 
     def first_light(self, photons: float) -> float:
-        """All that comes before the first picture is shaded, but for compiling."""
+        """Return the time of all work before the first picture is shaded, without compiling, s."""
         return self.preparing() + self.pilot() + self.tracing(photons) + self.smoothing()

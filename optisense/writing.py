@@ -15,20 +15,20 @@ from uuid import uuid4
 from optisense.errors import OutputError
 
 TEMPORARY = re.compile(r"\..+\.(?P<process>[0-9]{1,9})-[0-9a-f]{8}(\.[^.]+)?")
-"""Names of temporary files, which hold the number of the process that writes them."""
+"""Pattern of the names of temporary files, which contain the id of the process that writes them."""
 
 FREE_SPACE = "Free space on this disk or choose another folder"
 
 
 def inside(folder: Path, relative: str) -> Path:
-    """Where to write a file of a folder; its subfolder is made.
+    """Return the path for a file of a folder, and create its subfolder.
 
     Args:
-        folder: the folder that the user named, which may be a link itself.
+        folder: folder that the user named, which may be a link itself.
         relative: path of the file in it.
 
     Raises:
-        OutputError: a link in the folder leads out of it, or its subfolder can't be made.
+        OutputError: a link in the folder leads out of it, or its subfolder can't be created.
     """
     final = folder / relative
     if not Path(os.path.realpath(final.parent)).is_relative_to(os.path.realpath(folder)) or (
@@ -52,18 +52,18 @@ def inside(folder: Path, relative: str) -> Path:
 
 @contextmanager
 def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Path], Path]]:
-    """Files that appear all at once, when the block has ended well.
+    """Context for files that appear all at once, when the block has ended without an error.
 
     Yields:
         A function that takes where a file shall be, makes its folder, and returns the temporary
         path to write to, in the same folder and with the same suffix.
 
     Args:
-        what: for the message, such as "the design".
-        hint: what the user may do when it fails.
+        what: word for the files in messages, such as "the design".
+        hint: remedy if it fails.
 
     Raises:
-        OutputError: for any `OSError`; no temporary file is left behind.
+        OutputError: in place of any `OSError`; no temporary file is left behind.
     """
     staged: list[tuple[Path, Path]] = []
 
@@ -78,7 +78,7 @@ def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Pa
         for temporary, final in staged:
             temporary.replace(final)
     except OSError as error:
-        # A failed rename names the temporary file: the user knows only the other.
+        # A failed rename names the temporary file; the user knows only the other.
         names = {str(temporary): str(final) for temporary, final in staged}
         named = str(error.filename or (staged[-1][0] if staged else ""))
         raise OutputError(
@@ -94,10 +94,10 @@ def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Pa
 
 @contextmanager
 def written_whole(path: Path, what: str = "the file", hint: str = FREE_SPACE) -> Iterator[Path]:
-    """The same for one file: yields the temporary path to write to.
+    """Context for one file, as `written_together`; yields the temporary path to write to.
 
     Raises:
-        OutputError: as `written_together`.
+        OutputError: see `written_together`.
     """
     with written_together(what, hint) as stage:
         yield stage(path)
@@ -107,23 +107,23 @@ def write_text(path: Path, text: str, what: str = "the file", hint: str = FREE_S
     """Write a text file (UTF-8), whole.
 
     Raises:
-        OutputError: as `written_together`.
+        OutputError: see `written_together`.
     """
     with written_whole(path, what, hint) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
 HEAD = 4096
-"""Bytes at the start of an HTML page among which its head is looked for."""
+"""Number of bytes at the start of an HTML page in which its head is searched."""
 
 
 def is_own_page(path: Path, kind: str) -> bool:
-    """Whether a file is an HTML page that this program has written.
+    """Return whether a file is an HTML page that this program has written.
 
     Args:
-        path: of the file.
-        kind: of the page, which its head names: "render", "scores", "search",
-            "tolerance", "compare" or "calibrate".
+        path: path of the file.
+        kind: kind of the page, which its head names: "render", "scores", "search", "tolerance",
+            "compare" or "calibrate".
     """
     try:
         with path.open("rb") as file:
@@ -137,11 +137,11 @@ def is_own_page(path: Path, kind: str) -> bool:
 def remove_own_page(path: Path, kind: str) -> None:
     """Remove a page that this program wrote about results which others now replace.
 
-    A file of that name that is anything else is a user's, and stays.
+    Any other file of that name belongs to the user, and is kept.
 
     Args:
-        path: of the page.
-        kind: as of `is_own_page`.
+        path: path of the page.
+        kind: see `is_own_page`.
 
     Raises:
         OutputError: the page can't be removed.
@@ -164,7 +164,7 @@ def write_json(
     """Write a JSON file, whole.
 
     Raises:
-        OutputError: as `written_together`.
+        OutputError: see `written_together`.
     """
     text = json.dumps(values, indent=2, ensure_ascii=False)
     write_text(path, text + "\n", what, hint)
