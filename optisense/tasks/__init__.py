@@ -77,5 +77,5 @@ __all__ = [
     "verify",
 ]
 
-if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
+if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
     __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class BallForce(BallPress):
-    """A ball pressed near the middle of the sensor, whose force is to be read.
+    """A perception task: the force on a ball pressed near the middle of the sensor.
 
-    The force is that of the elastic gel (see `optisense.mechanics`). The whole picture is read, as
-    nothing in it tells where the contact ends.
+    The force is that of the elastic gel (see `optisense.mechanics`). The features are those of the
+    whole picture, as the extent of the contact is unknown.
     """
 
     name: ClassVar[str] = "force"
@@ -34,10 +34,10 @@ class BallForce(BallPress):
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
     ) -> tuple[Contact, Sequence[float]]:
-        """A ball at a random depth, and the force of the gel on it."""
+        """Return a ball at a random depth, and the force (N) of the gel on it."""
         contact = self.ball(rng)
         return contact, (model.pressed([contact]).contacts[0].force,)
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """The standard deviation of each channel over the picture, in levels of 255."""
+        """Return the standard deviation of each channel over the picture, in levels of 255."""
         return spread_of_colours(picture)

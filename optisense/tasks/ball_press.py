@@ -1,4 +1,4 @@
-"""Balls pressed near the middle of a sensor, as several tasks press them."""
+"""Balls pressed near the middle of a sensor, shared by several tasks."""
 
 from __future__ import annotations
 
@@ -16,17 +16,19 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 SPREAD_FEATURES = ("spread_red", "spread_green", "spread_blue")
-"""Names of what `spread_of_colours` gives."""
+"""Names of the features that `spread_of_colours` returns."""
 
 
 def spread_of_colours(pixels: NDArray[np.uint8]) -> Sequence[float]:
-    """The standard deviation of each channel over pixels (..., 3), in levels of 255."""
+    """Return the standard deviation of each channel over pixels (..., 3), in levels of 255."""
     spread: list[float] = pixels.reshape(-1, 3).std(axis=0, dtype=np.float64).tolist()
     return spread
 
 
 def place_aside(rng: np.random.Generator, aside: float) -> tuple[float, float]:
-    """A place (u, v) mm drawn evenly from a square of half this side around the middle."""
+    """Draw a place (u, v), mm, uniformly from a square of half side ``aside`` (mm) around the
+    middle.
+    """
     u, v = rng.uniform(-aside, aside, 2).tolist()
     return u, v
 
@@ -34,10 +36,10 @@ def place_aside(rng: np.random.Generator, aside: float) -> tuple[float, float]:
 def try_corners(
     model: OpticalModel, indenters: Iterable[Indenter], aside: float, depth: float
 ) -> None:
-    """Place indenters at the corners of the square from which `place_aside` draws.
+    """Check that indenters can be placed at the corners of the square of `place_aside`.
 
     Raises:
-        ContactError: one is off the surface or deeper than the gel.
+        ContactError: an indenter is off the surface or deeper than the gel.
     """
     for indenter in indenters:
         for u in (-aside, aside):
@@ -50,9 +52,9 @@ class BallPress:
     """A ball pressed near the middle of a sensor.
 
     Attributes:
-        radius: mm, of the ball.
-        least, most: mm; the depth is drawn evenly in between.
-        aside: mm; the place is drawn evenly from a square of half this side around the middle.
+        radius: radius of the ball, mm.
+        least, most: bounds of the uniform distribution of the depth, mm.
+        aside: half side (mm) of the square around the middle from which the place is drawn.
     """
 
     radius: float = 3.0
@@ -69,14 +71,14 @@ class BallPress:
             )
 
     def check(self, model: OpticalModel) -> None:
-        """Try the deepest press at the corners of the square.
+        """Check the deepest press at the corners of the square.
 
         Raises:
-            ContactError: one is off the surface or deeper than the gel.
+            ContactError: a press is off the surface or deeper than the gel.
         """
         try_corners(model, [Sphere(self.radius)], self.aside, self.most)
 
     def ball(self, rng: np.random.Generator) -> Contact:
-        """A ball at a random place and depth."""
+        """Return a ball at a random place and depth."""
         depth = float(rng.uniform(self.least, self.most))
         return Contact(Sphere(self.radius), at=place_aside(rng, self.aside), depth=depth)

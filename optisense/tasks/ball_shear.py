@@ -19,24 +19,23 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
 
 FEWEST_DOTS = 4
-"""Number of markers in a picture below which their mean motion tells little: two along each
-axis."""
+"""Smallest number of markers in a picture that gives features, two along each axis; the mean motion
+of fewer is unreliable."""
 
 
 @dataclass(frozen=True)
 class BallShear(BallPress):
-    """A ball that is pressed in near the middle of the sensor and dragged, whose shear is to be
-    read.
+    """A perception task: the shear force of a ball that is pressed in near the middle and dragged.
 
     The shear force is that of the elastic gel with friction (see `optisense.mechanics`). The
-    sensor's design needs markers; each is looked for in the picture near where the untouched
-    picture shows it.
+    sensor's design needs markers; each is located in the picture near its position in the untouched
+    picture.
 
     Attributes:
-        radius: mm, of the ball.
-        least, most: mm; the depth is drawn evenly in between.
-        aside: mm; the place is drawn evenly from a square of half this side around the middle.
-        farthest: mm; the drag is drawn evenly from a disc of this radius.
+        radius: radius of the ball, mm.
+        least, most: bounds of the uniform distribution of the depth, mm.
+        aside: half side (mm) of the square around the middle from which the place is drawn.
+        farthest: radius (mm) of the disc from which the drag is drawn.
     """
 
     least: float = 0.4
@@ -58,7 +57,7 @@ class BallShear(BallPress):
             )
 
     def check(self, model: OpticalModel) -> None:
-        """See whether the sensor has markers, and try the deepest press.
+        """Check that the sensor has markers, and the deepest press at the corners of the square.
 
         Raises:
             TaskError: the design has no markers.
@@ -76,7 +75,7 @@ class BallShear(BallPress):
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
     ) -> tuple[Contact, Sequence[float]]:
-        """A ball that was dragged, and the shear force (N) on the skin along u and v."""
+        """Return a ball that was dragged, and the shear force (N) on the skin along u and v."""
         size, way = self.farthest * math.sqrt(rng.random()), 2.0 * math.pi * rng.random()
         shift = size * math.cos(way), size * math.sin(way)
         contact = replace(self.ball(rng), shift=shift)
@@ -85,7 +84,8 @@ class BallShear(BallPress):
         return contact, (float(force @ surface.u_axis), float(force @ surface.v_axis))
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """Mean and standard deviation of the dots' motion across and down the picture, in pixels.
+        """Return the mean and standard deviation of the dots' motion across and down the picture,
+        pixels.
 
         Raises:
             TaskError: too few dots are found.

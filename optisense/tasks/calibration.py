@@ -1,5 +1,5 @@
-"""Calibrate a simulated sensor as users calibrate real ones: press balls at known places, and fit
-what colour means which tilt of the surface.
+"""Calibration of a simulated sensor by the usual method for real ones: balls are pressed at known
+places, and a reader of the surface's tilt from colours is fitted to the pictures.
 """
 
 from __future__ import annotations
@@ -30,32 +30,31 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 WIDTH = 320
-"""Pixels across the pictures, as GelSight's own software has."""
+"""Default width of the pictures (pixels), that of GelSight's own software."""
 
 MOST_SAMPLES = 20_000
 """Largest number of pixels that a reader is fitted to, drawn from all presses, which bounds the
 time of the fit."""
 
 ATTEMPTS = 50
-"""Number of presses that are tried for each one that is wanted, as some miss the surface or the
-view."""
+"""Number of presses tried for each one that is needed, as some miss the surface or the view."""
 
 LEAST_PIXELS = 20
-"""Number of pixels from which on a contact counts as seen."""
+"""Smallest number of pixels of a contact that counts as seen."""
 
 QUIET = 3.0
-"""Difference in levels of 255 from the untouched picture below which nothing is read, in each
-channel: small errors over a wide, flat surface would add up."""
+"""Difference from the untouched picture (levels of 255, in each channel) below which the tilt is
+read as 0; otherwise small errors over a wide, flat surface would add up in the depth."""
 QUIET_BLUR = 1.5
-"""Standard deviation in pixels of the Gaussian that a picture is blurred with before it is compared
-with the untouched one."""
+"""Standard deviation (pixels) of the Gaussian blur of a picture before it is compared with the
+untouched one."""
 
 _PLACE, _CAMERA, _SAMPLES, _SENSOR = 5, 6, 7, 10
-"""Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
-another. No two modules of this package share one."""
+"""Numbers that are hashed with the seed, one for each kind of random draw, so that the draws are
+independent. They are unique among the modules of this package."""
 
 _NEXT_READER = 1009
-"""The offset of seeds between readers of a fit: a prime larger than usual differences of seeds."""
+"""Offset of seeds between the readers of a fit: a prime larger than usual differences of seeds."""
 
 
 @dataclass(frozen=True)
@@ -64,14 +63,16 @@ class ReconstructionSettings:
 
     Attributes:
         method: "network" or "table" (see `colour_to_normal`).
-        presses: balls that it is fitted to.
-        radius: mm, of these balls.
-        depth: mm, least and most; the steepest slope that is learned follows from the deepest.
-        seed: of places, depths, noise and network.
-        camera_noise: standard deviation in levels of 255, on all pictures.
-        resolution: (width, height) pixels; `width` wide, in the camera's shape, if None.
-        width: pixels, where no resolution is given.
-        photons: of the light that all pictures share.
+        presses: number of balls that the reader is fitted to.
+        radius: radius of these balls, mm.
+        depth: smallest and largest depth (mm); the largest determines the steepest slope that is
+            learned.
+        seed: seed of places, depths, noise and network.
+        camera_noise: standard deviation of the noise of all pictures, levels of 255.
+        resolution: (width, height) pixels; if None, `width` pixels wide with the camera's aspect
+            ratio.
+        width: width (pixels) if no resolution is given.
+        photons: number of photons of the light that all pictures share.
         skin: "elastic" or "conforming"; see docs/mechanics.md.
     """
 
@@ -115,10 +116,11 @@ class CalibratedSensor:
         """Press the balls and fit the reader.
 
         Args:
-            model: the sensor. settings: of presses and reader.
-            progress: called with the number of balls pressed.
-            readers: how many are fitted to the same presses, each to other pixels of them and from
-                another seed, so that the luck of a fit can be told from the sensor.
+            model: the sensor.
+            settings: settings of presses and reader.
+            progress: function that is called with the number of balls pressed.
+            readers: number of readers fitted to the same presses, each to other pixels and with
+                another seed, so that the variation between fits can be separated from the sensor.
         """
         self._model = model
         self._settings = settings
@@ -130,7 +132,7 @@ class CalibratedSensor:
         self._integrator = NormalIntegrator(self.untouched)
         blank = self._render([])
         self._exposure = blank.auto_exposure()
-        # A real one is the mean of many pictures, without noise.
+        # The background of a real sensor is the mean of many pictures and so has no noise.
         self._background = blank.without_noise().picture(self._exposure).astype(np.float64)
         samples = [np.hstack(self._press(i)) for i in _counted(settings.presses, progress)]
         known = np.concatenate(samples)
@@ -138,7 +140,7 @@ class CalibratedSensor:
         self._readers = [self._fitted(known, number) for number in range(readers)]
 
     def _fitted(self, known: FloatArray, number: int) -> TiltReader:
-        """A reader of colours, places and tilts (n, 7); its number changes its seeds."""
+        """Fit a reader to colours, places and tilts (n, 7); its number changes its seeds."""
         settings = self._settings
         if len(known) > MOST_SAMPLES:
             seed = [settings.seed, _SAMPLES, *([number] if number else [])]
@@ -148,7 +150,9 @@ class CalibratedSensor:
         return fit_reader(settings.method, known[:, :3], known[:, 3:5], known[:, 5:], seed_of_fit)
 
     def read(self, picture: NDArray[np.uint8], reader: int = 0) -> tuple[FloatArray, FloatArray]:
-        """Normals (h, w, 3) and depth (h, w) mm from a picture (h, w, 3), by one of the readers."""
+        """Return normals (h, w, 3) and depth (h, w), mm, from a picture (h, w, 3), by one of the
+        readers.
+        """
         seen = self.untouched.seen
         colours, places = self._features(picture)
         tilts = np.zeros((*seen.shape, 2))
@@ -160,17 +164,18 @@ class CalibratedSensor:
         return normals, self._integrator.depths(normals)
 
     def look(self, contact: Contact, number: int = 0) -> tuple[TactileImage, NDArray[np.uint8]]:
-        """An image of something that presses, and the picture (h, w, 3) that the camera stores.
+        """Return the image of a contact, and the picture (h, w, 3) that the camera stores.
 
         Args:
-            number: of the picture; each has noise of its own.
+            contact: the contact.
+            number: number of the picture; each has noise of its own.
         """
         image = self._render([contact])
         seed = [self._settings.seed, self._settings.presses + number, _CAMERA]
         return image, self._picture(image, seed)
 
     def _press(self, index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Colours, places and tilts of pixels in, near and far from one ball press."""
+        """Return colours, places and tilts of pixels in, near and far from one ball press."""
         settings = self._settings
         image = None
         for attempt in range(ATTEMPTS):
@@ -216,7 +221,9 @@ class CalibratedSensor:
         return add_camera_noise(picture, self._settings.camera_noise, seed)
 
     def _features(self, picture: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
-        """Colour differences (h, w, 3) and places (h, w, 2)."""
+        """Return the colour differences (h, w, 3), levels of 255, and places (h, w, 2) of a
+        picture.
+        """
         height, width = picture.shape[:2]
         y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
         return picture - self._background, np.stack([x, y], axis=-1)
@@ -225,8 +232,10 @@ class CalibratedSensor:
 def _pixels_to_learn(
     inside: NDArray[np.bool_], seen: NDArray[np.bool_], rng: np.random.Generator
 ) -> NDArray[np.bool_]:
-    """(h, w): all of a contact, half as many around it, where its shadow falls, and half as many
-    anywhere else: a reader must learn that nothing is tilted there.
+    """Return a mask (h, w) of the pixels that a reader is fitted to.
+
+    It selects all pixels of a contact, half as many around it, where its shadow falls, and half as
+    many elsewhere, so that the reader learns that those are not tilted.
     """
     count = int(inside.sum())
     chosen = inside & seen

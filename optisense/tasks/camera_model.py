@@ -1,8 +1,8 @@
-"""The camera of a dataset: a ray for each pixel, and the pinhole that comes nearest.
+"""The camera of a dataset: a ray for each pixel, and the best-fitting pinhole camera.
 
-The rays are those inside the gel, where they arrive at the skin: between the skin at rest and a
-skin that is pressed in they are straight, so they are right through glass, gel and over mirrors. A
-pinhole, which most programs expect, is fitted to them; how far it is off is told beside it.
+The rays are those inside the gel where they arrive at the skin. They are straight between the skin
+at rest and a skin that is pressed in, so they are exact through glass and gel and over mirrors. A
+pinhole camera, which most programs expect, is fitted to them, and its errors are reported.
 """
 
 from __future__ import annotations
@@ -19,29 +19,31 @@ if TYPE_CHECKING:
     from optisense.optics import ChiefRays
 
 PRESSED = 1.0
-"""mm under the skin at rest at which a pinhole is fitted too, about as deep as gels are pressed."""
+"""Depth (mm) below the skin at rest of the second layer of points that a pinhole is fitted to,
+about as deep as gels are pressed."""
 
 MOST_POINTS = 3000
-"""Number of pixels that a pinhole is fitted to, spread over the picture; it has 12 parameters."""
+"""Largest number of pixels that a pinhole is fitted to, spread over the picture; it has 12
+parameters."""
 
 WIDEST = 150.0
-"""Degrees of view across the picture above which no pinhole is fitted: a flat picture stretches its
-edge without bound there."""
+"""Field of view (degrees) across the picture above which no pinhole is fitted, as a flat picture
+stretches its edge without bound."""
 
 FloatArray = NDArray[np.float64]
 
 
 def ray_arrays(rays: ChiefRays) -> dict[str, NDArray[np.float32]]:
-    """The ray of each pixel inside the gel, NaN where the camera sees no skin.
+    """Return the ray of each pixel inside the gel, NaN where the camera sees no skin.
 
     Args:
-        rays: without contacts.
+        rays: chief rays without contacts.
 
     Returns:
-        "points" (h, w, 3) mm, where it meets the skin at rest, and "directions" (h, w, 3), unit,
-        the way that light from the skin goes, against which the camera looks; both in the frame of
-        the design. What is seen of a pressed skin lies at ``points + s * directions`` with some
-        s >= 0 in mm.
+        "points" (h, w, 3), mm, the intersections with the skin at rest, and "directions" (h, w, 3),
+        unit vectors along which light from the skin travels, opposite to the view; both in the
+        frame of the design. A visible point of a pressed skin lies at ``points + s * directions``
+        with some s >= 0 in mm.
     """
     seen = rays.hit[..., None]
     return {
@@ -52,17 +54,20 @@ def ray_arrays(rays: ChiefRays) -> dict[str, NDArray[np.float32]]:
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A pinhole camera with radial distortion, as OpenCV has it.
+    """A pinhole camera with radial distortion, as in OpenCV.
 
-    A point X (mm, design's frame) is ``x = rotation @ X + translation`` before the camera, x to the
-    right, y down, z forward; with ``a = x[0] / x[2]``, ``b = x[1] / x[2]``, ``r2 = a*a + b*b`` and
-    ``f = 1 + radial[0]*r2 + radial[1]*r2*r2`` it is seen in column ``focal[0]*f*a + centre[0]`` and
-    row ``focal[1]*f*b + centre[1]``. Columns and rows count from the picture's edge: the middle of
-    the first pixel is at 0.5, where OpenCV has 0.
+    A point X (mm, design's frame) has the coordinates ``x = rotation @ X + translation`` in the
+    camera's frame, x to the right, y down, z forward. With ``a = x[0] / x[2]``, ``b = x[1] /
+    x[2]``, ``r2 = a*a + b*b`` and ``f = 1 + radial[0]*r2 + radial[1]*r2*r2`` it appears in column
+    ``focal[0]*f*a + centre[0]`` and row ``focal[1]*f*b + centre[1]``. Columns and rows count from
+    the picture's edge: the middle of the first pixel is at 0.5, while it is at 0 in OpenCV.
 
     Attributes:
-        rotation: (3, 3). translation: (3,) mm. focal: (2,) pixels. centre: (2,) pixels.
-        radial: (2,) k1 and k2.
+        rotation: (3, 3) rotation from the design's frame to the camera's.
+        translation: (3,) translation, mm.
+        focal: (2,) focal lengths, pixels.
+        centre: (2,) column and row of the axis, pixels.
+        radial: (2,) coefficients k1 and k2.
     """
 
     rotation: FloatArray
@@ -73,11 +78,11 @@ class Pinhole:
 
     @staticmethod
     def of(camera: Camera, resolution: tuple[int, int]) -> Pinhole:
-        """The camera of a design, without any refraction before its lens.
+        """Return the pinhole of a design's camera, without any refraction in front of its lens.
 
         Args:
-            camera: its field of view is that across the picture.
-            resolution: width and height in pixels.
+            camera: the camera, whose field of view is that across the picture.
+            resolution: width and height, pixels.
         """
         right, up, forward = camera.axes()
         rotation = np.array([right, -up, forward])
@@ -92,7 +97,9 @@ class Pinhole:
         )
 
     def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(n, 2) columns and rows of (n, 3) points, and (n,) their distances along the view, mm."""
+        """Return the columns and rows (n, 2) of points (n, 3), mm, and their distances (n,), mm,
+        along the viewing direction.
+        """
         seen = points @ self.rotation.T + self.translation
         flat = seen[:, :2] / seen[:, 2:]
         r2 = (flat**2).sum(axis=1, keepdims=True)
@@ -100,7 +107,7 @@ class Pinhole:
         return self.focal * bent + self.centre, seen[:, 2]
 
     def errors(self, points: FloatArray, pixels: FloatArray) -> dict[str, float]:
-        """How far it is off in pixels, and in mm at the points: root mean square and at most."""
+        """Return the root-mean-square and largest errors in pixels, and in mm at the points."""
         seen, along = self.project(points)
         apart = np.linalg.norm(seen - pixels, axis=1)
         real = apart * along / float(self.focal.mean())
@@ -112,7 +119,7 @@ class Pinhole:
         }
 
     def as_dict(self) -> dict[str, Any]:
-        """The numbers, ready for JSON."""
+        """Return the parameters, ready for JSON."""
         return {
             "rotation": self.rotation.tolist(),
             "translation_mm": self.translation.tolist(),
@@ -123,12 +130,12 @@ class Pinhole:
 
 
 def fit_pinhole(start: Pinhole, points: FloatArray, pixels: FloatArray) -> Pinhole:
-    """The pinhole that sees points in pixels, by least squares of the distances in pixels.
+    """Fit a pinhole camera to points and their pixels, by least squares of the distances in pixels.
 
     Args:
-        start: near it.
-        points: (n, 3) mm, of more than one depth.
-        pixels: (n, 2) columns and rows, where they are seen.
+        start: initial camera.
+        points: (n, 3) points at more than one depth, mm.
+        pixels: (n, 2) columns and rows of the points.
     """
     from scipy.optimize import least_squares
     from scipy.spatial.transform import Rotation
@@ -153,15 +160,15 @@ def fit_pinhole(start: Pinhole, points: FloatArray, pixels: FloatArray) -> Pinho
 
 
 def camera_model(camera: Camera, rays: ChiefRays) -> dict[str, Any]:
-    """The pinhole of the design and the fitted one, each with its errors, ready for JSON.
+    """Return the pinhole of the design and the fitted one, each with its errors, ready for JSON.
 
     Args:
-        camera: of the design.
-        rays: without contacts.
+        camera: the camera of the design.
+        rays: chief rays without contacts.
 
     Returns:
-        "as_designed" and "fitted"; None where a pinhole makes no sense: a fisheye, a very wide
-        view, or a camera that sees part of the skin from behind, as over mirrors.
+        "as_designed" and "fitted"; None for a camera that no pinhole describes: a fisheye, a very
+        wide view, or one that sees part of the skin from behind, as over mirrors.
     """
     height, width = rays.hit.shape
     pair = _seen(rays)
@@ -184,7 +191,9 @@ LEAST = 50
 
 
 def _seen(rays: ChiefRays) -> tuple[FloatArray, FloatArray]:
-    """(n, 3) points of the skin at rest and `PRESSED` mm along the rays; (n, 2) their pixels."""
+    """Return points (n, 3) of the skin at rest and at `PRESSED` (mm) along the rays, and their
+    pixels (n, 2).
+    """
     rows, columns = np.nonzero(rays.hit)
     every = max(1, len(rows) // MOST_POINTS)
     rows, columns = rows[::every], columns[::every]

@@ -1,9 +1,9 @@
-"""Readers of the surface's tilt from colours: the table and the network that users fit to real
-sensors, fitted here to simulated ball presses.
+"""Readers of the surface's tilt from colours: the lookup table and the network that are used with
+real sensors, fitted to simulated ball presses.
 
 Both map the difference of a picture from that of the untouched sensor to the *tilt*: the two
 components of the unit normal along the tangents of the untouched surface (the sines of the slopes).
-They are 0 where nothing touches, on curved sensors too.
+They are 0 where nothing touches, also on curved sensors.
 """
 
 from __future__ import annotations
@@ -24,41 +24,44 @@ from optisense.errors import TaskError
 FloatArray = NDArray[np.float64]
 
 BIN = 4.0
-"""Levels of 255, the width of a bin of the table."""
+"""Width of a bin of the table, levels of 255."""
 
 LAYERS = (32, 32)
-"""Neurons of the network's hidden layers. Larger networks learned the presses by heart: in trials
-on presses kept aside they read worse."""
+"""Numbers of neurons of the network's hidden layers. Larger networks overfit: their errors on
+held-out presses were larger."""
 
 EPOCHS = 30
-"""Number of passes over the samples in the fit of the network, which ends there by intent: more of
-them learn the presses by heart."""
+"""Number of passes over the samples in the fit of the network. The fit is stopped early on purpose,
+as more passes overfit."""
 WEIGHT_PENALTY = 0.03
-"""Weight of the squared weights in the loss of the network (scikit-learn's `alpha`), for the same
-reason."""
+"""Weight of the squared weights in the loss of the network (scikit-learn's `alpha`), which also
+limits overfitting."""
 
 METHODS = ("network", "table")
 
 
 class TiltReader(Protocol):
-    """Reads tilts from colours."""
+    """A reader of tilts from colours."""
 
     def tilts(self, colours: FloatArray, places: FloatArray) -> FloatArray:
-        """Tilts (n, 2) of colour differences (n, 3), levels of 255, at places (n, 2) in the picture
-        (-1 to 1 across its width and height).
+        """Return the tilts (n, 2) of colour differences (n, 3), levels of 255, at places (n, 2) in
+        the picture (-1 to 1 across its width and height).
         """
         ...
 
 
 class ColourTable:
     """The lookup table of Yuan, Dong and Adelson ("GelSight: high-resolution robot tactile sensors
-    for estimating geometry and force", Sensors 2017): one tilt for each colour, wherever it is.
+    for estimating geometry and force", Sensors 2017): one tilt for each colour, regardless of its
+    place.
 
-    Colours fall in bins of BIN levels; a colour whose bin is empty takes the nearest filled one.
+    Colours fall in bins of BIN levels; a colour whose bin is empty uses the nearest filled bin.
     """
 
     def __init__(self, colours: FloatArray, places: FloatArray, tilts: FloatArray) -> None:
-        """Args: as `TiltReader.tilts`, and the tilts (n, 2) known there."""
+        """Fit the table to colours and places, as in `TiltReader.tilts`, with known tilts (n,
+        2).
+        """
         bins, which = np.unique(np.round(colours / BIN), axis=0, return_inverse=True)
         which = which.reshape(-1)
         count = np.bincount(which)
@@ -66,12 +69,12 @@ class ColourTable:
         self._tilts = np.stack([np.bincount(which, column) / count for column in tilts.T], axis=1)
 
     def tilts(self, colours: FloatArray, places: FloatArray) -> FloatArray:
-        """See `TiltReader`; the places are not read."""
+        """Return tilts; see `TiltReader`. The places have no effect."""
         return self._tilts[self._tree.query(colours / BIN)[1]]
 
 
 class ColourNetwork:
-    """A small network that reads colour and place, as current GelSight software does.
+    """A small network with colour and place as inputs, as in current GelSight software.
 
     Standardised inputs, two layers of 32 rectified neurons, Adam for EPOCHS epochs, and a penalty
     on large weights.
@@ -80,7 +83,9 @@ class ColourNetwork:
     def __init__(
         self, colours: FloatArray, places: FloatArray, tilts: FloatArray, seed: int = 0
     ) -> None:
-        """Args: as `TiltReader.tilts`, the tilts (n, 2) known there, and a seed."""
+        """Fit the network to colours and places, as in `TiltReader.tilts`, with known tilts (n,
+        2).
+        """
         network = MLPRegressor(
             hidden_layer_sizes=LAYERS,
             alpha=WEIGHT_PENALTY,
@@ -91,12 +96,12 @@ class ColourNetwork:
         )
         self._network: Pipeline = make_pipeline(StandardScaler(), network)
         with warnings.catch_warnings():
-            # It is meant to stop after so many epochs.
+            # Stopping after this number of epochs is intended.
             warnings.simplefilter("ignore", ConvergenceWarning)
             self._network.fit(np.hstack([colours, places]), tilts)
 
     def tilts(self, colours: FloatArray, places: FloatArray) -> FloatArray:
-        """See `TiltReader`."""
+        """Return tilts; see `TiltReader`."""
         read: FloatArray = self._network.predict(np.hstack([colours, places]))
         return read
 
@@ -104,7 +109,7 @@ class ColourNetwork:
 def fit_reader(
     method: str, colours: FloatArray, places: FloatArray, tilts: FloatArray, seed: int = 0
 ) -> TiltReader:
-    """Fit one of METHODS.
+    """Fit a reader by one of METHODS; see `TiltReader.tilts` for the arrays.
 
     Raises:
         TaskError: there is no such method.

@@ -22,21 +22,22 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
 
 LEAST_PIXELS = 20
-"""Fewer pixels in a contact give no useful spread."""
+"""Smallest number of pixels of a contact that gives features; fewer give no useful spread."""
 
 
 @dataclass(frozen=True)
 class CylinderRadius:
-    """A cylinder pressed on the middle of the sensor, whose radius is to be read.
+    """A perception task: the radius of a cylinder pressed on the middle of the sensor.
 
-    It lies along the picture's width, a little aside and turned, as no robot grasps exactly. The
-    paper gives the features and the model; all numbers here are ours.
+    The cylinder lies along the picture's width, slightly displaced and turned, as a robot's grasp
+    is not exact. The features and the model are those of the OptiSense paper; the numbers are not.
 
     Attributes:
-        least, most: mm; the radius is drawn evenly in between.
-        depth: mm, the same for all: a deeper press spreads colours as a thinner cylinder does.
-        aside: mm; the place is drawn evenly from a square of half this side around the middle.
-        turn: degrees; turned about the normal by -turn to turn.
+        least, most: bounds of the uniform distribution of the radius, mm.
+        depth: depth (mm), the same for all samples, as a deeper press spreads colours like a
+            thinner cylinder.
+        aside: half side (mm) of the square around the middle from which the place is drawn.
+        turn: largest angle (degrees) of the uniform rotation about the normal.
     """
 
     least: float = 1.0
@@ -60,10 +61,10 @@ class CylinderRadius:
             )
 
     def check(self, model: OpticalModel) -> None:
-        """Try the thinnest and the thickest cylinder at the corners of the square.
+        """Check the thinnest and the thickest cylinder at the corners of the square.
 
         Raises:
-            ContactError: one is off the surface or deeper than the gel.
+            ContactError: a press is off the surface or deeper than the gel.
         """
         thinnest, thickest = Cylinder(self.least), Cylinder(self.most)
         try_corners(model, [thinnest, thickest], self.aside, self.depth)
@@ -71,7 +72,7 @@ class CylinderRadius:
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
     ) -> tuple[Contact, Sequence[float]]:
-        """A cylinder of random radius."""
+        """Return a cylinder of random radius, and this radius (mm)."""
         radius = float(rng.uniform(self.least, self.most))
         at = place_aside(rng, self.aside)
         turn = float(rng.uniform(-self.turn, self.turn))
@@ -79,7 +80,7 @@ class CylinderRadius:
         return contact, (radius,)
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """The standard deviation of each channel over the contact, in levels of 255."""
+        """Return the standard deviation of each channel over the contact, in levels of 255."""
         inside = image.contact_mask
         if inside.sum() < LEAST_PIXELS:
             raise TaskError(

@@ -1,4 +1,4 @@
-"""The card of a dataset: what it is, for people and for hubs of datasets, as README.md."""
+"""The card of a dataset: its description as README.md, for people and for dataset hubs."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ OURS = "<!-- Written by optisense dataset. Without this line the file is left as
 LICENCE = re.compile(r"[A-Za-z0-9][A-Za-z0-9.+-]{0,63}")
 
 SIZES = (("n<1K", 1_000), ("1K<n<10K", 10_000), ("10K<n<100K", 100_000), ("100K<n<1M", 1_000_000))
-"""Words of hubs for the number of samples, and the number below which each holds."""
+"""Size categories of dataset hubs, each with the number of samples below which it applies."""
 
 
 def check_licence(licence: str | None) -> None:
-    """Raise where a licence is no identifier.
+    """Check that a licence is an identifier.
 
     Raises:
-        TaskError: says how one looks.
+        TaskError: the licence is not an identifier such as cc-by-4.0.
     """
     if licence is not None and not LICENCE.fullmatch(licence):
         raise TaskError(
@@ -41,16 +41,16 @@ def write_card(dataset: Dataset, licence: str | None = None) -> Path | None:
     """Write the card into the dataset's folder.
 
     Args:
-        dataset: as it is on disk.
-        licence: an identifier such as cc-by-4.0; None says that none was chosen, or leaves that of
-            the card that is there.
+        dataset: the dataset on disk.
+        licence: an identifier such as cc-by-4.0. With None the licence of an existing card is kept,
+            or the card states that none was chosen.
 
     Returns:
-        The file; None where somebody else wrote it, so that it was left as it is.
+        The file; None if a README.md that is not a card exists, which is not overwritten.
 
     Raises:
-        TaskError: the licence is no identifier.
-        OutputError: it can't be written.
+        TaskError: the licence is not an identifier.
+        OutputError: the card cannot be written.
     """
     check_licence(licence)
     path = dataset.folder / CARD
@@ -66,7 +66,7 @@ def write_card(dataset: Dataset, licence: str | None = None) -> Path | None:
 
 
 def card_text(dataset: Dataset, licence: str | None = None) -> str:
-    """The card as Markdown, with a head of YAML that hubs read."""
+    """Return the card as Markdown, with a YAML header for dataset hubs."""
     info, settings = dataset.info, dataset.info["settings"]
     contacts = settings["contacts"]
     counts = Counter(row["split"] for row in dataset.labels)

@@ -1,4 +1,4 @@
-"""A dataset of labelled contacts on disk, and how to read it."""
+"""A dataset of labelled contacts on disk, and functions to read it."""
 
 from __future__ import annotations
 
@@ -57,8 +57,8 @@ NUMBER_COLUMNS = {
     "pressure": "MPa, the greatest; empty for a conforming skin",
 }
 LATER_COLUMNS = {"force": "", "area": "", "pressure": "", "cut": "-1", "split": ""}
-"""Columns that tables of release 0.1 lack, with what stands for them; such tables are read, and go
-on without them."""
+"""Columns that tables of release 0.1 lack, with their default values; such tables can be read, and
+are continued without these columns."""
 COLUMNS = (
     "file_name",
     "index",
@@ -71,7 +71,7 @@ COLUMNS = (
     "cut",
     "split",
 )
-"""Columns of `LABELS`; the first is what common loaders of picture folders look for."""
+"""Columns of `LABELS`; the first is the one that common loaders of image folders expect."""
 FIRST_COLUMNS = tuple(name for name in COLUMNS if name not in LATER_COLUMNS)
 """Columns of `LABELS` in release 0.1."""
 
@@ -87,18 +87,20 @@ LATER_ARRAYS: ArrayKinds = {
     "displacement": ("f", 3),
 }
 BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
-"""Arrays of the files by name: what their type may be (as of NumPy's `dtype.kind`), and the numbers
-of a pixel. The later ones may be missing: release 0.1 wrote none of them, and only an elastic skin
-has pressure, penetration and displacement."""
+"""Arrays of each file by name, with their allowed types (NumPy's `dtype.kind`) and the number of
+values per pixel. The later arrays may be missing: release 0.1 wrote none of them, and only an
+elastic skin has pressure, penetration and displacement."""
 
 CAMERA_ARRAYS: ArrayKinds = {"points": ("f", 3), "directions": ("f", 3)}
-"""Arrays of `CAMERA`, as above."""
+"""Arrays of `CAMERA`, with their allowed types and the number of values per pixel."""
 
 FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class _KeptContacts(BaseModel):
-    """What contacts are drawn from; compared with what is asked for, so values may be any."""
+    """The stored ranges of contacts. They are compared with the requested ones, so any values are
+    allowed.
+    """
 
     model_config = ConfigDict(extra="allow")
 
@@ -106,7 +108,9 @@ class _KeptContacts(BaseModel):
 
 
 class _KeptSettings(BaseModel):
-    """The settings of a dataset; compared with what is asked for, so other values may be any."""
+    """The stored settings of a dataset. They are compared with the requested ones, so any further
+    values are allowed.
+    """
 
     model_config = ConfigDict(extra="allow")
 
@@ -116,7 +120,7 @@ class _KeptSettings(BaseModel):
 
 
 class _Info(BaseModel):
-    """What `INFO` must hold; what more it holds is for people."""
+    """The required content of `INFO`; further content is for people."""
 
     model_config = ConfigDict(extra="allow", strict=False)
 
@@ -130,10 +134,11 @@ class _Info(BaseModel):
 
 
 def read_info(folder: Path) -> dict[str, Any]:
-    """The content of `dataset.json`.
+    """Return the content of `dataset.json`.
 
     Raises:
-        TaskError: it is missing, damaged, or of another release; says what is wrong.
+        TaskError: the file is missing, damaged, or of another release; the message names the
+            defect.
     """
     path = folder / INFO
     info = read_object(path)
@@ -152,10 +157,10 @@ def read_info(folder: Path) -> dict[str, Any]:
 
 
 def read_labels(folder: Path) -> list[dict[str, Any]]:
-    """The rows of `LABELS`, numbers as numbers; empty where there is no such file yet.
+    """Return the rows of `LABELS` with converted numbers; empty if there is no such file yet.
 
     Raises:
-        TaskError: the table or one of its rows can't be read; says the line.
+        TaskError: the table or one of its rows cannot be read; the message names the line.
     """
     path = folder / LABELS
     rows = read_rows(path) if path.exists() else []
@@ -173,10 +178,10 @@ def read_labels(folder: Path) -> list[dict[str, Any]]:
 
 
 def read_failures(folder: Path) -> list[dict[str, str]]:
-    """The rows of `FAILURES`; empty where there is no such file yet.
+    """Return the rows of `FAILURES`; empty if there is no such file yet.
 
     Raises:
-        TaskError: the table or one of its rows can't be read; says the line.
+        TaskError: the table or one of its rows cannot be read; the message names the line.
     """
     path = folder / FAILURES
     rows = read_rows(path) if path.exists() else []
@@ -191,21 +196,24 @@ ROW_AGAIN = "Delete the line; the command that made the dataset then makes the s
 
 @dataclass(frozen=True)
 class Sample:
-    """One labelled contact; arrays are (h, w, ...), row 0 is the top.
+    """One labelled contact; row 0 of arrays is the top of the image.
 
-    image: uint8 sRGB. depth: float32 mm, pushed in along the inward normal. normals: float32
-    unit, inward, in the design's frame. mask: bool, where the indenter is seen. labels: a row of
-    `LABELS`, numbers as numbers.
-
-    points: (h, w, 3) float32 mm, the pressed surface behind each pixel in the design's frame, NaN
-    where the camera sees none; None in samples of release 0.1.
-
-    Of an elastic skin also, all float32 and NaN where no skin is seen (None for other skins):
-    pressure: MPa. penetration: mm that the undeformed skin lies inside the indenter, 0 elsewhere.
-    displacement: (h, w, 3) mm by which the skin behind a pixel has moved, in the design's frame.
-
-    Of a design with markers, markers: (n, 4) column and row in pixels at which each is seen in the
-    untouched sensor, and in this sample; NaN where it is not seen.
+    Attributes:
+        image: (h, w, 3) uint8, sRGB.
+        depth: (h, w) float32, displacement of the skin along the inward normal, mm.
+        normals: (h, w, 3) float32, unit normals into the gel, in the design's frame.
+        mask: (h, w) bool, the pixels that see the indenter.
+        labels: the sample's row of `LABELS`, with converted numbers.
+        points: (h, w, 3) float32, points (mm) of the pressed surface in the design's frame, NaN
+            where the camera sees none; None in samples of release 0.1.
+        pressure: (h, w) float32, MPa; NaN where no skin is seen. This and the next two are None if
+            the skin is not elastic.
+        penetration: (h, w) float32, depth (mm) of the undeformed skin inside the indenter, 0
+            outside; NaN where no skin is seen.
+        displacement: (h, w, 3) float32, displacement (mm) of the skin in the design's frame; NaN
+            where no skin is seen.
+        markers: (n, 4) float32, column and row (pixels) of each marker in the untouched sensor, and
+            in this sample; NaN where it is not seen. None if the design has no markers.
     """
 
     image: NDArray[np.uint8]
@@ -222,10 +230,13 @@ class Sample:
 
 @dataclass(frozen=True)
 class Dataset:
-    """A folder of samples, opened for reading; samples are read when they are asked for.
+    """A folder of samples, opened for reading; each sample is read on access.
 
-    info: what `dataset.json` says. labels: one row a sample, in the order of the samples.
-    failures: rows of contacts that could not be made.
+    Attributes:
+        folder: the folder.
+        info: the content of `dataset.json`.
+        labels: one row per sample, in the order of the samples.
+        failures: rows of contacts that could not be made.
     """
 
     folder: Path
@@ -238,7 +249,7 @@ class Dataset:
         """Open a dataset, finished or not.
 
         Raises:
-            TaskError: the folder holds no dataset, or one of another release, or its tables can't
+            TaskError: the folder holds no dataset, or one of another release, or its tables cannot
                 be read.
         """
         folder = Path(folder)
@@ -257,7 +268,8 @@ class Dataset:
         """Read a sample.
 
         Raises:
-            TaskError: one of its files is missing or damaged; says which sample and which file.
+            TaskError: one of its files is missing or damaged; the message names the sample and the
+                file.
         """
         labels = self.labels[number]
         try:
@@ -292,7 +304,8 @@ class Dataset:
         return (self[number] for number in range(len(self)))
 
     def background(self) -> dict[str, NDArray[Any]]:
-        """The untouched sensor: image (uint8, without camera noise), points (mm), normals.
+        """Return arrays of the untouched sensor: image (uint8, without camera noise), points (mm),
+        normals.
 
         Raises:
             TaskError: its file is missing or damaged.
@@ -300,8 +313,8 @@ class Dataset:
         return self._arrays(BACKGROUND, BACKGROUND_ARRAYS)
 
     def camera_rays(self) -> dict[str, NDArray[Any]]:
-        """The ray of each pixel inside the gel: points (mm) where it meets the skin at rest, and
-        directions (unit), against the view; see `optisense.tasks.camera_model`.
+        """Return the ray of each pixel inside the gel; see
+        `optisense.tasks.camera_model.ray_arrays`.
 
         Raises:
             TaskError: its file is missing, as in datasets of release 0.1, or damaged.
@@ -309,13 +322,14 @@ class Dataset:
         return self._arrays(CAMERA, CAMERA_ARRAYS)
 
     def split(self, name: str) -> list[int]:
-        """Numbers of the samples of a split, to be given to `dataset[number]`.
+        """Return the indices of the samples of a split, for use in `dataset[number]`.
 
         Args:
             name: "train", "validation" or "test".
 
         Raises:
-            TaskError: there is no such split, or release 0.1 wrote the dataset, which has none.
+            TaskError: there is no such split, or the dataset is of release 0.1, which has no
+                splits.
         """
         if name not in SPLITS:
             raise TaskError(f"there is no split '{name}'", hint="Name one: " + ", ".join(SPLITS))
@@ -365,7 +379,9 @@ class Dataset:
 
 
 def columns_of(folder: Path) -> tuple[str, ...]:
-    """The columns in which `LABELS` of a folder goes on, or begins."""
+    """Return the columns of `LABELS` in a folder: those of release 0.1 if its file has them, else
+    all.
+    """
     path = folder / LABELS
     begun = read_text(path, MOST_TABLE, TaskError, "the table") if path.exists() else ""
     return FIRST_COLUMNS if begun.startswith(",".join(FIRST_COLUMNS) + "\n") else COLUMNS

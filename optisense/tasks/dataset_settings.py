@@ -13,18 +13,18 @@ from optisense.tasks.draws import ContactDraw
 
 @dataclass(frozen=True)
 class DatasetSettings:
-    """Settings of the samples. Another number of samples does not change the first ones.
+    """Settings of the samples. The number of samples does not affect the first ones.
 
     Attributes:
-        contacts: what contacts are drawn from.
+        contacts: ranges that contacts are drawn from.
         resolution: (width, height) pixels; None for the camera's own.
-        photons: of the radiance cache that all samples share.
-        seed: of everything; sample i depends on it and on i only.
-        exposure: a factor on the radiance, or "auto": what suits the untouched sensor. One for
-            all samples, as a camera with a fixed exposure.
-        camera_noise: standard deviation in levels of 255 (see `camera_noise`); 0 leaves pictures
-            clean, so that noise can be added when they are used.
-        radiance: also write linear radiance as EXR.
+        photons: number of photons of the radiance cache that all samples share.
+        seed: seed of all random numbers; sample i depends on it and on i only.
+        exposure: a factor on the radiance, or "auto" for that of the untouched sensor. It is the
+            same for all samples, as for a camera with a fixed exposure.
+        camera_noise: standard deviation in levels of 255 (see `camera_noise`); with 0 pictures have
+            no noise, so that it can be added when they are used.
+        radiance: whether linear radiance is written as EXR as well.
         estimator: "radiance-cache" or "sppm"; see docs/simulation.md.
         hold_out: texts of indenters that are in the test split only.
         skin: "elastic" or "conforming"; see docs/mechanics.md.

@@ -12,7 +12,9 @@ from optisense.untrusted_files import MOST_MESH, MOST_STEP, read_bytes
 
 
 def design_values(design: SensorDesign) -> dict[str, Any]:
-    """The values that determine a design's pictures, without file names and sources of numbers."""
+    """Return the values that determine a design's pictures, without file names and sources of
+    numbers.
+    """
     values = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
     for part in values["parts"].values():
         part.pop("mesh", None)
@@ -20,7 +22,7 @@ def design_values(design: SensorDesign) -> dict[str, Any]:
 
 
 def mesh_digests(design: SensorDesign) -> dict[str, str]:
-    """Digests that distinguish meshes of the same name."""
+    """Return digests that distinguish meshes of the same name."""
     return {
         name: _digest(mesh.vertices.tobytes(), mesh.faces.tobytes())
         for name, mesh in design.meshes.items()
@@ -35,9 +37,9 @@ def _digest(*contents: bytes) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """The same of a file.
+    """Return the digest of a file's content.
 
     Raises:
-        TaskError: it can't be read.
+        TaskError: the file cannot be read.
     """
     return _digest(read_bytes(path, max(MOST_MESH, MOST_STEP), TaskError, "the mesh"))

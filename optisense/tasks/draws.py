@@ -1,4 +1,4 @@
-"""Random contacts: which indenter, where, how deep, and turned how."""
+"""Random contacts: random indenters, places, depths and rotations."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
 
 PLACES_SEEN = 320, 240
-"""Places are drawn among the points that this many rays of the camera meet."""
+"""Numbers of the camera's rays (across, down) whose end points are the places that are drawn
+from."""
 
 MARGIN = 0.02
-"""Part of the picture's width that stays free around a contact: 6 of 320 pixels, 0.4 mm on a
-GelSight Mini, so that the shading just outside the contact is in the picture too."""
+"""Margin around a contact, as a share of the picture's width: 6 of 320 pixels, 0.4 mm on a GelSight
+Mini, so that the picture includes the shading just outside the contact."""
 
 FloatArray = NDArray[np.float64]
 
 
 def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:
-    """Whether a contact stays clear of the picture's edge.
+    """Return whether a contact keeps a margin to the picture's edge.
 
     Args:
-        mask: (h, w), true where the contact is seen.
-        margin: part of the width that must stay free; 0 is always kept.
+        mask: (h, w) mask of the contact.
+        margin: margin as a share of the width; 0 is always kept.
     """
     if margin == 0.0:
         return True
@@ -42,10 +43,10 @@ def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:
 
 
 def is_cut(mask: NDArray[np.bool_]) -> bool:
-    """Whether a contact reaches the picture's edge, so that some of it may be out of view.
+    """Return whether a contact reaches the picture's edge, so that some of it may be out of view.
 
     Args:
-        mask: (h, w), true where the contact is seen.
+        mask: (h, w) mask of the contact.
     """
     inner = mask.copy()
     inner[1:-1, 1:-1] = False
@@ -53,16 +54,21 @@ def is_cut(mask: NDArray[np.bool_]) -> bool:
 
 
 class Places:
-    """The places of a sensing surface that the camera sees, to draw from evenly by area."""
+    """The places of a sensing surface that the camera sees, drawn uniformly by area."""
 
     def __init__(self, rays: ChiefRays, areas: FloatArray) -> None:
-        """Args: rays: without contacts. areas: (h, w) mm^2 of surface behind each pixel."""
+        """Collect the places.
+
+        Args:
+            rays: chief rays without contacts.
+            areas: (h, w) area (mm^2) of surface that each pixel sees.
+        """
         weights = np.where(rays.hit, areas, 0.0)
         rows, columns = np.nonzero(weights > 0)
         if not len(rows):
             raise TaskError("the camera sees nothing of the sensing surface")
         self._points = rays.points[rows, columns].astype(np.float64)
-        # As parts of the image's width and height, measured to the middles of pixels.
+        # Positions are shares of the image's width and height, at the middles of pixels.
         height, width = rays.hit.shape
         self._spots = np.column_stack([(columns + 0.5) / width, (rows + 0.5) / height])
         self._share = np.cumsum(weights[rows, columns])
@@ -70,7 +76,7 @@ class Places:
 
     @classmethod
     def of(cls, model: OpticalModel) -> Places:
-        """The places that a model's camera sees."""
+        """Return the places that a model's camera sees."""
         from optisense.optics.transport.chief_rays import pixel_areas
 
         rays = model.chief_rays(PLACES_SEEN)
@@ -78,18 +84,20 @@ class Places:
 
     @property
     def middle(self) -> FloatArray:
-        """(3,) mm: the place that the picture shows nearest to its middle."""
+        """Return the place (3,), mm, that the picture shows nearest to its middle."""
         return self._points[self._middle]
 
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-        """A place: its point (3,) mm, and where the image shows it, (2,) parts of its size."""
+        """Draw a place; return its point (3,), mm, and its position (2,) in the image as shares of
+        its size.
+        """
         chosen = int(np.searchsorted(self._share, rng.uniform(0.0, self._share[-1])))
         return self._points[chosen], self._spots[chosen]
 
 
 @dataclass(frozen=True)
 class DrawnContact:
-    """A random contact and the numbers it was made from (mm, degrees)."""
+    """A random contact and the values that it was made from (mm, degrees)."""
 
     contact: Contact
     indenter: str
@@ -103,12 +111,13 @@ class ContactDraw:
     """Ranges that random contacts are drawn from; each quantity is uniform.
 
     Attributes:
-        indenters: texts of `parse_indenter`, each as likely as the others.
-        depth: mm, least and most.
-        rotation: degrees about the outward normal, least and most.
-        tilt: degrees; turns about two axes in the surface are drawn from -tilt to tilt.
-        margin: part of the picture's width that stays free between a contact and the picture's
-            edge, from 0 to less than a half; 0 lets the edge cut contacts.
+        indenters: texts of `parse_indenter`, drawn with equal probability.
+        depth: smallest and largest depth, mm.
+        rotation: smallest and largest rotation (degrees) about the outward normal.
+        tilt: largest rotation (degrees) about each of two axes in the surface, drawn from -tilt to
+            tilt.
+        margin: margin between a contact and the picture's edge as a share of the picture's width,
+            from 0 to less than a half; with 0 the edge may cut contacts.
     """
 
     indenters: tuple[str, ...] = ("sphere:1.5",)
@@ -131,18 +140,20 @@ class ContactDraw:
             raise TaskError(f"the margin is {self.margin:g}", hint="Give 0 to less than 0.5")
 
     def parsed(self) -> dict[str, Indenter]:
-        """The indenters by their texts.
+        """Return the indenters by their texts.
 
         Raises:
-            ContactError: one can't be read.
+            ContactError: a text is not an indenter.
         """
         return {text: parse_indenter(text) for text in self.indenters}
 
     def draw(
         self, indenters: dict[str, Indenter], places: Places, rng: np.random.Generator
     ) -> DrawnContact:
-        """One contact. All numbers are drawn whether they are used or not, so that changing one
-        range leaves the others' draws alone.
+        """Draw one contact.
+
+        All random numbers are drawn even if they are not used, so that changing one range does not
+        change the draws of the others.
         """
         text = self.indenters[int(rng.integers(len(self.indenters)))]
         point, spot = places.draw(rng)

@@ -1,4 +1,6 @@
-"""Figures of tasks. Matplotlib is loaded when one is drawn; nothing is shown or saved here."""
+"""Figures of tasks. Matplotlib is imported when a figure is drawn; figures are neither shown nor
+saved.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 DOT = "#1f6fb2"
 LINE = "#c0392b"
 WORST_ANGLE = 30.0
-"""Angle in degrees at which the colours of a normal's error end."""
+"""Error of a normal (degrees) at the end of the colour scale."""
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +30,7 @@ def _figure(width: float, height: float) -> Figure:
 
 
 def draw_perception(result: PerceptionResult) -> Figure:
-    """Read against true targets, each read by a forest that did not see it."""
+    """Draw predicted against true targets, each predicted by a forest that was not fitted to it."""
     targets, read = result.samples.targets, result.reading.predictions
     figure = _figure(1.2 + 4.2 * targets.shape[1], 4.8)
     for number, axes in enumerate(figure.subplots(1, targets.shape[1], squeeze=False)[0]):
@@ -50,7 +52,8 @@ def draw_perception(result: PerceptionResult) -> Figure:
 
 
 def draw_reconstruction(result: ReconstructionResult, axes: FloatArray) -> Figure:
-    """Each object: picture, true and read normals, their angle, true and read depth.
+    """Draw for each object the picture, true and read normals, their angle, and true and read
+    depth.
 
     Args:
         axes: (3, 3) rows: image right, image up and viewing direction, in the design's frame.
@@ -90,7 +93,9 @@ def draw_reconstruction(result: ReconstructionResult, axes: FloatArray) -> Figur
 
 
 def _normal_colours(normals: FloatArray, axes: FloatArray) -> FloatArray:
-    """The usual colours of a normal map, 0..1: red right, green up, blue towards the camera."""
+    """Return the usual colours (0 to 1) of a normal map: red right, green up, blue towards the
+    camera.
+    """
     seen = np.nan_to_num(normals) @ (axes * np.array([[1.0], [1.0], [-1.0]])).T
     colours: FloatArray = np.clip(0.5 + 0.5 * seen, 0.0, 1.0)
     return colours

@@ -1,4 +1,4 @@
-"""Make a dataset: random contacts, rendered and labelled, sample by sample."""
+"""Generation of datasets: random contacts, rendered and labelled one by one."""
 
 from __future__ import annotations
 
@@ -51,16 +51,16 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
 
 ATTEMPTS = 50
-"""Contacts drawn for one sample before it is recorded as failed. A plate of 8 mm turned at random
-stays clear of a GelSight Mini's edge in one draw of six, so that one sample in 10,000 fails; a draw
-that is thrown away costs chief rays and no rendering."""
+"""Number of contacts drawn for one sample before it is recorded as failed. A plate of 8 mm with a
+random rotation keeps clear of a GelSight Mini's edge in one draw of six, so that one sample in
+10,000 fails; a rejected draw takes chief rays but no rendering."""
 
 LEAST_PIXELS = 4
 """Number of pixels below which a contact counts as unseen."""
 
 _CONTACT, _CAMERA, _SENSOR = 1, 2, 8
-"""Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
-another. No two modules of this package share one."""
+"""Numbers that are hashed with the seed, one for each kind of random draw, so that the draws are
+independent. They are unique among the modules of this package."""
 
 
 def generate(
@@ -72,26 +72,28 @@ def generate(
     *,
     mend: bool = False,
 ) -> Dataset:
-    """Make a dataset of `count` samples, or continue one until it has that many.
+    """Generate a dataset of `count` samples, or continue one until it has that many.
 
     Args:
         model: the sensor.
-        folder: made if need be; nothing is written outside it.
-        count: samples in all.
-        settings: the defaults when None.
-        progress: called with the number of samples done and `count`, first with those found.
-        mend: whether to read all samples that are there, and to make those again whose files are
-            missing or damaged; they become what they were.
+        folder: folder of the dataset, created if needed; nothing is written outside it.
+        count: total number of samples.
+        settings: settings of the samples; the defaults if None.
+        progress: function that is called with the number of finished samples and `count`, first
+            with the existing samples.
+        mend: whether all existing samples are read, and those with missing or damaged files are
+            generated again with the same content.
 
     Returns:
         The dataset. Contacts that could not be made are among its failures.
 
     Raises:
-        TaskError: the folder holds a dataset made otherwise.
+        TaskError: the folder holds a dataset with other settings.
         FolderInUseError: another process is writing to the folder.
-        ContactError, MeshError: an indenter can't be read.
-        OutputError: the folder holds something else, or a file can't be written.
-        KeyboardInterrupt: Ctrl-C; what is finished is kept, and calling again continues.
+        ContactError, MeshError: an indenter cannot be read.
+        OutputError: the folder holds something else, or a file cannot be written.
+        KeyboardInterrupt: Ctrl-C was pressed; finished samples are kept, and a further call
+            continues.
     """
     if count < 1:
         raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")
@@ -109,7 +111,7 @@ def generate(
 
 
 def _too_small(resolution: tuple[int, int]) -> str:
-    """What to say of a contact of fewer pixels than a sample needs; the same for all."""
+    """Return the reason to record for a contact of fewer pixels than a sample needs."""
     width, height = resolution
     return (
         f"fewer than {LEAST_PIXELS} pixels of {width}x{height} show the contact: raise the "
@@ -118,7 +120,7 @@ def _too_small(resolution: tuple[int, int]) -> str:
 
 
 class _Maker:
-    """One dataset being made."""
+    """The generation of one dataset."""
 
     def __init__(
         self, model: OpticalModel, folder: Path, settings: DatasetSettings, lock: FolderLock
@@ -128,13 +130,13 @@ class _Maker:
         self._settings = settings
         self._indenters = settings.contacts.parsed()
         for indenter in self._indenters.values():
-            indenter.mesh(1.0)  # reads mesh files, so that a wrong one is told before any work
+            indenter.mesh(1.0)  # reads mesh files, so that errors are reported before any work
         width, height = settings.resolution or model.design.camera.resolution
         self._resolution = int(width), int(height)
         self._exposure = self._exposure_of_all(lock)
         rays = model.chief_rays(self._resolution)
         self._untouched = UntouchedSurface.of(rays)
-        if not (folder / CAMERA).exists():  # release 0.1 wrote none
+        if not (folder / CAMERA).exists():  # release 0.1 wrote no such file
             self._write_arrays(CAMERA, ray_arrays(rays))
         self._places = Places.of(model)
         self._larger_than_view = {
@@ -146,11 +148,13 @@ class _Maker:
         self._failed = {int(row["index"]) for row in read_failures(folder)}
 
     def done(self) -> set[int]:
-        """The indices that need no more work."""
+        """Return the indices of finished and of failed samples."""
         return self._labelled | self._failed
 
     def mended(self) -> set[int]:
-        """The same without those of samples whose files are damaged; the background is mended."""
+        """Return the indices of `done` except samples with damaged files; restore a damaged
+        background.
+        """
         dataset = Dataset.load(self._folder)
         try:
             dataset.background()
@@ -174,7 +178,7 @@ class _Maker:
         self._failures.close()
 
     def make(self, index: int) -> None:
-        """Make one sample, or record why it can't be made."""
+        """Generate one sample, or record why it cannot be generated."""
         reason = ""
         for attempt in range(ATTEMPTS):
             rng = np.random.default_rng([self._settings.seed, index, _CONTACT, attempt])
@@ -193,10 +197,11 @@ class _Maker:
         self._failures.add({"index": index, "reason": reason})
 
     def _why_not(self, drawn: DrawnContact) -> str:
-        """Why a contact makes no sample, by its chief rays; empty if it makes one.
+        """Return the reason why a contact makes no sample, from its chief rays; empty if it makes
+        one.
 
         Raises:
-            ContactError: it can't be pressed in there.
+            ContactError: the contact cannot be pressed in there.
         """
         mask = self._touched(drawn.contact)
         if mask.sum() < LEAST_PIXELS:
@@ -207,14 +212,15 @@ class _Maker:
         return ""
 
     def _touched(self, contact: Contact) -> NDArray[np.bool_]:
-        """(h, w) the pixels that see a contact."""
+        """Return the mask (h, w) of the pixels that see a contact."""
         rays = self._model.chief_rays(self._resolution, [contact], self._settings.skin)
         return rays.contact_mask
 
     def _fits(self, indenter: Indenter) -> bool:
-        """Whether the view holds an indenter with its margin, pressed in the middle and upright.
+        """Return whether the view contains an indenter with its margin, pressed upright in the
+        middle.
 
-        One that is larger is cut by the picture's edge wherever it is.
+        The picture's edge cuts a larger indenter at every place.
         """
         draw = self._settings.contacts
         x, y, z = self._places.middle.tolist()
@@ -222,19 +228,19 @@ class _Maker:
         try:
             mask = self._touched(contact)
         except ContactError:
-            return True  # each draw tells why
+            return True  # each draw reports the reason
         return keeps_margin(mask, draw.margin)
 
     def _exposure_of_all(self, lock: FolderLock) -> float:
-        """Check or write what is common to all samples; returns the exposure."""
+        """Check or write the data common to all samples; return the exposure."""
         info_file = self._folder / INFO
         before = read_info(self._folder) if info_file.exists() else None
         if before is not None and "skin" not in before["settings"]:
-            # Release 0.1 knew the conforming skin only: the dataset goes on as it was begun.
+            # Release 0.1 had the conforming skin only; its datasets are continued with it.
             self._settings = replace(self._settings, skin=CONFORMING)
         common = self._common()
         if before is not None:
-            kept = before["settings"]  # release 0.1 had no margin, and another name
+            kept = before["settings"]  # release 0.1 had no margin and other estimator names
             kept["contacts"].setdefault("margin", 0.0)
             kept["estimator"] = current_name(kept["estimator"])
             kept.setdefault("skin", CONFORMING)
@@ -257,7 +263,7 @@ class _Maker:
         return exposure
 
     def _begin(self, common: dict[str, Any]) -> float:
-        """Write what is common to all samples; returns the exposure."""
+        """Write the data common to all samples; return the exposure."""
         image = self._image()
         asked = self._settings.exposure
         exposure = float(image.auto_exposure() if asked == "auto" else asked)
@@ -274,7 +280,7 @@ class _Maker:
             "columns": NUMBER_COLUMNS,
             "camera": camera_model(self._model.design.camera, rays),
         }
-        write_json(self._folder / INFO, info, "the dataset")  # last: now it is a dataset
+        write_json(self._folder / INFO, info, "the dataset")  # last: makes the folder a dataset
         return exposure
 
     def _image(self, *contacts: Contact) -> TactileImage:
@@ -301,7 +307,9 @@ class _Maker:
             _save_arrays(arrays, temporary)
 
     def _common(self) -> dict[str, Any]:
-        """What all samples share and a continued dataset must agree with."""
+        """Return the values that all samples share and that must not change when a dataset is
+        continued.
+        """
         from optisense.optics.backend.versions import versions
 
         values = asdict(self._settings)
@@ -349,7 +357,7 @@ class _Maker:
         write_whole(inside(self._folder, f"arrays/{name}.npz"), partial(_save_arrays, arrays))
         if settings.radiance:
             write_whole(inside(self._folder, f"radiance/{name}.exr"), image.save_radiance)
-        if index in self._labelled:  # it is made again as it was
+        if index in self._labelled:  # an existing sample is restored
             return
         width, height = self._resolution
         contact = drawn.contact

@@ -21,26 +21,27 @@ THICKNESS = 2.0
 """Thickness in mm of the plate; only its face touches the skin."""
 
 RAYS = 32, 24
-"""Grid of chief rays (columns, rows) that tell how far the camera sees and what a plane covers."""
+"""Grid of chief rays (columns, rows) that find the extent of the view and the part that a plane
+covers."""
 
 MARGIN = 0.5
-"""mm that the plate reaches beyond the outermost of these rays."""
+"""Distance (mm) by which the plate extends beyond the outermost of these rays."""
 
 LEAST_SHARE = 0.9
-"""Share of the cropped picture that must show the plate; less would tell the angle by the plate's
-border."""
+"""Smallest share of the cropped picture that must show the plate; with less, the features would
+depend on the plate's border."""
 
 
 @dataclass(frozen=True)
 class TiltedPlate:
-    """A plate whose middle stays on the contact place, however it is turned.
+    """A plate whose middle stays at the place of the contact for any rotation.
 
     (`optisense.geometry.Plane` counts the depth to its lowest corner instead.)
 
     Attributes:
-        angle_x, angle_y: degrees, turned about the indenter's x axis, which is the u axis, and
+        angle_x, angle_y: rotation (degrees) about the indenter's x axis, which is the u axis, and
             then about its y axis.
-        half: mm, half its sides along u and v.
+        half: half sides along u and v, mm.
     """
 
     angle_x: float
@@ -48,7 +49,9 @@ class TiltedPlate:
     half: tuple[float, float]
 
     def mesh(self, reach: float, facet_error: float = 0.0) -> TriangleMesh:
-        """See `optisense.geometry.Indenter`; it reaches below z = 0 where it is tilted."""
+        """Return the mesh; see `optisense.geometry.Indenter`. A tilted plate reaches below z =
+        0.
+        """
         u, v = self.half
         block = TriangleMesh.box((-u, -v, 0.0), (u, v, THICKNESS)).vertex_normals()
         return block.transformed(turn_about_x_and_y(self.angle_x, self.angle_y))
@@ -56,16 +59,17 @@ class TiltedPlate:
 
 @dataclass(frozen=True)
 class Misalignment:
-    """A plane pressed on the middle of the sensor at two angles, which are to be read.
+    """A perception task: two angles of a plane pressed on the middle of the sensor.
 
-    The plane covers what the camera sees and passes at `depth` below the middle of the sensing
-    surface. The paper gives the feature and the model; range, depth and crop are ours.
+    The plane covers the camera's view and passes at `depth` below the middle of the sensing
+    surface. The feature and the model are those of the OptiSense paper; range, depth and crop are
+    not.
 
     Attributes:
-        range: degrees; both angles are drawn evenly from -range to range.
-        depth: mm, so that the crop lies within the contact at all angles.
-        crop: the part of the picture's width and height whose mean is taken, where it shows the
-            plane.
+        range: bound (degrees) of both angles, drawn uniformly from -range to range.
+        depth: depth (mm), with which the crop lies within the contact at all angles.
+        crop: share of the picture's width and height over which the mean is taken, where it shows
+            the plane.
     """
 
     range: float = 10.0
@@ -87,11 +91,11 @@ class Misalignment:
             )
 
     def check(self, model: OpticalModel) -> None:
-        """Try the four largest pairs of angles.
+        """Check the four largest pairs of angles.
 
         Raises:
-            ContactError: the plane would go through the gel.
-            TaskError: it would not cover the crop.
+            ContactError: the plane would pass through the gel.
+            TaskError: the plane would not cover the crop.
         """
         from optisense.optics.scene.surfaces import Region
 
@@ -104,12 +108,12 @@ class Misalignment:
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
     ) -> tuple[Contact, Sequence[float]]:
-        """A plane at random angles."""
+        """Return a plane at random angles, and these angles (degrees)."""
         angles = rng.uniform(-self.range, self.range, 2).tolist()
         return plane_contact(model, angles[0], angles[1], self.depth), angles
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """The mean of each channel over the crop, in levels of 255.
+        """Return the mean of each channel over the crop, in levels of 255.
 
         Raises:
             TaskError: less than LEAST_SHARE of the crop shows the plane.
@@ -120,12 +124,12 @@ class Misalignment:
         return mean
 
     def _middle(self, values: NDArray[Any]) -> NDArray[Any]:
-        """The crop of (h, w, ...)."""
+        """Return the crop of an array (h, w, ...)."""
         rows, columns = (central(length, self.crop) for length in values.shape[:2])
         return values[rows, columns]
 
     def _ensure_covered(self, contact_mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """The crop of a contact mask (h, w), or an error if too little of it is true."""
+        """Return the crop of a contact mask (h, w); raise if too little of it is true."""
         touched = self._middle(contact_mask)
         if touched.mean() < LEAST_SHARE:
             raise TaskError(
@@ -136,27 +140,30 @@ class Misalignment:
 
 
 def central(length: int, part: float) -> slice:
-    """The central `part` of so many rows or columns; at least one."""
+    """Return the slice of the central `part` of `length` rows or columns; at least one."""
     size = max(1, round(length * part))
     start = (length - size) // 2
     return slice(start, start + size)
 
 
 def plane_contact(model: OpticalModel, angle_x: float, angle_y: float, depth: float) -> Contact:
-    """A plane over all that the camera sees, `depth` mm below the surface's middle.
+    """Return a plane over the camera's whole view.
 
     Args:
-        angle_x, angle_y: degrees about the u axis and then about the one square to it.
+        model: the sensor.
+        angle_x, angle_y: rotation (degrees) about the u axis and then about the axis perpendicular
+            to it.
+        depth: depth (mm) of the plane below the middle of the surface.
 
     Raises:
-        ContactError: it reaches the bottom of the gel.
+        ContactError: the plane reaches the bottom of the gel.
     """
     surface = model.surface
     spot = surface.point_at(0.0, 0.0)
     rays = model.chief_rays(RAYS)
     seen = rays.points[rays.hit] - spot.point
     u, v = (float(np.abs(seen @ axis).max()) + MARGIN for axis in (surface.u_axis, surface.v_axis))
-    # As a contact's own axes: v may point the other way than y.
+    # These are a contact's own axes; v may point opposite to y.
     axes = np.column_stack([surface.u_axis, np.cross(-spot.inward, surface.u_axis), -spot.inward])
     corners = np.array([(a * u, b * v, 0.0) for a in (-1, 1) for b in (-1, 1)])
     turned = corners @ (axes @ turn_about_x_and_y(angle_x, angle_y)).T

@@ -1,4 +1,4 @@
-"""Whether one sensor reads better than another on the same presses, by a paired bootstrap."""
+"""Comparison of the errors of two sensors on the same presses by a paired bootstrap."""
 
 from __future__ import annotations
 
@@ -13,23 +13,24 @@ RESAMPLES = 4000
 """Number of resamples; the ends of the interval then vary by 2 to 3 per cent of its width."""
 
 CONFIDENCE = 95.0
-"""Per cent of the resamples that the interval holds, as is usual."""
+"""Confidence level (per cent) of the interval, the usual one."""
 
 LEAST_OBJECTS = 6
-"""Objects without which nothing is told: if two sensors are alike, all of 5 objects come out on one
-side once in 16 times, of 6 once in 32, which is below the 5 per cent that the interval allows."""
+"""Smallest number of objects for a verdict. For two equal sensors, the changes of all of 5 objects
+have the same sign once in 16 times, and of 6 objects once in 32, which is below the 5 per cent of
+the interval."""
 
 BETTER, WORSE, UNKNOWN = "better", "worse", "cannot be told"
 
 
 @dataclass(frozen=True)
 class ErrorChange:
-    """The difference of an error between two sensors that the same objects pressed.
+    """The difference of an error between two sensors that the same objects press.
 
     Attributes:
-        before, after: mean errors of the two.
-        low, high: the ends of the 95 % interval of after - before.
-        objects: how many things pressed, which is what the interval rests on.
+        before, after: mean errors of the first and of the second sensor.
+        low, high: the ends of the 95 % confidence interval of after - before.
+        objects: number of objects, which determines the width of the interval.
     """
 
     before: float
@@ -40,12 +41,14 @@ class ErrorChange:
 
     @property
     def change(self) -> float:
-        """after - before; below 0 the second sensor reads better."""
+        """The change of the error, after - before; if it is negative, the second sensor is
+        better.
+        """
         return self.after - self.before
 
     @property
     def verdict(self) -> str:
-        """BETTER, WORSE or UNKNOWN, of the second sensor."""
+        """The verdict on the second sensor: BETTER, WORSE or UNKNOWN."""
         if self.objects < LEAST_OBJECTS:
             return UNKNOWN
         if self.high < 0.0:
@@ -53,7 +56,7 @@ class ErrorChange:
         return WORSE if self.low > 0.0 else UNKNOWN
 
     def to_dict(self) -> dict[str, float | str | int]:
-        """All of it, ready for JSON."""
+        """Return all values, ready for JSON."""
         return {
             "before": self.before,
             "after": self.after,
@@ -69,13 +72,14 @@ class ErrorChange:
 def error_change(before: FloatArray, after: FloatArray, seed: int = 0) -> ErrorChange:
     """Compare the errors of two sensors on the same presses.
 
-    A bootstrap in two stages: objects are drawn with replacement, then places of each object
-    (Davison and Hinkley, "Bootstrap Methods and their Application", 1997, section 3.8). Readers
-    are drawn for each sensor by itself, since theirs have nothing to do with each other.
+    The bootstrap has two stages: objects are drawn with replacement, then places of each object
+    (Davison and Hinkley, "Bootstrap Methods and their Application", 1997, section 3.8). Readers are
+    drawn separately for each sensor, as they are independent.
 
     Args:
-        before, after: (objects, places, readers) errors, higher is worse; both of the same presses.
-        seed: of the resamples.
+        before, after: (objects, places, readers) errors of both sensors on the same presses; higher
+            is worse.
+        seed: seed of the resamples.
     """
     if before.shape[:2] != after.shape[:2]:
         raise ValueError(f"errors of other presses: {before.shape} and {after.shape}")

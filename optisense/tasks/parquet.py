@@ -1,8 +1,8 @@
-"""A dataset as Parquet files, which libraries of machine learning load without a script.
+"""Export of a dataset as Parquet files, which machine-learning libraries load without a script.
 
-A file is a table with a row for each sample: its picture as PNG, its arrays, its labels. The files
-tell the types of their columns as Hugging Face's `datasets` does, by its features in the metadata
-of the table; with PyArrow alone the arrays are nested lists.
+A file is a table with a row for each sample: its picture as PNG, its arrays, its labels. The types
+of the columns are stored like those of Hugging Face's `datasets`, as features in the table's
+metadata; with PyArrow alone the arrays are nested lists.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from optisense.writing import inside
 FOLDER = "parquet"
 
 SAMPLES_OF_A_FILE = 256
-"""Number of samples in a file; at 320 x 240 pixels it has some 500 MB, the size that hubs of
-datasets advise."""
+"""Number of samples in a file; at 320 x 240 pixels it has some 500 MB, the size that dataset hubs
+recommend."""
 
 SAMPLES_AT_ONCE = 16
 """Number of samples that are in memory at once, some 60 MB at 320 x 240 pixels; they are a row
@@ -47,20 +47,20 @@ ARRAYS = {
     "penetration": ("float32", 1),
     "displacement": ("float32", 3),
 }
-"""Arrays of a sample: their types, and the numbers of a pixel."""
+"""Arrays of a sample: their types, and the number of values per pixel."""
 
 WHOLE = ("index", "contact_pixels", "cut", "attempt")
 TEXTS = ("indenter", "split")
 
 RENAMED = {"depth": "press_depth", "pressure": "greatest_pressure"}
-"""Labels that have the name of an array, and what they are called here."""
+"""Labels with the name of an array, and the names of their columns."""
 
 NUMBERS = {each: RENAMED.get(each, each) for each in NUMBER_COLUMNS}
-"""Columns of numbers by label."""
+"""Name of the column of each numeric label."""
 
 
 def require_parquet() -> None:
-    """Find out whether Parquet files can be written.
+    """Check that Parquet files can be written.
 
     Raises:
         SetupError: the extra is not installed.
@@ -79,11 +79,11 @@ def write_parquet(
 ) -> list[Path]:
     """Write all samples into the folder `parquet` of a dataset, a few files for each split.
 
-    Samples of a release without splits are all in "train". Files of an earlier call go.
+    Samples of a release without splits are all in "train". Files of an earlier call are removed.
 
     Args:
-        dataset: as it is on disk.
-        progress: called with the number of samples written and how many there are.
+        dataset: the dataset on disk.
+        progress: function that is called with the number of samples written and their total number.
 
     Returns:
         The files.
@@ -158,7 +158,9 @@ def features_of(height: int, width: int) -> dict[str, Any]:
 
 
 def _field(name: str, feature: dict[str, Any]) -> Any:
-    """A column; those of arrays tell `datasets` their shape, and are lists to other readers."""
+    """Return a column's field. Columns of arrays have metadata with their shape for `datasets`, and
+    are lists to other readers.
+    """
     import pyarrow as pa
 
     told = None
@@ -185,7 +187,7 @@ def _arrow_type(feature: dict[str, Any]) -> Any:
 
 
 def _columns(dataset: Dataset, numbers: Sequence[int], features: dict[str, Any]) -> dict[str, Any]:
-    """Samples as Arrow's arrays, by column."""
+    """Return samples as Arrow arrays, by column."""
     import pyarrow as pa
 
     samples = [dataset[number] for number in numbers]
@@ -196,7 +198,7 @@ def _columns(dataset: Dataset, numbers: Sequence[int], features: dict[str, Any])
     for name in ARRAYS:
         found[name] = _nested([getattr(sample, name) for sample in samples], features[name])
     for name, label in {**{each: each for each in (*TEXTS, *WHOLE)}, **NUMBERS}.items():
-        values = [None if row[name] != row[name] else row[name] for row in rows]  # NaN: not told
+        values = [None if row[name] != row[name] else row[name] for row in rows]  # NaN: unknown
         found[label] = pa.array(values, _arrow_type(features[label]))
     return found
 
@@ -209,7 +211,7 @@ def _pictures(dataset: Dataset, samples: Sequence[Sample]) -> Iterator[dict[str,
 
 
 def _nested(arrays: Sequence[NDArray[Any] | None], feature: dict[str, Any]) -> Any:
-    """Arrays of one shape as nested lists; what is missing is null."""
+    """Return arrays of one shape as nested lists; missing arrays are null."""
     import pyarrow as pa
 
     shape = tuple(feature["shape"])

@@ -1,8 +1,9 @@
-"""Perception tasks: press something whose angle or size is known, and see how well it is read.
+"""Perception tasks: the accuracy with which a known angle, size or force is predicted from
+pictures.
 
-The OptiSense paper ("Why choosing those objective functions?") makes a small set of simulated
-contacts for each task, turns each picture into a few numbers, and lets a random forest read the
-quantity from them. Each task module says what is pressed and which numbers are taken.
+As in the OptiSense paper ("Why choosing those objective functions?"), a small set of simulated
+contacts is rendered for each task, each picture is reduced to a few features, and a random forest
+predicts the quantity from them. Each task module defines the contacts and the features.
 """
 
 from __future__ import annotations
@@ -41,16 +42,16 @@ SETTINGS = "task.json"
 SAMPLES = "samples.csv"
 
 _CONTACT, _CAMERA, _SENSOR = 3, 4, 9
-"""Numbers that are mixed into a seed, one for each thing that is drawn, so that none depends on
-another. No two modules of this package share one."""
+"""Numbers that are hashed with the seed, one for each kind of random draw, so that the draws are
+independent. They are unique among the modules of this package."""
 
 
 class PerceptionTask(Protocol):
-    """A quantity to read from pictures; a frozen dataclass, whose fields are its settings."""
+    """A quantity to predict from pictures; a frozen dataclass, whose fields are its settings."""
 
     @property
     def name(self) -> str:
-        """The task's name as on the command line."""
+        """The task's name on the command line."""
         ...
 
     @property
@@ -60,43 +61,44 @@ class PerceptionTask(Protocol):
 
     @property
     def targets(self) -> tuple[str, ...]:
-        """Names of the quantities to read."""
+        """Names of the quantities to predict."""
         ...
 
     @property
     def features(self) -> tuple[str, ...]:
-        """Names of the numbers taken from a picture."""
+        """Names of the features of a picture."""
         ...
 
     @property
     def width(self) -> int:
-        """Pixels across the pictures that the features need."""
+        """Width (pixels) of the pictures that the features need."""
         ...
 
     @property
     def contact_only(self) -> bool:
-        """Whether the features read nothing outside the contact."""
+        """Whether the features depend on pixels of the contact only."""
         ...
 
     def check(self, model: OpticalModel) -> None:
-        """Find out before any work whether the sensor can be pressed so.
+        """Check before any work that the contacts are possible on the sensor.
 
         Raises:
-            ContactError: it can't.
+            ContactError: a contact is not possible.
         """
         ...
 
     def contact(
         self, model: OpticalModel, rng: np.random.Generator
     ) -> tuple[Contact, Sequence[float]]:
-        """A random contact and its targets."""
+        """Return a random contact and its targets."""
         ...
 
     def measure(self, picture: ByteArray, image: TactileImage) -> Sequence[float]:
-        """The features of a picture (h, w, 3), as the camera stored it.
+        """Return the features of a picture (h, w, 3) that the camera stored.
 
         Raises:
-            TaskError: they can't be taken, for instance because the contact is not seen.
+            TaskError: the features cannot be computed, for instance because the contact is not
+                seen.
         """
         ...
 
@@ -106,12 +108,13 @@ class SampleSettings:
     """Settings of the samples.
 
     Attributes:
-        count: of samples.
-        seed: of everything; sample i depends on it and on i only.
+        count: number of samples.
+        seed: seed of all random numbers; sample i depends on it and on i only.
         camera_noise: standard deviation in levels of 255 (see `camera_noise`).
-        resolution: (width, height) pixels; what the task needs, in the camera's shape, if None.
-        photons: of the light that all samples share.
-        estimator: of the light, "radiance-cache" or "sppm".
+        resolution: (width, height) pixels; if None, the task's width with the camera's aspect
+            ratio.
+        photons: number of photons of the light that all samples share.
+        estimator: estimator of the light, "radiance-cache" or "sppm".
         skin: "elastic" or "conforming"; see docs/mechanics.md.
     """
 
@@ -126,7 +129,9 @@ class SampleSettings:
 
 @dataclass(frozen=True)
 class Samples:
-    """features (n, f) in levels of 255, targets (n, t) in the task's unit."""
+    """The features (n, f), in levels of 255 or the task's own units, and targets (n, t), in the
+    task's unit.
+    """
 
     features: FloatArray
     targets: FloatArray
@@ -136,8 +141,15 @@ class Samples:
 class PerceptionResult:
     """The accuracy with which a sensor measures a quantity.
 
-    task, unit, targets: of what. samples: what was learned from. reading: of the random forest,
-    cross-validated. snr: the signal-to-noise ratio. settings: of task and samples.
+    Attributes:
+        task: name of the task.
+        design: name of the design.
+        unit: unit of the targets.
+        targets: names of the targets.
+        samples: the samples.
+        reading: cross-validated predictions of the random forest.
+        snr: the signal-to-noise ratio.
+        settings: the settings of task and samples.
     """
 
     task: str
@@ -150,7 +162,7 @@ class PerceptionResult:
     settings: dict[str, Any]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the samples, ready for JSON."""
+        """Return all values except the samples, ready for JSON."""
         error = np.abs(self.reading.predictions - self.samples.targets).mean(axis=0)
         return {
             "task": self.task,
@@ -174,20 +186,22 @@ def perceive(
     folder: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> PerceptionResult:
-    """Make samples of a task and see how well they tell its targets.
+    """Render samples of a task and compute the accuracy with which they predict its targets.
 
     Args:
-        task: what is pressed and read.
+        task: the perception task.
         model: the sensor.
-        settings: of the samples; the defaults when None.
-        neighbours: k of the signal-to-noise ratio.
-        folder: keeps the samples, so that stopped work continues; None keeps them in memory.
-        progress: called with the number of samples done and their count.
+        settings: settings of the samples; the defaults if None.
+        neighbours: number k of neighbours of the signal-to-noise ratio.
+        folder: folder that stores the samples, so that interrupted work continues; None keeps them
+            in memory.
+        progress: function that is called with the number of finished samples and their total
+            number.
 
     Raises:
         TaskError: a contact is not seen, there are too few samples, or the folder holds samples
-            made otherwise.
-        ContactError: the sensor can't be pressed so.
+            with other settings.
+        ContactError: a contact is not possible on the sensor.
     """
     settings = settings or SampleSettings()
     least = max(2 * FOLDS, neighbours + 1)
@@ -247,7 +261,7 @@ def collect(
 
 
 class _Camera:
-    """Takes the pictures of one task with a fixed exposure."""
+    """The camera of one task, with a fixed exposure."""
 
     def __init__(self, task: PerceptionTask, model: OpticalModel, settings: SampleSettings) -> None:
         self._task = task
@@ -256,7 +270,7 @@ class _Camera:
         self._exposure = self._render([]).auto_exposure()
 
     def sample(self, index: int) -> list[float]:
-        """Features and targets of one contact."""
+        """Return features and targets of one contact."""
         seed = self._settings.seed
         rng = np.random.default_rng([seed, index, _CONTACT])
         contact, targets = self._task.contact(self._model, rng)
@@ -294,7 +308,7 @@ def _resolution(
 def _described(
     task: PerceptionTask, model: OpticalModel, settings: SampleSettings
 ) -> dict[str, Any]:
-    """Everything that decides the samples, but how many there are."""
+    """Return all values that determine the samples, except their number."""
     values = asdict(settings) | {"resolution": _resolution(task, model, settings)}
     del values["count"]
     return {"task": task.name, task.name: asdict(task), "samples": values}  # type: ignore[call-overload]
@@ -325,7 +339,7 @@ def _open_table(
 
 
 def _kept_numbers(table: CsvTable, names: Sequence[str]) -> list[list[float]]:
-    """The numbers of the samples that a table has."""
+    """Return the values of the samples in a table."""
     found = []
     for line, row in enumerate(table.rows, start=2):
         try:

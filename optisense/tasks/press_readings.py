@@ -22,10 +22,12 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PressPictures:
-    """Pictures and normals of one press; arrays are (h, w, ...).
+    """Pictures and normals of one press.
 
-    picture: uint8. true_normals, read_normals: unit, in the design's frame. angles: degrees between
-    them, NaN where nothing touches.
+    Attributes:
+        picture: (h, w, 3) uint8.
+        true_normals, read_normals: (h, w, 3) unit normals in the design's frame.
+        angles: (h, w) angles (degrees) between them, NaN where nothing touches.
     """
 
     picture: NDArray[np.uint8]
@@ -39,14 +41,14 @@ class PressReading:
     """The reading of one press by a sensor, where its camera sees the contact.
 
     Attributes:
-        points: (n, 3) mm, the untouched skin behind the pixels of the contact.
-        areas: (n,) mm^2 of skin behind each.
-        angles: (readers, n) degrees between read and true normals.
-        depths: (readers, n) mm between read and true depth, absolute.
-        flat_angles: (n,) degrees from the untouched normals to the true ones, which is the error
-            of reading nothing.
-        flat_depths: (n,) mm, the true depth, which is the same for depth.
-        pictures: where they are kept.
+        points: (n, 3) points (mm) of the untouched skin that the pixels of the contact see.
+        areas: (n,) area (mm^2) of skin that each of these pixels sees.
+        angles: (readers, n) angles (degrees) between read and true normals.
+        depths: (readers, n) absolute differences (mm) of read and true depth.
+        flat_angles: (n,) angles (degrees) between the untouched and the true normals, the error of
+            a reader that always reads a flat surface.
+        flat_depths: (n,) true depth (mm), the error in depth of such a reader.
+        pictures: the pictures, if they are kept.
     """
 
     points: FloatArray
@@ -69,9 +71,12 @@ def read_press(
     """Press something into a calibrated sensor and read it.
 
     Args:
-        sensor: the sensor. areas: (h, w) mm^2 of skin behind each of its pixels.
-        contact: what presses. number: of the picture, for its noise.
-        readers: of the sensor, all of which read. keeps: whether the pictures are kept.
+        sensor: the sensor.
+        areas: (h, w) area (mm^2) of skin that each of its pixels sees.
+        contact: the contact.
+        number: number of the picture, for its noise.
+        readers: number of the sensor's readers, all of which are used.
+        keeps: whether the pictures are kept.
     """
     image, picture = sensor.look(contact, number)
     mask = image.contact_mask & (areas > 0.0)
@@ -104,14 +109,15 @@ def read_press(
 def whole_errors(
     pair: tuple[PressReading, ...], trees: Sequence[cKDTree], reach: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Errors of normals and of depth over the whole contact: (readers,) of each sensor.
+    """Return the errors of normals (degrees) and of depth (mm) over the whole contact, (readers,)
+    for each sensor.
 
-    What only the other camera sees counts as read flat.
+    Parts that only the other camera sees count as read flat.
 
     Args:
-        pair: what each of two sensors reads of the same press.
-        trees: of the points (mm) of the skin that each camera sees.
-        reach: mm within which one of these means that a place is seen.
+        pair: the readings of the same press by two sensors.
+        trees: search trees of the points (mm) of the skin that each camera sees.
+        reach: largest distance (mm) from one of these points at which a place counts as seen.
 
     Raises:
         TaskError: neither camera sees the contact.
@@ -130,7 +136,7 @@ def whole_errors(
             unseen = trees[side].query(other.points)[0] > reach
         hidden = other.areas[unseen]
         whole = own.areas.sum() + hidden.sum()
-        if whole == 0.0:  # nothing of it is seen, and nothing lies where it could be
+        if whole == 0.0:  # no contact seen, though all of it is in view
             unseen[:], hidden, whole = True, other.areas, other.areas.sum()
         for kept, read, flat in (
             (normals, own.angles, other.flat_angles),
@@ -141,6 +147,8 @@ def whole_errors(
 
 
 def flat_errors(press: PressReading) -> tuple[float, float]:
-    """Degrees and mm by which reading nothing is off."""
+    """Return the errors in normals (degrees) and depth (mm) of a reader that always reads a flat
+    surface.
+    """
     shares = press.areas / press.areas.sum()
     return float(press.flat_angles @ shares), float(press.flat_depths @ shares)

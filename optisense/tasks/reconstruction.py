@@ -1,7 +1,7 @@
-"""Shape reconstruction: how well a sensor's pictures give back the shape that touched it.
+"""Shape reconstruction: the accuracy of shapes that are reconstructed from a sensor's pictures.
 
-What users do with a real sensor, done with a simulated one: calibrate it with balls, then press
-other things, read their normals and integrate them to depth.
+The procedure is that for a real sensor: it is calibrated with balls, then other objects are pressed
+in, their normals are read, and integrated to depth.
 """
 
 from __future__ import annotations
@@ -28,24 +28,28 @@ FloatArray = NDArray[np.float64]
 
 
 def pyramid(slope: float = 30.0, height: float = 2.0) -> TriangleMesh:
-    """A square pyramid standing on its tip, its sides tilted by `slope` degrees, `height` mm."""
+    """Return a square pyramid (mm) that stands on its tip, with sides tilted by `slope` (degrees)
+    and height `height` (mm).
+    """
     half = height / np.tan(np.radians(slope))
     base = [(-half, -half, height), (half, -half, height), (half, half, height)]
     vertices = np.array([(0.0, 0.0, 0.0), *base, (-half, half, height)])
     faces = np.array([[0, 2, 1], [0, 3, 2], [0, 4, 3], [0, 1, 4], [1, 2, 3], [1, 3, 4]])
     corners = vertices[faces].reshape(-1, 3)
-    # Each face has corners of its own, so that edges stay sharp.
+    # The faces do not share vertices, so that edges stay sharp.
     flat = TriangleMesh(corners, np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
     return TriangleMesh(corners, flat.faces, np.repeat(flat.face_normals, 3, axis=0))
 
 
 RING_SLOPE = 2.0
-"""Degrees by which the skin beside a contact slopes at least where it counts as the ring: about
-what the camera's noise lets a reader tell."""
+"""Smallest slope (degrees) of skin around a contact that counts as the ring: about the smallest
+slope that a reader can detect in the camera's noise."""
 
 
 def unseen_objects() -> dict[str, Contact]:
-    """The objects reconstructed by default: none is a ball of the radius used for the fit."""
+    """Return the objects reconstructed by default, none of which is a ball of the radius used for
+    the fit.
+    """
     return {
         "ball of 3 mm": Contact(Sphere(3.0), at=(-2.0, 1.5), depth=0.6),
         "cylinder of 2 mm": Contact(Cylinder(2.0), at=(0.0, 0.0), depth=0.5, rotation=30.0),
@@ -57,11 +61,15 @@ def unseen_objects() -> dict[str, Contact]:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """One object as it is and as it was read; arrays are (h, w, ...).
+    """The true and the reconstructed shape of one object.
 
-    normals, true_normals, untouched_normals: unit, inward, in the design's frame. depth,
-    true_depth: mm along the inward normal. mask: the contact, as far as its skin is seen untouched,
-    too; the errors count its pixels.
+    Attributes:
+        picture: (h, w, 3) uint8.
+        normals, true_normals, untouched_normals: (h, w, 3) unit normals into the gel, in the
+            design's frame.
+        depth, true_depth: (h, w) depth along the inward normal, mm.
+        mask: (h, w) mask of the contact, where its skin is also seen untouched; errors are means
+            over its pixels.
     """
 
     picture: NDArray[np.uint8]
@@ -74,37 +82,39 @@ class Reconstruction:
 
     @cached_property
     def angles(self) -> FloatArray:
-        """(h, w) degrees between read and true normals."""
+        """Angles (h, w), degrees, between read and true normals."""
         return angles_between(self.normals, self.true_normals)
 
     @property
     def normal_error(self) -> float:
-        """Degrees, the mean over the contact."""
+        """Mean error of the normals over the contact, degrees."""
         return float(self.angles[self.mask].mean())
 
     @cached_property
     def ring(self) -> NDArray[np.bool_]:
-        """(h, w) the skin around the contact that slopes by `RING_SLOPE` or more."""
+        """Mask (h, w) of the skin around the contact that slopes by `RING_SLOPE` or more."""
         sloping = angles_between(self.untouched_normals, self.true_normals) >= RING_SLOPE
         return sloping & ~self.mask
 
     @property
     def depth_error(self) -> float:
-        """mm, the mean absolute difference over the contact."""
+        """Mean absolute error of the depth over the contact, mm."""
         return float(np.abs(self.depth - self.true_depth)[self.mask].mean())
 
     @property
     def ring_normal_error(self) -> float:
-        """Degrees, the mean over the ring; NaN where there is none."""
+        """Mean error of the normals over the ring, degrees; NaN if there is no ring."""
         return _mean(self.angles, self.ring)
 
     @property
     def ring_depth_error(self) -> float:
-        """mm, the mean absolute difference over the ring; NaN where there is none."""
+        """Mean absolute error of the depth over the ring, mm; NaN if there is no ring."""
         return _mean(np.abs(self.depth - self.true_depth), self.ring)
 
     def to_dict(self) -> dict[str, float | None]:
-        """The errors, beside those of reading nothing, ready for JSON; None where no ring is."""
+        """Return the errors, and those of a reader that always reads a flat surface, ready for
+        JSON; None if there is no ring.
+        """
         inside = self.mask
         nothing = angles_between(self.untouched_normals, self.true_normals)
         return {
@@ -125,12 +135,12 @@ class Reconstruction:
 
 
 def _mean(values: FloatArray, where: NDArray[np.bool_]) -> float:
-    """The mean absolute value of some pixels; NaN if there are none."""
+    """Return the mean absolute value over a mask of pixels; NaN if it is empty."""
     return float(np.abs(values[where]).mean()) if where.any() else float("nan")
 
 
 def _mean_of_known(values: Iterable[float]) -> float:
-    """The mean without NaN; NaN if there is nothing else."""
+    """Return the mean of the values that are not NaN; NaN if there are none."""
     known = [value for value in values if not math.isnan(value)]
     return float(np.mean(known)) if known else float("nan")
 
@@ -146,26 +156,30 @@ class ReconstructionResult:
 
     @property
     def normal_error(self) -> float:
-        """Degrees."""
+        """Mean error of the normals over the objects, degrees."""
         return float(np.mean([each.normal_error for each in self.objects.values()]))
 
     @property
     def depth_error(self) -> float:
-        """mm."""
+        """Mean absolute error of the depth over the objects, mm."""
         return float(np.mean([each.depth_error for each in self.objects.values()]))
 
     @property
     def ring_normal_error(self) -> float:
-        """Degrees, over the objects that have a ring; NaN if none has, as of a conforming skin."""
+        """Mean error of the normals over the rings of the objects, degrees; NaN if there are none,
+        as with a conforming skin.
+        """
         return _mean_of_known(each.ring_normal_error for each in self.objects.values())
 
     @property
     def ring_depth_error(self) -> float:
-        """mm, over the same objects."""
+        """Mean absolute error of the depth over the rings of the objects, mm; NaN if there are
+        none.
+        """
         return _mean_of_known(each.ring_depth_error for each in self.objects.values())
 
     def to_dict(self) -> dict[str, Any]:
-        """All errors and settings, ready for JSON."""
+        """Return all errors and settings, ready for JSON."""
         return {
             "task": "reconstruction",
             "design": self.design,
@@ -186,15 +200,17 @@ def reconstruct(
     objects: Mapping[str, Contact] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> ReconstructionResult:
-    """Fit a reader to ball presses and try it on objects that it has not seen.
+    """Fit a reader to ball presses and apply it to objects that it was not fitted to.
 
     Args:
-        model: the sensor. settings: the defaults when None. objects: `unseen_objects` when None.
-        progress: called with the number of pictures taken and their count.
+        model: the sensor.
+        settings: the settings; the defaults if None.
+        objects: contacts by name; `unseen_objects` if None.
+        progress: function that is called with the number of pictures taken and their total number.
 
     Raises:
         ContactError: an object is off the surface or deeper than the gel.
-        TaskError: an object or too few presses are seen, or a setting makes no sense.
+        TaskError: an object is not seen, too few presses are seen, or a setting is invalid.
     """
     settings = settings or ReconstructionSettings()
     wanted = unseen_objects() if objects is None else dict(objects)
@@ -205,7 +221,7 @@ def reconstruct(
             progress(done, count)
 
     for contact in wanted.values():
-        model.place(contact)  # so that one that does not fit is told before any work
+        model.place(contact)  # so that errors are reported before any work
     sensor = CalibratedSensor(model, settings, report)
     read = {}
     for number, (name, contact) in enumerate(wanted.items()):
@@ -218,13 +234,19 @@ def reconstruct(
 def reconstruct_one(
     sensor: CalibratedSensor, contact: Contact, number: int = 0, name: str = "the object"
 ) -> Reconstruction:
-    """Press something and read it. number: of the picture, for its noise.
+    """Press an object into a calibrated sensor and reconstruct it.
+
+    Args:
+        sensor: the calibrated sensor.
+        contact: the contact.
+        number: number of the picture, for its noise.
+        name: name of the object, for messages.
 
     Raises:
-        TaskError: the camera does not see it.
+        TaskError: the camera does not see the contact.
     """
     image, picture = sensor.look(contact, number)
-    # At the border of the view a contact shows where the untouched skin does not.
+    # At the border of the view, a pixel may see the contact but not the untouched skin.
     mask = image.contact_mask & sensor.untouched.seen
     if mask.sum() < LEAST_PIXELS:
         raise TaskError(f"the camera does not see {name}", hint="Place it where it looks")

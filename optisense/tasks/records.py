@@ -1,8 +1,8 @@
-"""Folders that grow sample by sample and survive being killed at any moment.
+"""Folders that grow sample by sample and stay valid if the process is killed at any moment.
 
-Three rules make that so: one process at a time writes to a folder (see `optisense.folders`), a
-file is written under a temporary name and renamed when it is whole, and a sample exists once its
-row does, which is written last. `generation` and the samples of perception tasks keep to them.
+Three rules ensure this: one process at a time writes to a folder (see `optisense.folders`), a file
+is written under a temporary name and renamed when it is complete, and a sample exists once its row
+does, which is written last. `generation` and the samples of perception tasks follow them.
 """
 
 from __future__ import annotations
@@ -22,14 +22,15 @@ from optisense.writing import written_whole
 KEPT = "Free space on this disk or choose another folder; finished samples are kept"
 
 MOST_SHOWN = 5
-"""Number of differences between settings that a message lists; the rest is counted."""
+"""Largest number of differences between settings that a message lists; further ones are only
+counted."""
 
 
 def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
-    """Let `writer` make a file under a temporary name beside `path`, then rename it.
+    """Call `writer` to write a file under a temporary name beside `path`, then rename it.
 
     Raises:
-        OutputError: it can't be written.
+        OutputError: the file cannot be written.
     """
     with written_whole(path, "the results", KEPT) as temporary:
         writer(temporary)
@@ -39,7 +40,7 @@ def read_object(path: Path) -> dict[str, Any]:
     """Read a JSON file that holds an object.
 
     Raises:
-        TaskError: it is missing or no such file.
+        TaskError: the file is missing or holds no JSON object.
     """
     values = read_json(path, TaskError)
     if not isinstance(values, dict):
@@ -51,17 +52,17 @@ class CsvTable:
     """A CSV file with named columns that grows row by row; its folder's lock must be held."""
 
     def __init__(self, path: Path, columns: Sequence[str]) -> None:
-        """Open it, or start it with its heading. A last row that was cut off is dropped.
+        """Open the file, or create it with its header. An incomplete last row is dropped.
 
         Raises:
             TaskError: the file has other columns, or is a link.
-            OutputError: it can't be written.
+            OutputError: the file cannot be written.
         """
         self.path = path
         self.columns = list(columns)
         heading = _line(self.columns)
         try:
-            if path.is_symlink():  # rows are appended, which would write to another place
+            if path.is_symlink():  # appending rows would write to another place
                 raise TaskError(
                     "the table is a link", where=str(path), hint="Put the file itself there"
                 )
@@ -83,10 +84,10 @@ class CsvTable:
         self.rows = read_rows(path)
 
     def add(self, row: Mapping[str, object]) -> None:
-        """Append a row, all of it or nothing.
+        """Append a row completely or not at all.
 
         Raises:
-            OutputError: it can't be written.
+            OutputError: the row cannot be written.
         """
         text = {name: _text(row[name]) for name in self.columns}
         before = self._file.tell()
@@ -105,16 +106,18 @@ class CsvTable:
 
 
 def read_rows(path: Path) -> list[dict[str, str]]:
-    """The rows of a CSV file as text, by column.
+    """Return the rows of a CSV file as text, by column.
 
     Raises:
-        TaskError: it can't be read.
+        TaskError: the file cannot be read.
     """
     return read_table(path, TaskError)
 
 
 def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Differences between two nested mappings, as "path: was A, is B", in the order of `now`."""
+    """Return the differences between two nested mappings, as "path: was A, is B", in the order of
+    `now`.
+    """
     found: list[str] = []
     for key in [*now, *(key for key in before if key not in now)]:
         found += _difference(before.get(key, _NOTHING), now.get(key, _NOTHING), f"{prefix}{key}")
@@ -122,7 +125,9 @@ def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str =
 
 
 def _difference(old: object, new: object, path: str) -> list[str]:
-    """The same of two values; short lists of plain values are told as a whole."""
+    """Return the differences between two values; short lists of plain values are compared as a
+    whole.
+    """
     old, new = _plain(old), _plain(new)
     if isinstance(old, dict) and isinstance(new, dict):
         return differences(old, new, path + ".")
@@ -144,7 +149,7 @@ def refuse_differences(
     """Raise if a folder was begun with other settings.
 
     Raises:
-        TaskError: says what differs.
+        TaskError: the settings differ; the message lists the differences.
     """
     found = differences(before, now)
     if not found:
@@ -161,7 +166,7 @@ _NOTHING = object()
 
 
 def _plain(value: object) -> object:
-    """A value as JSON would give it back, so that tuples equal lists."""
+    """Return a value as JSON would load it, so that tuples equal lists."""
     return value if value is _NOTHING else json.loads(json.dumps(value))
 
 
@@ -173,7 +178,7 @@ def _shown(value: object) -> str:
 
 
 def _text(value: object) -> str:
-    # repr gives the shortest digits that read back as the same float.
+    # repr returns the shortest digits that give the same float.
     return repr(float(value)) if isinstance(value, float) else str(value)
 
 

@@ -24,8 +24,11 @@ FloatArray = NDArray[np.float64]
 class ForestReading:
     """Cross-validated predictions of a random forest.
 
-    predictions: (n, t). error: mean absolute error over samples and targets. spread: standard
-    deviation of the error among folds. guess: the error of always saying the mean.
+    Attributes:
+        predictions: (n, t) predicted targets.
+        error: mean absolute error over samples and targets.
+        spread: standard deviation of the error among folds.
+        guess: mean absolute error of predicting the mean.
     """
 
     predictions: FloatArray
@@ -37,15 +40,17 @@ class ForestReading:
 def read_by_forest(features: FloatArray, targets: FloatArray, seed: int = 0) -> ForestReading:
     """Cross-validate a random forest regression.
 
-    FOLDS folds of shuffled samples; forests of TREES full-grown trees with bootstrap and all
-    features at each split (scikit-learn's defaults). The OptiSense paper names the model and
-    the mean absolute error, but neither the trees nor how it splits.
+    The samples are shuffled into FOLDS folds. Forests have TREES full-grown trees with bootstrap
+    and all features at each split (scikit-learn's defaults). The OptiSense paper names the model
+    and the mean absolute error, but neither the number of trees nor the folds.
 
     Args:
-        features: (n, f). targets: (n, t), of one unit. seed: of folds and forests.
+        features: (n, f) features.
+        targets: (n, t) targets, all of one unit.
+        seed: seed of folds and forests.
 
     Raises:
-        TaskError: there are fewer than two samples a fold.
+        TaskError: there are fewer than two samples per fold.
     """
     count = len(features)
     if count < 2 * FOLDS:
@@ -56,7 +61,7 @@ def read_by_forest(features: FloatArray, targets: FloatArray, seed: int = 0) -> 
     errors, guesses = [], []
     for fitted, held_out in KFold(FOLDS, shuffle=True, random_state=seed).split(features):
         forest = RandomForestRegressor(n_estimators=TREES, random_state=seed)
-        # One target is a vector to scikit-learn, several are a matrix.
+        # scikit-learn expects a vector for one target and a matrix for several.
         known = targets[fitted] if targets.shape[1] > 1 else targets[fitted, 0]
         forest.fit(features[fitted], known)
         predictions[held_out] = forest.predict(features[held_out]).reshape(len(held_out), -1)

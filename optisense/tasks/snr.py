@@ -2,9 +2,10 @@
 
     SNR = sigma^2_global / E[sigma^2_local]
 
-Global is the variance of what is to be told over all samples; local is its variance among the
-nearest neighbours of a sample in feature space. Where features tell the target, neighbours agree
-and the ratio is large; where they don't, neighbours are as different as any samples and it is 1.
+The global variance is that of the target over all samples; the local variance is that among the
+nearest neighbours of a sample in feature space. If the features determine the target, neighbours
+have similar targets and the ratio is large; if they do not, neighbours differ as much as any
+samples and the ratio is 1.
 """
 
 from __future__ import annotations
@@ -21,21 +22,21 @@ state its own."""
 
 
 def signal_to_noise(features: ArrayLike, targets: ArrayLike, neighbours: int = NEIGHBOURS) -> float:
-    """The ratio of the targets' variance to their mean variance among neighbours.
+    """Return the ratio of the targets' variance to their mean variance among neighbours.
 
-    Several targets are added up in both variances, so they should share a unit. Neighbours are
-    the `neighbours` other samples at the smallest Euclidean distance in feature space; features
-    are taken as they are (camera levels share a unit and a noise), and both variances are the
-    unbiased ones, divided by the number less one. Noise of variance s^2 on a target that is
-    otherwise a smooth function of densely sampled features gives 1 + signal variance / s^2.
+    Several targets are added up in both variances, so they should share a unit. Neighbours are the
+    `neighbours` other samples at the smallest Euclidean distance in feature space; features are not
+    normalised (camera levels share a unit and a noise level), and both variances are unbiased
+    (divided by the number minus one). Noise of variance s^2 on a target that is otherwise a smooth
+    function of densely sampled features gives 1 + signal variance / s^2.
 
     Args:
-        features: (n, f), or (n,) for one.
-        targets: (n, t), or (n,) for one.
-        neighbours: k, at least 2 and less than n.
+        features: (n, f) features, or (n,) for one.
+        targets: (n, t) targets, or (n,) for one.
+        neighbours: number k of neighbours, at least 2 and less than n.
 
     Returns:
-        The ratio; infinite where neighbours agree exactly.
+        The ratio; infinite if neighbours agree exactly.
 
     Raises:
         TaskError: there are too few samples for k, the numbers of samples differ, or a number is
@@ -54,7 +55,7 @@ def signal_to_noise(features: ArrayLike, targets: ArrayLike, neighbours: int = N
     if not (np.isfinite(x).all() and np.isfinite(y).all()):
         raise TaskError("a feature or a target is not a finite number")
     whole = y.var(axis=0, ddof=1).sum()
-    # A search over the fitted samples themselves leaves each one out of its own neighbours.
+    # In a search among the fitted samples, a sample is not its own neighbour.
     near = NearestNeighbors(n_neighbors=neighbours).fit(x).kneighbors(return_distance=False)
     local = y[near].var(axis=1, ddof=1).sum(axis=1).mean()
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -10,27 +10,28 @@ TRAIN, VALIDATION, TEST = "train", "validation", "test"
 SPLITS = (TRAIN, VALIDATION, TEST)
 
 SHARES = (0.8, 0.1, 0.1)
-"""Parts of all cells that the splits get, as is usual for data of some thousand samples."""
+"""Shares of all cells in the training, validation and test split, usual for data of some thousand
+samples."""
 
 CELLS = 8
-"""Number of cells across the picture, squares; on a GelSight Mini they are 2.3 mm wide, and presses
+"""Number of square cells across the picture; on a GelSight Mini they are 2.3 mm wide, and presses
 of one indenter inside a cell look alike."""
 
 
 def split_of(
     seed: int, indenter: str, spot: tuple[float, float], hold_out: tuple[str, ...] = ()
 ) -> str:
-    """The split of a press.
+    """Return the split of a press.
 
-    The picture is cut into cells, and all presses of an indenter in a cell are in one split; so no
-    press has a near copy of itself in another. The split depends on these arguments only, so more
-    samples change nothing for those that are there.
+    The picture is divided into cells, and all presses of an indenter in a cell are in one split, so
+    that no press has a near copy in another split. The split depends on the arguments only, so that
+    further samples do not change those of existing ones.
 
     Args:
-        seed: of the dataset.
-        indenter: as given.
-        spot: where the picture shows the place, in parts of its width, from the left and from the
-            upper edge.
+        seed: seed of the dataset.
+        indenter: text of the indenter, as given.
+        spot: position of the place in the picture, as shares of its width from the left and from
+            the upper edge.
         hold_out: indenters that are in the test split only.
     """
     if indenter in hold_out:

@@ -1,4 +1,4 @@
-"""The same things pressed at the same places into two sensors."""
+"""Presses of the same objects at the same places into two sensors."""
 
 from __future__ import annotations
 
@@ -23,34 +23,37 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 CANDIDATES = 1500
-"""Places on the skin among which those of presses are chosen."""
+"""Number of places on the skin from which those of presses are chosen."""
 
 CHOICES = 12
-"""Places that are drawn for each press, of which the one farthest from all earlier ones is taken:
-Mitchell's best candidate, which spreads presses over the skin without a pattern."""
+"""Number of places drawn for each press, of which the one farthest from all earlier presses is
+taken (Mitchell's best-candidate sampling, which spreads presses over the skin without a
+pattern)."""
 
 ATTEMPTS = 8
-"""Places that are tried for a press before it is made less deep, as some lie over an edge."""
+"""Number of places tried for a press before its depth is reduced, as some lie over an edge."""
 
 ONE_SKIN = 0.1
-"""mm within which two sensing surfaces count as one: less than objects are pressed in by far."""
+"""Largest distance (mm) between two sensing surfaces that count as one, far less than the depth of
+presses."""
 
 SAMPLED = 200
-"""Corners of a sensing surface whose distance from the other one is looked at."""
+"""Number of vertices of a sensing surface whose distance from the other surface is computed."""
 
 FITS = 0.8
-"""Share of the narrower side of the seen skin that an object may be long; all are scaled to it."""
+"""Largest length of an object as a share of the narrower side of the skin in view; all objects are
+scaled to it."""
 
 RIM = 0.12
-"""Share of the same that a press keeps away from the border of the skin."""
+"""Margin between a press and the border of the skin, as a share of the narrower side of the skin in
+view."""
 
 VIEW_RIM = 0.2
-"""Share of the same that a press keeps away from the border of what a camera sees, so that most of
-an object is in the picture."""
+"""Margin between a press and the border of a camera's view, as a share of the narrower side of the
+skin in view, so that most of an object is in the picture."""
 
 MOST_DEEP = 0.4
-"""Largest share of the gel's thickness that an object is pressed in: gels that are pressed deeper
-tear."""
+"""Largest depth of a press as a share of the gel's thickness; gels that are pressed deeper tear."""
 
 SHALLOWER = (1.0, 0.7, 0.5, 0.35, 0.25)
 """Factors on an object's depth that are tried until the gel is thick enough."""
@@ -58,11 +61,11 @@ SHALLOWER = (1.0, 0.7, 0.5, 0.35, 0.25)
 
 @dataclass(frozen=True)
 class UnseenPress:
-    """Something that is pressed into two sensors alike.
+    """The press of one object into two sensors.
 
     Attributes:
-        name: of the object.
-        contacts: into the first and into the second sensor.
+        name: name of the object.
+        contacts: the contacts with the first and with the second sensor.
     """
 
     name: str
@@ -74,10 +77,10 @@ class UnseenPresses:
     """Presses of the same objects into two sensors.
 
     Attributes:
-        presses: as many for each object, object by object.
-        scale: factor on the real sizes of all objects; 1 where they fit.
-        same_places: whether both have one skin and are pressed at the same places of it; else the
-            places of each are chosen on its own skin.
+        presses: the presses in the order of objects, the same number for each.
+        scale: factor on the real sizes of all objects; 1 if they fit.
+        same_places: whether both sensors have the same skin and are pressed at the same places;
+            otherwise places are chosen on each skin separately.
     """
 
     presses: list[UnseenPress]
@@ -87,7 +90,7 @@ class UnseenPresses:
 
 @dataclass
 class _Skin:
-    """A skin that one sensor has, or both, and the places on it where presses may be."""
+    """The skin of one sensor, or of both, and its possible places of presses."""
 
     models: Sequence[OpticalModel]
     seed: int
@@ -106,10 +109,10 @@ class _Skin:
     def press(
         self, indenter: ObjectIndenter, depth: float, rotation: float, rng: np.random.Generator
     ) -> list[Contact]:
-        """A contact with each of the models, at one place far from those before.
+        """Return a contact with each of the models, at one place far from earlier ones.
 
         Raises:
-            ContactError: the gel is too thin for the depth wherever it was tried.
+            ContactError: the gel is too thin for the depth at all places that were tried.
         """
         for attempt in range(ATTEMPTS):
             point = _far_from(
@@ -129,14 +132,16 @@ class _Skin:
 def choose_presses(
     models: tuple[OpticalModel, OpticalModel], objects: Sequence[str], places: int, seed: int
 ) -> UnseenPresses:
-    """Choose where and how objects press, on the skin that either sensor's camera sees.
+    """Choose places, depths and rotations of objects on the skin that either sensor's camera sees.
 
     Args:
-        models: the two sensors. objects: keys of `OBJECTS`. places: presses of each object.
-        seed: of places and turns.
+        models: the two sensors.
+        objects: keys of `OBJECTS`.
+        places: number of presses of each object.
+        seed: seed of places and rotations.
 
     Raises:
-        TaskError: the cameras see nothing, or an object can be pressed nowhere.
+        TaskError: the cameras see nothing, or there is no place for an object.
     """
     alike = _have_one_skin(models)
     skins = [_Skin(models, seed)] if alike else [_Skin([each], seed) for each in models]
@@ -150,7 +155,7 @@ def choose_presses(
 
 
 def _have_one_skin(models: tuple[OpticalModel, OpticalModel]) -> bool:
-    """Whether both sensing surfaces lie on each other, each within `ONE_SKIN`."""
+    """Return whether each sensing surface lies within `ONE_SKIN` of the other."""
     meshes = [model.surface.mesh for model in models]
     for here, there in (meshes, meshes[::-1]):
         step = max(1, len(here.vertices) // SAMPLED)
@@ -162,7 +167,7 @@ def _have_one_skin(models: tuple[OpticalModel, OpticalModel]) -> bool:
 
 
 def _one(skins: Sequence[_Skin], indenter: ObjectIndenter, seed: list[int]) -> UnseenPress:
-    """One press into both sensors, equally deep."""
+    """Return one press into both sensors at equal depth."""
     rng = np.random.default_rng(seed)
     rotation = float(rng.uniform(0.0, 360.0))
     reason: ContactError | None = None
@@ -181,13 +186,14 @@ def _one(skins: Sequence[_Skin], indenter: ObjectIndenter, seed: list[int]) -> U
 def _pressed(
     model: OpticalModel, indenter: ObjectIndenter, point: FloatArray, depth: float, rotation: float
 ) -> Contact:
-    """A contact at the place of a sensor's skin that is nearest to a point.
+    """Return a contact at the place of a sensor's skin that is nearest to a point (mm).
 
     Raises:
         ContactError: the gel there is too thin for the depth.
     """
     x, y, z = model.surface.nearest(point).point.tolist()
-    # A place where it would fit much deeper as well is one where it may press so deep.
+    # The place is accepted if the object could also be pressed in deeper, by a factor of 1 /
+    # MOST_DEEP.
     model.place(Contact(indenter, point=(x, y, z), depth=depth / MOST_DEEP, rotation=rotation))
     return Contact(indenter, point=(x, y, z), depth=depth, rotation=rotation)
 
@@ -200,7 +206,7 @@ def _far_from(chosen: list[FloatArray], candidates: FloatArray) -> FloatArray:
 
 
 def _seen_places(models: Sequence[OpticalModel], seed: int) -> FloatArray:
-    """Points (n, 3) mm, evenly by area, that a camera sees."""
+    """Return points (n, 3), mm, that a camera sees, distributed uniformly by area."""
     from optisense.optics.transport.chief_rays import pixel_areas
 
     found: list[FloatArray] = []
@@ -218,7 +224,7 @@ def _seen_places(models: Sequence[OpticalModel], seed: int) -> FloatArray:
         )
         points = rays.points.reshape(-1, 3)[pixels].astype(np.float64)
         if found:
-            # Between neighbouring candidates lies about this much.
+            # The distance of neighbouring candidates is about this.
             away, _ = cKDTree(np.concatenate(found)).query(points)
             points = points[away > 2.0 / np.sqrt(density)]
         found.append(points)
@@ -226,8 +232,10 @@ def _seen_places(models: Sequence[OpticalModel], seed: int) -> FloatArray:
 
 
 def _away_from_the_border(points: FloatArray, areas: FloatArray) -> FloatArray:
-    """Areas (h, w) of pixels, 0 where they are near the border of what is seen; the points are
-    (h, w, 3) mm. All of them where nothing else is left.
+    """Return areas (h, w) of pixels, set to 0 near the border of the view; unchanged if none would
+    remain.
+
+    ``points`` are the points (h, w, 3), mm, that the pixels see.
     """
     seen = areas > 0.0
     border = seen & ~binary_erosion(seen)
@@ -239,14 +247,16 @@ def _away_from_the_border(points: FloatArray, areas: FloatArray) -> FloatArray:
 
 
 def _narrower_side(points: FloatArray) -> float:
-    """mm, the second longest extent of points along their main axes."""
+    """Return the second longest extent (mm) of points along their principal axes."""
     centred = points - points.mean(axis=0)
     axes = np.linalg.svd(centred, full_matrices=False)[2]
     return float(np.sort(np.ptp(centred @ axes.T, axis=0))[-2])
 
 
 def _inside(points: FloatArray, models: Sequence[OpticalModel], rim: float) -> NDArray[np.bool_]:
-    """(n,) whether points keep away from the border of every model's skin."""
+    """Return a mask (n,) of the points that are at least ``rim`` (mm) from the border of every
+    model's skin.
+    """
     kept = np.ones(len(points), dtype=bool)
     for model in models:
         border = _border(model.surface.mesh)
@@ -257,7 +267,7 @@ def _inside(points: FloatArray, models: Sequence[OpticalModel], rim: float) -> N
 
 
 def _border(mesh: TriangleMesh) -> FloatArray:
-    """(n, 3) mm: points along the edges that only one triangle has."""
+    """Return points (n, 3), mm, along the edges that belong to a single triangle."""
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     each, count = np.unique(edges, axis=0, return_counts=True)
     start, end = mesh.vertices[each[count == 1]].transpose(1, 0, 2)

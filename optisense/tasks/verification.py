@@ -1,7 +1,7 @@
-"""Whether one sensor reads better than another, on things that no score has seen.
+"""Verification that one sensor reads better than another, on objects that no score uses.
 
-Both are calibrated with balls, as users calibrate real ones, and then touch the same objects at the
-same places. What comes back of normals and depth decides; see docs/verify.md.
+Both sensors are calibrated with balls, like real ones, and then touch the same objects at the same
+places. The errors of the normals and depth that they read are compared; see docs/verify.md.
 """
 
 from __future__ import annotations
@@ -44,11 +44,12 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 NEAR = 2.0
-"""Pixels of both cameras, side by side, within which a place of the skin counts as seen by one that
-has a pixel there; between neighbouring pixels lies one."""
+"""Largest distance of a place of the skin from the nearest point that a camera sees at which the
+place counts as seen, in units of the sum of both cameras' median pixel sizes on the skin;
+neighbouring pixels of one camera are one pixel size apart."""
 
 BEFORE, AFTER = "before", "after"
-"""The two sensors, in this order."""
+"""Default names of the two sensors, in this order."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +58,9 @@ class VerificationSettings:
 
     Attributes:
         objects: keys of `optisense.geometry.objects.OBJECTS`.
-        places: presses of each object.
-        readers: that are fitted to each sensor's ball presses; errors are means over them.
-        reading: how a reader is calibrated.
+        places: number of presses of each object.
+        readers: number of readers fitted to each sensor's ball presses; errors are means over them.
+        reading: settings of the calibration of a reader.
     """
 
     objects: tuple[str, ...] = tuple(OBJECTS)
@@ -88,9 +89,9 @@ class SensorView:
     """Measures of a camera's view of the untouched skin.
 
     Attributes:
-        coverage: share of the skin's area.
-        detail: mm, the longer side of what a pixel of the camera shows of the skin, its median.
-        stretching: how much longer than wide that is, its median.
+        coverage: share of the skin's area in view.
+        detail: median length (mm) of the longer side of a pixel's footprint on the skin.
+        stretching: median ratio of length to width of a pixel's footprint.
     """
 
     coverage: float
@@ -102,19 +103,21 @@ class SensorView:
 class Verification:
     """Errors of two sensors that read the same objects.
 
-    Arrays are (objects, places, readers), of errors over the whole contact: what a camera does not
-    see of it, while the other does, counts as read flat.
+    Errors are means over the whole contact; parts that only the other camera sees count as read
+    flat.
 
     Attributes:
-        names: of the two sensors.
-        settings: of both.
+        names: names of the two sensors.
+        settings: settings of the calibration and the presses of both.
         scale: factor on the real sizes of the objects.
-        same_places: whether both were pressed at the same places; else they have other skins.
-        normals: degrees, of each sensor. depths: mm.
-        flat: errors of reading nothing: degrees and mm, means over all presses.
-        views: of each sensor.
-        pictures: of the first place of each object, of each sensor.
-        contacts: of each object, in the first sensor.
+        same_places: whether both were pressed at the same places; otherwise their skins differ.
+        normals: (objects, places, readers) errors of the normals of each sensor, degrees.
+        depths: (objects, places, readers) errors of the depth of each sensor, mm.
+        flat: errors (degrees and mm) of a reader that always reads a flat surface, means over all
+            presses.
+        views: measures of the view of each sensor.
+        pictures: pictures of each sensor at the first place of each object.
+        contacts: contacts of each object with the first sensor.
     """
 
     names: tuple[str, str]
@@ -130,19 +133,20 @@ class Verification:
 
     @property
     def normal_change(self) -> ErrorChange:
-        """Degrees."""
+        """Change of the error of the normals, degrees."""
         return error_change(*self.normals, seed=self.settings.reading.seed)
 
     @property
     def depth_change(self) -> ErrorChange:
-        """mm."""
+        """Change of the error of the depth, mm."""
         return error_change(*self.depths, seed=self.settings.reading.seed)
 
     @property
     def verdict(self) -> str:
-        """BETTER, WORSE or UNKNOWN: what normals tell, unless depth tells the opposite.
+        """The verdict BETTER, WORSE or UNKNOWN: that of the normals, unless depth has the opposite
+        one.
 
-        Normals are what a camera-based sensor reads; depth is integrated from them.
+        Normals are measured by a camera-based sensor directly; depth is integrated from them.
         """
         normals, depth = self.normal_change.verdict, self.depth_change.verdict
         return UNKNOWN if {normals, depth} == {BETTER, WORSE} else normals
@@ -188,7 +192,7 @@ class Verification:
         return found
 
     def to_dict(self) -> dict[str, Any]:
-        """All errors and settings, ready for JSON."""
+        """Return all errors and settings, ready for JSON."""
         objects = {}
         for row, name in enumerate(self.settings.objects):
             objects[name] = {
@@ -223,15 +227,18 @@ def verify(
     names: tuple[str, str] = (BEFORE, AFTER),
     progress: Callable[[int, int, int], None] | None = None,
 ) -> Verification:
-    """Press the same objects into two sensors and compare what is read of them.
+    """Press the same objects into two sensors and compare the errors of their readings.
 
     Args:
-        models: the sensors. settings: the defaults when None. names: to call the sensors by.
-        progress: called with the sensor (0 or 1), how many of its pictures are taken, and of how
-            many.
+        models: the sensors.
+        settings: the settings; the defaults if None.
+        names: names of the sensors.
+        progress: function that is called with the sensor (0 or 1), the number of its pictures
+            taken, and their total number.
 
     Raises:
-        TaskError: a camera sees nothing, an object fits nowhere, or a sensor can't be calibrated.
+        TaskError: a camera sees nothing, there is no place for an object, or a sensor cannot be
+            calibrated.
     """
     settings = settings or VerificationSettings()
     for name, model in zip(names, models, strict=True):
@@ -255,7 +262,7 @@ def verify(
         reach += NEAR * float(np.sqrt(np.median(areas[areas > 0.0])))
     pairs = list(zip(*readings, strict=True))
     shape = len(settings.objects), settings.places, settings.readers
-    # On skins of their own, no place of one is a place of the other.
+    # Different skins have no places in common.
     reach = reach if chosen.same_places else np.inf
     found = [whole_errors(pair, trees, reach) for pair in pairs]
     normals, depths = (
@@ -291,7 +298,7 @@ def _told(
 
 
 def _areas(model: OpticalModel, sensor: CalibratedSensor) -> FloatArray:
-    """(h, w) mm^2 of skin behind each pixel of a sensor's pictures."""
+    """Return the area (h, w), mm^2, of skin that each pixel of a sensor's pictures sees."""
     from optisense.optics.transport.chief_rays import pixel_areas
 
     rays = model.chief_rays(sensor.resolution)
@@ -303,7 +310,7 @@ def _view(model: OpticalModel, areas: FloatArray, sensor: CalibratedSensor) -> S
 
     stretching = pixel_stretching(model.chief_rays(sensor.resolution))
     known = np.isfinite(stretching) & (areas > 0.0)
-    # A pixel of the camera is smaller than one of these pictures.
+    # The camera's pixels are smaller than those of these pictures.
     smaller = sensor.resolution[0] / model.design.camera.resolution[0]
     longer = smaller * np.sqrt(areas[known] * stretching[known])
     return SensorView(
@@ -321,7 +328,9 @@ def _read_all(
     settings: VerificationSettings,
     told: Callable[[int], None],
 ) -> list[PressReading]:
-    """What a sensor reads of all presses; pictures of the first place of each object."""
+    """Return a sensor's readings of all presses, with pictures at the first place of each
+    object.
+    """
     found = []
     for number, press in enumerate(presses):
         told(settings.reading.presses + number)
