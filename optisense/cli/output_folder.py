@@ -14,7 +14,9 @@ def take_folder(folder: Path) -> None:
     """Create the folder if needed, and hold its lock against other processes until the command
     ends.
 
-    FolderInUseError: another process is writing to the folder.
+    Raises:
+        FolderInUseError: another process is writing to the folder.
+        OutputError: the folder can't be written; the error comes before the work and not after it.
     """
     at_end(hold(folder))
 

@@ -1,4 +1,4 @@
-"""The path of a belt, put together from straight runs and bends, and its parallel curves."""
+"""Path of a belt, made of straight runs and bends, and its parallel curves."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Straight:
-    """A straight run of `length` mm."""
+    """Straight run of `length` mm."""
 
     length: float
 
 
 @dataclass(frozen=True)
 class Bend:
-    """A bend down by `angle` degrees around a wheel of `radius` mm inside the loop."""
+    """Bend down by `angle` degrees around a wheel of `radius` mm inside the loop."""
 
     radius: float
     angle: float
@@ -34,10 +34,10 @@ class BeltHalf:
     """Half of the inner face of a belt, from x = 0 in the direction of +x.
 
     Attributes:
-        points: (n, 2) x and z, mm.
-        normals: (n, 2) unit normals out of the loop; the belt lies on that side.
-        starts: row of the first point of each run and bend, and last the row of the last point.
-        bends: the number of each bend among them, and its centre (x, z) mm.
+        points: x and z of the points, (n, 2) mm.
+        normals: unit normals (n, 2) out of the loop; the belt lies on that side.
+        starts: index of the first point of each run and bend, and last the index of the last point.
+        bends: centre (x, z), mm, of each bend, by its number among the runs and bends.
     """
 
     points: FloatArray
@@ -46,17 +46,19 @@ class BeltHalf:
     bends: dict[int, tuple[float, float]]
 
     def raised(self, height: float) -> FloatArray:
-        """The curve that lies `height` mm outside the inner face, point by point: (n, 2)."""
+        """Return the curve that lies `height` mm outside the inner face, point by point, (n, 2)
+        mm.
+        """
         return self.points + height * self.normals
 
     def wheel(self, number: int, gap: float, tessellation: float) -> FloatArray:
-        """The outline of the wheel of a bend: (k, 2) mm, counter-clockwise.
+        """Return the outline of the wheel of a bend, (k, 2) mm, counter-clockwise.
 
         Args:
-            number: of the bend.
-            gap: mm between belt and wheel; the same everywhere, as the wheel has its corners
-                below those of the belt.
-            tessellation: mm.
+            number: number of the bend.
+            gap: distance between belt and wheel, mm; the same everywhere, as the wheel has its
+                corners below those of the belt.
+            tessellation: approximate length of a piece, mm.
         """
         beside = self.raised(-gap)[self.starts[number] : self.starts[number + 1] + 1][::-1]
         centre = self.bends[number]
@@ -68,12 +70,12 @@ class BeltHalf:
 
 
 def trace(way: Sequence[Straight | Bend], level: float, tessellation: float) -> BeltHalf:
-    """Follow a belt.
+    """Return the inner face of a belt along its runs and bends.
 
     Args:
         way: runs and bends in turn.
-        level: mm, z of the inner face at x = 0, where the belt runs along +x.
-        tessellation: mm, about the length of a piece.
+        level: z of the inner face at x = 0, where the belt runs along +x, mm.
+        tessellation: approximate length of a piece, mm.
     """
     place, angle = np.array([0.0, level]), 0.0
     points, normals, starts, bends = [place[None]], [_normal(angle)[None]], [0], {}
@@ -102,19 +104,22 @@ def trace(way: Sequence[Straight | Bend], level: float, tessellation: float) -> 
 
 
 def mirrored_and_joined(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Two halves (n, 2) that begin at x = 0 as one curve from left to right; `left` is given as
-    if it lay on the right."""
+    """Join two halves (n, 2) that begin at x = 0 to one curve from left to right; `left` is given
+    as if it lay on the right.
+    """
     return np.concatenate([left[:0:-1] * (-1.0, 1.0), right])
 
 
 def way_back(left: BeltHalf, right: BeltHalf) -> tuple[float, float]:
-    """How a belt closes behind its two wheels, which turn it by a quarter each before.
+    """Return the lengths of a belt that closes behind its two wheels, which turn it by a quarter
+    each before.
 
     Args:
-        left: as if it lay on the right.
+        left: left half, as if it lay on the right.
 
     Returns:
-        mm: the length of the inner face that is drawn, and of the straight run of the way back;
+        Length of the inner face that is modelled, and of the straight run of the return, mm; this
+        run and half a turn around a wheel are not modelled.
         this one and half a turn around a wheel are what is left out.
     """
     (x0, z0), (x1, z1) = left.bends[max(left.bends)], right.bends[max(right.bends)]
@@ -125,5 +130,5 @@ def way_back(left: BeltHalf, right: BeltHalf) -> tuple[float, float]:
 
 
 def _normal(angle: float) -> FloatArray:
-    """(2,) the outward unit normal of a belt that is turned down by `angle` degrees."""
+    """Return the outward unit normal (2,) of a belt that is turned down by `angle` degrees."""
     return np.array([math.sin(math.radians(angle)), math.cos(math.radians(angle))])

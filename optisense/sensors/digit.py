@@ -1,9 +1,10 @@
 """DIGIT: a domed gel on a thick acrylic window, lit through the window's edge by three LEDs.
 
-Frame: the origin is the top of the gel, over the middle of its outline; +z runs out of the sensor,
-the half-round end points to +y and the straight end to -y. Outline, thicknesses, places of the LEDs
-along the edge, and camera are those of the published design; how high the LEDs stand, how the
-edge of the acrylic scatters and what the gel is made of is not published and marked as assumed.
+Frame: the origin is the top of the gel, over the middle of its outline; +z points out of the
+sensor, the half-round end points to +y and the straight end to -y. Outline, thicknesses, positions
+of the LEDs along the edge, and camera are those of the published design; the height of the LEDs,
+the scattering of the acrylic's edge and the material of the gel are not published and marked as
+assumed.
 """
 
 from __future__ import annotations
@@ -35,26 +36,27 @@ LED = "everlight-19-337"
 CAMERA = "ovm7692"
 
 CORNERS = (1.3, 0.5)
-"""mm, radius of the corners at the straight end of gel and acrylic."""
+"""Radius of the corners at the straight end of gel and acrylic, mm."""
 
 HALF_OVERHANG = 0.05
-"""mm by which the gel is wider than the acrylic, on each side."""
+"""Distance by which the gel is wider than the acrylic on each side, mm."""
 
 OPENING_GAP = 0.09
-"""mm between the gel and the opening of the housing: 18.58 mm for a gel of 18.4."""
+"""Distance between the gel and the opening of the housing, mm: 18.58 mm for a gel of 18.4."""
 
 CAVITY = (1.25, 2.5)
-"""mm of room around the acrylic, for the strip with the LEDs: at its sides and round end, and so
-much more at its straight end (a cavity of 20.8 x 30 mm)."""
+"""Room around the acrylic for the strip with the LEDs, mm: at its sides and round end, and at its
+straight end (a cavity of 20.8 x 30 mm).
+"""
 
 HOUSING_WALL = 1.5
-"""mm, thickness of wall and floor of the housing."""
+"""Thickness of wall and floor of the housing, mm."""
 
 BEHIND_PUPIL = 2.0
-"""mm from the camera's pupil to the floor of the housing."""
+"""Distance from the camera's pupil to the floor of the housing, mm."""
 
 EDGE_STEPS = 6
-"""Rings that the rounded edge of the gel is cut into: about 13 degrees each."""
+"""Number of rings of the rounded edge of the gel: about 13 degrees each."""
 
 SIDES = {
     "edge_right": (1.0, 0.0, 0.0),
@@ -62,7 +64,7 @@ SIDES = {
     "edge_round": (0.0, 1.0, 0.0),
     "edge_straight": (0.0, -1.0, 0.0),
 }
-"""Faces of the acrylic's edge, and the direction about which each of them looks."""
+"""Faces of the acrylic's edge, and the direction in which each points."""
 
 
 @tells_of_dimensions(NAME)
@@ -86,33 +88,32 @@ def digit(
     coating: str = "diffuse-grey",
     tessellation: Positive = 0.6,
 ) -> SensorDesign:
-    """A DIGIT.
+    """Build a DIGIT.
 
     Args:
-        gel_width: mm; the half-round end has half of it as its radius, and the acrylic is 0.1 mm
-            narrower.
-        straight_length: mm, from the straight end to the centre of the half round.
-        gel_thickness: mm, in the middle of the gel.
-        wall_height: mm, of the vertical wall around the gel.
-        dome_rise: mm, how much higher the middle of the gel is than the upper end of its rounded
-            edge.
-        edge_inset: mm, how far the rounded edge reaches inward.
-        window_thickness: mm, of the acrylic.
+        gel_width: width of the gel, mm; the half-round end has half of it as its radius, and the
+            acrylic is 0.1 mm narrower.
+        straight_length: distance from the straight end to the centre of the half round, mm.
+        gel_thickness: thickness of the gel in its middle, mm.
+        wall_height: height of the vertical wall around the gel, mm.
+        dome_rise: height of the middle of the gel above the upper end of its rounded edge, mm.
+        edge_inset: distance by which the rounded edge reaches inward, mm.
+        window_thickness: thickness of the acrylic, mm.
         edge_roughness: GGX alpha of the acrylic's edge; 0 for a polished one.
-        led_height: mm, of the middle of the LEDs over the acrylic's lower face.
-        led_pitch: mm along the acrylic's edge from the blue LED, in the middle of the straight
-            end, to the red and the green one.
-        led_gap: mm of air between an LED's window and the acrylic's edge.
-        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
-        pupil_distance: mm, from the top of the gel to the camera's entrance pupil.
-        fov: degrees, across the image width (46.83 across 240 of 240 x 320 pixels are 60 along
-            the 320).
-        resolution: pixels, width and height.
-        coating: a coating of the library.
-        tessellation: mm, about the edge length of the largest triangles.
+        led_height: height of the middle of the LEDs above the acrylic's lower face, mm.
+        led_pitch: distance along the acrylic's edge from the blue LED, in the middle of the
+            straight end, to the red and the green one, mm.
+        led_gap: air gap between an LED's window and the acrylic's edge, mm.
+        led_flux: radiant flux of each LED, mW; None takes that of its weakest colour (library).
+        pupil_distance: distance from the top of the gel to the camera's entrance pupil, mm.
+        fov: field of view across the image width, degrees (46.83 across 240 of 240 x 320 pixels are
+            60 along the 320).
+        resolution: width and height of the picture, pixels.
+        coating: name of a coating of the library.
+        tessellation: approximate edge length of the largest triangles, mm.
 
     Raises:
-        DesignError: dimensions that contradict one another; says which.
+        DesignError: dimensions contradict one another; the message says which.
         LibraryError: there is no such coating.
     """
     given = dict(locals())
@@ -132,7 +133,7 @@ def digit(
     )
     flux = balanced_flux(LED) if led_flux is None else led_flux
     lamp_z = window_bottom + led_height
-    # The camera looks along +z with +y up, so the picture's right is -x.
+    # The camera looks along +z with +y up, so the right of the picture is -x.
     places = {"red": led_pitch, "green": -led_pitch, "blue": 0.0}
     colours = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
     design = SensorDesign(
@@ -179,7 +180,7 @@ def digit(
 
 
 def _check(outline: HalfRound, thickness: float, curved: float, inset: float) -> None:
-    """All lengths in mm; `curved` is the height of wall and dome together."""
+    """Check lengths in mm; `curved` is the height of wall and dome together."""
     require(
         outline.straight > outline.radius + CORNERS[0],
         NAME,
@@ -205,7 +206,7 @@ def _check(outline: HalfRound, thickness: float, curved: float, inset: float) ->
 def _check_lights(
     edge: HalfRound, thickness: float, height: float, pitch: float, roughness: float
 ) -> None:
-    """All lengths in mm."""
+    """Check the positions of the LEDs, all lengths in mm."""
     require(
         0.0 < height < thickness,
         NAME,
@@ -228,7 +229,7 @@ def _check_lights(
 
 
 def _frosted(roughness: float) -> dict[str, FaceFinish] | None:
-    """The finish of the acrylic's edge, None where it is polished."""
+    """Return the finish of the acrylic's edge, or None if it is polished."""
     if roughness == 0.0:
         return None
     return {
@@ -245,7 +246,7 @@ def _led(
     colour: tuple[float, float, float],
     flux: float,
 ) -> LightGroup:
-    """An LED that shines into the edge, `along` mm from the middle of its straight end."""
+    """Return an LED that shines into the edge, `along` mm from the middle of its straight end."""
     (x, y), (nx, ny) = edge.at(along)
     light = Light(
         position=(x + gap * nx, y + gap * ny, z), direction=(-nx, -ny, 0.0), up=(0.0, 0.0, 1.0)
@@ -265,14 +266,14 @@ def _prism(outline: HalfRound, bottom: float, top: float, tessellation: float) -
 def _gel(
     outline: HalfRound, heights: tuple[float, float, float, float], tessellation: float
 ) -> TriangleMesh:
-    """A plate with a vertical wall, a rounded edge and a dome, its top at z = 0.
+    """Return a plate with a vertical wall, a rounded edge and a dome, with its top at z = 0.
 
-    The dome rises with the square of the way from its rim to the middle. The rounded edge is a
-    parabola that leaves the wall upright and meets the dome at the dome's mean slope; so all
-    corners lie in level rings.
+    The dome rises with the square of the distance from its rim towards the middle. The rounded edge
+    is a parabola that begins vertical at the wall and meets the dome at the dome's mean slope, so
+    all corners lie in horizontal rings.
 
     Args:
-        heights: mm, of the whole gel, its wall, its dome, and how far the edge reaches inward.
+        heights: height of the whole gel, its wall and its dome, and inset of the edge, mm.
     """
     thickness, wall, rise, inset = heights
     rim_z = -rise
@@ -298,7 +299,7 @@ def _gel(
 
 
 def _resampled(polygon: FloatArray, count: int) -> FloatArray:
-    """(count, 2) points spread over the sides of a closed polygon by their numbers."""
+    """Return points (count, 2) spread over the sides of a closed polygon by their numbers."""
     where = np.arange(count) * (len(polygon) / count)
     closed = np.concatenate([polygon, polygon[:1]])
     steps = np.arange(len(closed))
@@ -306,7 +307,9 @@ def _resampled(polygon: FloatArray, count: int) -> FloatArray:
 
 
 def _coated(gel: TriangleMesh) -> TriangleMesh:
-    """All faces of the gel but its flat underside, on the same vertices, looking into the gel."""
+    """Return all faces of the gel except its flat underside, on the same vertices, turned into the
+    gel.
+    """
     bottom = gel.bounds[0, 2]
     coated = ~(gel.triangles[:, :, 2] == bottom).all(axis=1)
     used, faces = np.unique(gel.faces[coated], return_inverse=True)
@@ -317,10 +320,10 @@ def _coated(gel: TriangleMesh) -> TriangleMesh:
 def _housing(
     gel: HalfRound, edge: HalfRound, levels: tuple[float, float, float], tessellation: float
 ) -> TriangleMesh:
-    """A tub with an opening for the gel in its roof, closed behind the camera.
+    """Return a tub with an opening for the gel in its roof, closed behind the camera.
 
     Args:
-        levels: mm, z of the roof's underside, of its top, and of the camera's pupil.
+        levels: z of the roof's underside, of its top, and of the camera's pupil, mm.
     """
     roof, top, pupil = levels
     floor = pupil - BEHIND_PUPIL

@@ -1,4 +1,4 @@
-"""The dimensions of a sensor: refusing those that none can have, naming those that were changed."""
+"""Dimensions of a sensor: refusal of impossible ones, and a description of changed ones."""
 
 from __future__ import annotations
 
@@ -17,19 +17,20 @@ from optisense.errors import DesignError
 Arguments = ParamSpec("Arguments")
 
 Positive = float
-"""A dimension above 0; builders are refused others by `tells_of_dimensions`."""
+"""Dimension above 0; `tells_of_dimensions` makes builders refuse others."""
 
 PositiveCount = int
-"""A number of things that is 1 or more."""
+"""Number of objects, 1 or more."""
 
 
 def tells_of_dimensions(
     sensor: str,
 ) -> Callable[[Callable[Arguments, SensorDesign]], Callable[Arguments, SensorDesign]]:
-    """Let a builder refuse arguments of a wrong type or not above 0, and what no design can have.
+    """Return a decorator by which a builder refuses arguments of a wrong type or not above 0, and
+    values that no design can have.
 
     Args:
-        sensor: its name, for messages.
+        sensor: name of the sensor, for messages.
     """
 
     def decorate(builder: Callable[Arguments, SensorDesign]) -> Callable[Arguments, SensorDesign]:
@@ -52,7 +53,9 @@ def tells_of_dimensions(
 
 
 def _check(sensor: str, name: str, value: Any, kind: str) -> None:
-    """Refuse what is no number, or not above 0, where the annotation of an argument asks for it."""
+    """Refuse a value that is no number, or not above 0, if the annotation of its argument requires
+    it.
+    """
     whole = kind in ("int", "PositiveCount")
     if (whole or kind in ("float", "Positive")) and not isinstance(
         value, Integral if whole else Real
@@ -66,7 +69,9 @@ def _check(sensor: str, name: str, value: Any, kind: str) -> None:
 
 
 def _refusal(error: ValidationError, sensor: str) -> DesignError:
-    """What a part of the design refuses; it names its field, which is mostly the argument."""
+    """Return the error for a value that a part of the design refuses; it names the field, which
+    usually is the argument.
+    """
     report = error.errors(include_url=False)[0]
     told = report["msg"].removeprefix("Value error, ").replace("Input should", "it should")
     field = ".".join(str(step) for step in report["loc"])
@@ -75,10 +80,10 @@ def _refusal(error: ValidationError, sensor: str) -> DesignError:
 
 
 def require(condition: bool, sensor: str, message: str, hint: str) -> None:
-    """What must hold between dimensions.
+    """Check a condition between dimensions.
 
     Raises:
-        DesignError: it does not; `message` says what is wrong, `hint` what to do.
+        DesignError: the condition does not hold; `message` names the problem, `hint` the remedy.
     """
     if not condition:
         raise DesignError(message, where=sensor, hint=hint)
@@ -90,15 +95,15 @@ def describe_changes(
     given: Mapping[str, Any],
     said: tuple[str, ...] = (),
 ) -> None:
-    """Name in a design's description which arguments were not the builder's defaults.
+    """Add to a design's description which arguments differ from the builder's defaults.
 
-    The provenance speaks of the defaults; so a reader sees for which numbers it no longer holds.
+    The provenance describes the defaults, so a reader sees for which numbers it does not hold.
 
     Args:
-        design: what was built.
-        builder: the function.
+        design: design that was built.
+        builder: function that built it.
         given: its arguments, by name.
-        said: those that the description names already.
+        said: names of arguments that the description mentions already.
     """
     defaults = {name: p.default for name, p in inspect.signature(builder).parameters.items()}
     changed = [

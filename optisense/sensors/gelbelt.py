@@ -1,11 +1,14 @@
 """GelBelt: a soft belt that runs over two wheels and slides across a fixed acrylic window.
 
-Frame: origin at the centre of the sensing surface, +z out of the sensor, x along the belt's way,
+Frame: the origin is the centre of the sensing surface, +z points out of the sensor, x along the
+    belt's motion, y along the wheels' axes. The layers from outside in are: coating, gel, clear
+    tape, an air gap, acrylic, air, camera. The camera is inside the loop of the belt. The green
+    LEDs are at -x.
 y along the wheels' axes. From outside in: coating, gel, clear tape, a film of air, acrylic, air,
 camera. The camera sits inside the loop of the belt. The green LEDs are at -x.
 
-The belt is not cast onto the acrylic but slides on it. The film of air between them keeps light
-that was sent into the side of the acrylic from entering the belt: it is totally reflected.
+The belt is not cast onto the acrylic but slides on it. The air gap between them keeps light that
+enters the side of the acrylic from entering the belt, by total reflection.
 """
 
 from __future__ import annotations
@@ -71,15 +74,17 @@ ROLLER_CLEARANCE = 1.0
 """Distance in mm between the window and the small roller; its provenance is in
 `gelbelt_sources`."""
 WHEEL_GAP = 0.02
-"""Smallest distance in mm of air between belt and wheels, so that they do not touch optically."""
+"""Smallest air gap between belt and wheels, mm, so that they are not in optical contact."""
 BESIDE_WINDOW = 0.5
-"""mm from the edge of the window to where green light is aimed in light design 2."""
+"""Distance from the edge of the window to the target of green light in light design 2, mm."""
 BEHIND_ROLLER = 2.0
-"""mm from the roller to where green light is aimed in light design 3."""
+"""Distance from the roller to the target of green light in light design 3, mm."""
 GREEN_LEAD = 3.0
-"""The ratio of green's power to that of red and blue: green comes from one end of a longer path."""
+"""Ratio of green's power to that of red and blue, because green has a longer path from one end
+only.
+"""
 WRAP = 90.0
-"""Degrees by which the belt is turned where it is no longer drawn."""
+"""Angle by which the belt is turned at the end of the modelled part, degrees."""
 
 
 @tells_of_dimensions(SENSOR)
@@ -110,42 +115,43 @@ def gelbelt(
     specularity: float = 0.2,
     tessellation: Positive = 2.0,
 ) -> SensorDesign:
-    """A GelBelt.
+    """Build a GelBelt.
 
     Args:
-        light_design: where the LEDs are, as in the OptiSense paper. 1: on the sides of the
-            acrylic. 2: red and blue on the sides of the belt; green next to the acrylic, shining
-            at an angle through the inner face of the belt. 3: as 2, but behind the green LEDs'
-            side of the acrylic a small roller turns the belt down, and green enters behind it.
-        window_size: mm, along x and y, of the acrylic; the belt is as wide as it.
-        window_thickness: mm, of the acrylic.
-        gel_thickness: mm.
-        tape_thickness: mm, of the clear tape on the inner face of the belt.
-        film_thickness: mm of air between tape and acrylic, and between tape and wheels; 0 lets
-            the tape lie on the acrylic in optical contact.
-        coat_thickness: mm that the black coat of the belt is made with; light sees its inner face.
-        wheel_radius: mm.
-        wheel_distance: mm, between the wheels' axes in light designs 1 and 2.
-        roller_radius: mm, of the small roller of light design 3.
-        deflection: degrees by which that roller turns the belt.
-        incline: mm, the straight way of the belt from the roller to its wheel.
-        pupil_distance: mm, from the sensing surface to the camera's entrance pupil.
-        fov: degrees, across the image width.
-        resolution: pixels, width and height.
-        leds_per_group: LEDs in each of the three rows.
-        led_pitch: mm, between LEDs of a row.
-        led_gap: mm of air between an LED's window and what it faces; must be above 0.
-        led_flux: mW, radiant, of each red, green and blue LED; None lets green shine as the
-            library says and dims red and blue to a third of it.
-        green_distance: mm, from the green LEDs to the belt in light designs 2 and 3.
-        green_angle: degrees between green light and the normal of the belt it meets, towards
-            the window.
-        reflectance: of the coating's diffuse part, 0 to 1.
-        specularity: of the coating, 0 to 1.
-        tessellation: mm, about the edge length of the triangles.
+        light_design: arrangement of the LEDs, as in the OptiSense paper. 1: on the sides of the
+            acrylic. 2: red and blue on the sides of the belt; green next to the acrylic, at an
+            angle through the inner face of the belt. 3: as 2, but on the green LEDs' side of the
+            acrylic a small roller turns the belt down, and green enters behind it.
+        window_size: size of the acrylic along x and y, mm; the belt is as wide as it.
+        window_thickness: thickness of the acrylic, mm.
+        gel_thickness: thickness of the gel, mm.
+        tape_thickness: thickness of the clear tape on the inner face of the belt, mm.
+        film_thickness: air gap between tape and acrylic, and between tape and wheels, mm; with 0
+            the tape is in optical contact with the acrylic.
+        coat_thickness: thickness of the belt's black coat for manufacturing, mm; light meets its
+            inner face.
+        wheel_radius: radius of the wheels, mm.
+        wheel_distance: distance between the wheels' axes in light designs 1 and 2, mm.
+        roller_radius: radius of the small roller of light design 3, mm.
+        deflection: angle by which that roller turns the belt, degrees.
+        incline: length of the straight run of the belt from the roller to its wheel, mm.
+        pupil_distance: distance from the sensing surface to the camera's entrance pupil, mm.
+        fov: field of view across the image width, degrees.
+        resolution: width and height of the picture, pixels.
+        leds_per_group: number of LEDs in each of the three rows.
+        led_pitch: distance between LEDs of a row, mm.
+        led_gap: air gap between an LED's window and the face opposite, mm; above 0.
+        led_flux: radiant flux of each red, green and blue LED, mW; None takes the library's flux
+            for green and a third of it for red and blue.
+        green_distance: distance from the green LEDs to the belt in light designs 2 and 3, mm.
+        green_angle: angle between green light and the normal of the belt where it meets it, towards
+            the window, degrees.
+        reflectance: reflectance of the coating's diffuse part, 0 to 1.
+        specularity: specularity of the coating, 0 to 1.
+        tessellation: approximate edge length of the triangles, mm.
 
     Raises:
-        DesignError: dimensions that contradict one another; says which.
+        DesignError: dimensions contradict one another; the message says which.
     """
     given = dict(locals())
     if led_flux is None:
@@ -186,7 +192,7 @@ def gelbelt(
         check_wheels(half_belt, (half[0], window_bottom), pupil_distance, fov)
 
     middle = 0.5 * (window_top + window_bottom) if light_design == 1 else -0.5 * gel_thickness
-    # As the belt's halves, the green row is worked out on the right and then mirrored.
+    # Like the belt's halves, the green row is computed on the right and then mirrored.
     green, shine = np.array([half[0] + led_gap, middle]), np.array([-1.0, 0.0])
     if light_design == 2:
         target = np.array([half[0] + BESIDE_WINDOW, level])
@@ -199,7 +205,7 @@ def gelbelt(
     check_green(left, (x, z))
     row, side = (leds_per_group, led_pitch), half[1] + led_gap
     rows = {
-        # The camera looks along +z with +y up, so the picture's right is -x.
+        # The camera looks along +z with +y up, so the right of the picture is -x.
         "red": (RED, row_of_lights((0.0, side, middle), ALONG_X, *row, (0.0, -1.0, 0.0))),
         "green": (GREEN, row_of_lights((-x, 0.0, z), ALONG_Y, *row, (-dx, 0.0, dz))),
         "blue": (BLUE, row_of_lights((0.0, -side, middle), ALONG_X, *row, (0.0, 1.0, 0.0))),
@@ -266,7 +272,7 @@ def gelbelt(
 def _left_out(
     left: BeltHalf, right: BeltHalf, radius: float, layers: tuple[float, float], half_width: float
 ) -> LeftOut:
-    """The belt's way back, which no light takes and which is not drawn."""
+    """Return the return path of the belt, which no light reaches and which is not modelled."""
     tape, gel = layers
     drawn, run = way_back(left, right)
     inner, outer = radius + tape, radius + tape + gel
@@ -282,8 +288,9 @@ def _left_out(
 def _aimed(
     target: NDArray[np.float64], angle: float, distance: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where a light must be, and where it shines, to meet `target` at `angle` degrees from +z,
-    coming from +x, `distance` mm away; all (2,) in x and z."""
+    """Return position and direction, (2,) in x and z, of a light that meets `target` at `angle`
+    degrees from +z, coming from +x, at a distance of `distance` mm.
+    """
     shine = np.array([-math.sin(math.radians(angle)), math.cos(math.radians(angle))])
     return target - distance * shine, shine
 
@@ -295,11 +302,12 @@ def _belt(
     half_width: float,
     tessellation: float,
 ) -> dict[str, TriangleMesh]:
-    """Tape, gel and the coating on common points; the skin is the coat that is on no wheel.
+    """Return tape, gel and coating on common points; the skin is the part of the coat that is on no
+    wheel.
 
     Args:
-        left: as if it lay on the right.
-        layers: mm, thickness of tape and gel.
+        left: left half, as if it lay on the right.
+        layers: thickness of tape and gel, mm.
     """
     tape, gel = layers
     inner, middle, outer = (
@@ -321,7 +329,7 @@ def _belt(
 def _wheels(
     left: BeltHalf, right: BeltHalf, gap: float, half_width: float, tessellation: float
 ) -> TriangleMesh:
-    """Both wheels, and the small roller where there is one."""
+    """Return both wheels, and the small roller if there is one."""
     rods = []
     for half, side in ((left, -1.0), (right, 1.0)):
         for number in half.bends:

@@ -1,4 +1,4 @@
-"""Refusing GelBelts that can't be built: parts in one another, or in the camera's view."""
+"""Checks of GelBelts: parts must not overlap one another, nor the camera's view."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from optisense.sensors.dimensions import require
 SENSOR = "gelbelt"
 
 LED_WINDOW = 2.4
-"""Diameter in mm of the emitting window of an SMD 3528 LED, as the library has it."""
+"""Diameter of the emitting window of an SMD 3528 LED, as in the library, mm."""
 LED_LENGTH = 3.5
-"""mm, of the body of an LED along its row."""
+"""Length of the body of an LED along its row, mm."""
 CAMERA_DEPTH = 9.0
-"""Length in mm of the camera module behind its pupil, which must not reach into a part."""
+"""Length of the camera module behind its pupil, which must not reach into a part, mm."""
 LEAST_FILM = 0.005
-"""mm; films thinner than this are contacts to a simulation of rays."""
+"""Smallest thickness of an air gap, mm; thinner ones are contacts to a simulation of rays."""
 
 
 def check_numbers(
@@ -30,7 +30,7 @@ def check_numbers(
     coat: tuple[float, float],
     led_flux: tuple[float, float, float],
 ) -> None:
-    """Numbers that have a range of their own; `coat` is reflectance and specularity."""
+    """Check numbers that have a range of their own; `coat` is reflectance and specularity."""
     for flux in led_flux:
         require(
             0.0 <= flux < math.inf,
@@ -73,7 +73,9 @@ def check_numbers(
 
 
 def check_camera(pupil_distance: float, window_bottom: float, loop: float) -> None:
-    """All lengths in mm below the sensing surface: window and inside of the returning belt."""
+    """Check the camera; lengths are depths of window and inside of the returning belt below the
+    sensing surface, mm.
+    """
     require(
         pupil_distance > window_bottom,
         SENSOR,
@@ -92,7 +94,7 @@ def check_camera(pupil_distance: float, window_bottom: float, loop: float) -> No
 def check_wheels(
     half: BeltHalf, corner: tuple[float, float], pupil_distance: float, fov: float
 ) -> None:
-    """Wheels must keep clear of the window, whose corner (x, z) is given, and of the view of it."""
+    """Check that wheels are clear of the window, whose corner (x, z) is given, and of its view."""
     flat = float(half.points[half.starts[1]][0])
     require(
         flat > corner[0],
@@ -117,7 +119,7 @@ def check_wheels(
 
 
 def check_green(half: BeltHalf, place: tuple[float, float]) -> None:
-    """The green LEDs, at (x, z) mm beside a half of the belt, must not be inside what turns it."""
+    """Check that the green LEDs, at (x, z) mm beside a half of the belt, are not inside a wheel."""
     for number, (x, z) in half.bends.items():
         radius = float(np.linalg.norm(half.points[half.starts[number]] - (x, z)))
         require(
@@ -129,7 +131,9 @@ def check_green(half: BeltHalf, place: tuple[float, float]) -> None:
 
 
 def check_leds(length: float, window_size: tuple[float, float], thickness: float) -> None:
-    """The rows (`length` mm) must fit beside what they face, which is `thickness` mm thick."""
+    """Check that the rows (`length` mm) fit beside the faces opposite, which are `thickness` mm
+    thick.
+    """
     require(
         length <= min(window_size),
         SENSOR,

@@ -9,13 +9,13 @@ from optisense.design import Provenance, Status
 
 @dataclass(frozen=True)
 class LeftOut:
-    """The part of a belt that is not modelled: its return behind the wheels.
+    """Part of a belt that is not modelled: its return behind the wheels.
 
     Attributes:
-        length: mm, along the inner face.
-        whole: mm, the inner face all around.
-        gel: mm^3.
-        coat: mm^2, of the outer face.
+        length: length along the inner face, mm.
+        whole: length of the whole inner face, mm.
+        gel: volume of its gel, mm^3.
+        coat: area of its outer face, mm^2.
     """
 
     length: float
@@ -25,7 +25,7 @@ class LeftOut:
 
 
 def gelbelt_sources(light_design: int, left_out: LeftOut) -> dict[str, Provenance]:
-    """The provenance of a GelBelt with one of its light designs."""
+    """Return the provenance of a GelBelt with one of its light designs."""
     way_back = f"{left_out.length:.0f} of {left_out.whole:.0f} mm along the inner face"
     assumed, sourced, derived = Status.ASSUMED, Status.SOURCED, Status.DERIVED
     paper = "OptiSense paper, GelBelt"

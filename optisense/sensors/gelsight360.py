@@ -1,9 +1,9 @@
-"""GelSight360: a round fingertip that senses all around, lit from inside its own wall.
+"""GelSight360: a round fingertip that senses on all sides, lit from inside its own wall.
 
-Frame: the camera's pupil is the origin, +z runs along the axis to the tip, +x through the first
-LED board. From the camera out: air, a rigid shell of clear epoxy, a soft gel, the coating. Four
-LED boards stand upright in the wall of the shell; each carries LEDs on both faces, which makes
-eight light groups. A ring of LEDs lights the wall from below.
+Frame: the camera's pupil is the origin, +z points along the axis to the tip, +x through the first
+LED board. The layers from the camera out are: air, a rigid shell of clear epoxy, a soft gel, the
+coating. Four LED boards stand upright in the wall of the shell; each has LEDs on both faces, which
+makes eight light groups. A ring of LEDs lights the wall from below.
 """
 
 from __future__ import annotations
@@ -48,10 +48,10 @@ SENSOR = "gelsight360"
 GEL, EPOXY, BLACK = "silicone-xp565", "epoxy", "black-absorber"
 GROUPS = 2 * BOARDS
 DESIGNS = 10.0
-"""The last number of both shape families; the first is 0."""
+"""Last number of both shape families; the first is 0."""
 
 BOARD_CLEARANCE = 0.05
-"""mm between boards and the gel, and between the ring's LEDs and the boards."""
+"""Distance between boards and the gel, and between the ring's LEDs and the boards, mm."""
 
 
 @tells_of_dimensions(SENSOR)
@@ -80,42 +80,43 @@ def gelsight360(
     coating: str = "semi-specular",
     tessellation: Positive = 1.0,
 ) -> SensorDesign:
-    """A GelSight360.
+    """Build a GelSight360.
 
     Args:
-        light_colours: the colours (R, G, B) of the eight light groups, anticlockwise as seen
-            when looking at the tip. Group 1 is on the first board (on +x) and shines
-            anticlockwise, group 2 faces it from the second board (on +y), group 3 is on that
-            board's other face, and so on; group 8 is on the first board again.
-        base_ring: the colour of the ring of LEDs at the foot of the shell; "" for no ring.
-        tip_design: 0 (flat with a rounded edge) over 5 (hemisphere) to 10 (cone with a rounded
-            nose).
-        resin_design: 0 (shell of uniform thickness) to 10 (innermost surface almost flat): the
-            innermost dome gets lower, from its full height to `flattest` of it.
-        radius: mm, of the coated outside.
-        height: mm, of the coated outside, from the camera's pupil to the tip; the straight wall
-            takes what the tip leaves of it.
-        gel_thickness: mm.
-        shell_thickness: mm, of the wall (and of the tip, in resin design 0).
-        edge_radius: mm, outside, of the rounded edge in tip designs 0 and 10 and of the nose in
-            10; in between the rounding is larger, up to `radius`.
-        cone_height: mm, how much higher the nose of tip design 10 is than its edge is round.
-        flattest: what is left of the height of the innermost dome in resin design 10.
-        board_bottom: mm, z of the boards' lower edge.
-        board_height: mm.
-        board_thickness: mm, without LEDs.
-        base_thickness: mm that the black bottom is made with, below its face; light sees the face.
-        leds_per_group: LEDs on each face of a board.
-        base_leds: LEDs of the ring; a multiple of 4.
-        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
-        fov: degrees, across the image width (equidistant fisheye).
-        resolution: pixels, width and height.
-        coating: a coating of the library.
-        tessellation: mm, about the edge length of the largest triangles.
+        light_colours: colours (R, G, B) of the eight light groups, anticlockwise as seen when
+            looking at the tip. Group 1 is on the first board (on +x) and shines anticlockwise,
+            group 2 faces it from the second board (on +y), group 3 is on that board's other face,
+            and so on; group 8 is on the first board again.
+        base_ring: colour of the ring of LEDs at the foot of the shell; "" for no ring.
+        tip_design: shape of the tip: 0 (flat with a rounded edge) over 5 (hemisphere) to 10 (cone
+            with a rounded nose).
+        resin_design: shape of the shell: 0 (uniform thickness) to 10 (innermost surface almost
+            flat): the innermost dome gets lower, from its full height to `flattest` of it.
+        radius: radius of the coated outside, mm.
+        height: height of the coated outside from the camera's pupil to the tip, mm; the straight
+            wall takes what the tip leaves of it.
+        gel_thickness: thickness of the gel, mm.
+        shell_thickness: thickness of the shell's wall (and of the tip, in resin design 0), mm.
+        edge_radius: outer radius of the rounded edge in tip designs 0 and 10 and of the nose in 10,
+            mm; in between the radius is larger, up to `radius`.
+        cone_height: height of the cone of tip design 10 between its rounded edge and its nose, mm.
+        flattest: share of the height of the innermost dome that is left in resin design 10.
+        board_bottom: z of the boards' lower edge, mm.
+        board_height: height of the boards, mm.
+        board_thickness: thickness of a board without LEDs, mm.
+        base_thickness: thickness of the black bottom for manufacturing, below its face, mm; light
+            meets the face.
+        leds_per_group: number of LEDs on each face of a board.
+        base_leds: number of LEDs of the ring; a multiple of 4.
+        led_flux: radiant flux of each LED, mW; None takes that of its weakest colour (library).
+        fov: field of view across the image width, degrees (equidistant fisheye).
+        resolution: width and height of the picture, pixels.
+        coating: name of a coating of the library.
+        tessellation: approximate edge length of the largest triangles, mm.
 
     Raises:
-        DesignError: dimensions that contradict one another, or colours that are not eight
-            letters R, G, B; says which.
+        DesignError: dimensions contradict one another, or the colours are not eight letters R, G,
+            B; the message says which.
         LibraryError: there is no such coating.
     """
     given = dict(locals())
@@ -195,11 +196,11 @@ def gelsight360(
 def _solids(
     shape: TipShape, layers: tuple[float, float], dome: float, tessellation: float
 ) -> dict[str, TriangleMesh]:
-    """Coating, gel, shell and the black bottom, on common points.
+    """Return coating, gel, shell and the black bottom, on common points.
 
     Args:
-        layers: mm, thickness of gel and shell.
-        dome: of the height of the innermost dome, what is left.
+        layers: thickness of gel and shell, mm.
+        dome: share of the innermost dome's height that is left.
     """
     gel, shell = layers
     outer = shape.profile(shape.edge, tessellation)
@@ -240,7 +241,9 @@ def _check_colours(light_colours: str, base_ring: str) -> None:
 
 
 def _check_layers(radius: float, edge_radius: float, gel: float, shell: float) -> None:
-    """Gel and shell must be thinner than the rounded edge, or the innermost surface folds."""
+    """Check that gel and shell are thinner than the rounded edge, since else the innermost surface
+    folds.
+    """
     layers = f"gel_thickness {gel:g} mm and shell_thickness {shell:g} mm"
     require(
         gel + shell < radius,
@@ -264,7 +267,7 @@ def _check_layers(radius: float, edge_radius: float, gel: float, shell: float) -
 
 
 def _check_boards(boards: LedBoards, shape: TipShape, wall: float, base_leds: int) -> None:
-    """The boards must fit into the straight wall, whose outer radius is `wall` mm."""
+    """Check that the boards fit into the straight wall, whose outer radius is `wall` mm."""
     narrowest = LED[0] + 2.0 * WALL_MARGIN
     require(
         boards.depth >= narrowest,

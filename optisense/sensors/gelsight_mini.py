@@ -1,8 +1,8 @@
-"""GelSight Mini: a flat gel on a tray, a side-lit light guide below, a camera behind it.
+"""GelSight Mini: a flat gel on a tray, with a side-lit light guide below and a camera behind it.
 
-Frame: origin at the centre of the sensing surface, +z out of the sensor, x along the long side.
-Dimensions come from the maker's published CAD and FAQ where there are any. The maker publishes
-neither the light guide, the LEDs nor the camera's place: these are marked as assumed.
+Frame: the origin is the centre of the sensing surface, +z points out of the sensor, x along the
+long side. Dimensions come from the maker's published CAD and FAQ where there are any. The maker
+publishes neither the light guide, the LEDs nor the camera's position: these are marked as assumed.
 """
 
 from __future__ import annotations
@@ -42,10 +42,12 @@ GEL, GUIDE = "silicone-xp565", "acrylic"
 LED = "smd-3528"
 
 PAPERS_RISE = {"cylindrical": 6.0, "spherical": 9.0}
-"""mm, by which the OptiSense paper moves the control points of each variant along z."""
+"""Distance by which the OptiSense paper moves the control points of each variant along z, mm."""
 
 WIDEST_FIELD = 150.0
-"""Degrees: a field derived from `view_width` beyond this is a mistake."""
+"""Largest field of view that may be derived from `view_width`, degrees; a larger one comes from an
+error.
+"""
 
 
 @tells_of_dimensions("gelsight-mini")
@@ -68,28 +70,28 @@ def gelsight_mini(
     coating: str = "diffuse-grey",
     tessellation: Positive = 0.5,
 ) -> SensorDesign:
-    """A GelSight Mini with a flat gel.
+    """Build a GelSight Mini with a flat gel.
 
     Args:
-        gel_size: mm, along x and y.
-        gel_thickness: mm.
-        tray_size: mm, along x and y, of the rigid plate the gel is cast on.
-        tray_thickness: mm.
-        guide_thickness: mm, of the side-lit acrylic block under the tray.
-        guide_size: mm, along x and y, of this block; as large as the gel if None.
-        pupil_distance: mm, from the back of the tray to the camera's entrance pupil.
-        view_width: mm, what the image width shows of the flat gel.
-        fov: degrees, across the image width; None derives it from view_width.
-        resolution: pixels, width and height.
-        leds_per_group: LEDs in each of the three rows.
-        led_pitch: mm, between LEDs of a row.
-        led_gap: mm of air between an LED's window and the guide's edge; must be above 0.
-        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
-        coating: a coating of the library.
-        tessellation: mm, edge length of the triangles on top of the gel.
+        gel_size: size of the gel along x and y, mm.
+        gel_thickness: thickness of the gel, mm.
+        tray_size: size of the rigid plate on which the gel is cast, along x and y, mm.
+        tray_thickness: thickness of this plate, mm.
+        guide_thickness: thickness of the side-lit acrylic block under the tray, mm.
+        guide_size: size of this block along x and y, mm; as large as the gel if None.
+        pupil_distance: distance from the back of the tray to the camera's entrance pupil, mm.
+        view_width: width of the flat gel that the image width shows, mm.
+        fov: field of view across the image width, degrees; None derives it from view_width.
+        resolution: width and height of the picture, pixels.
+        leds_per_group: number of LEDs in each of the three rows.
+        led_pitch: distance between LEDs of a row, mm.
+        led_gap: air gap between an LED's window and the guide's edge, mm; above 0.
+        led_flux: radiant flux of each LED, mW; None takes that of its weakest colour (library).
+        coating: name of a coating of the library.
+        tessellation: edge length of the triangles on top of the gel, mm.
 
     Raises:
-        DesignError: dimensions that contradict one another; says which.
+        DesignError: dimensions contradict one another; the message says which.
         LibraryError: there is no such coating.
     """
     given = dict(locals())
@@ -123,7 +125,7 @@ def gelsight_mini(
             "guide": Part(role=Role.SUPPORT, mesh="meshes/guide.obj", material=GUIDE),
         },
         lights={
-            # The camera looks along +z with +y up, so the picture's right is -x.
+            # The camera looks along +z with +y up, so the right of the picture is -x.
             "red": _row((1, 0, 0), (0, 1), half_y + led_gap, lamp_z, *leds),
             "green": _row((0, 1, 0), (-1, 0), half_x + led_gap, lamp_z, *leds),
             "blue": _row((0, 0, 1), (0, -1), half_y + led_gap, lamp_z, *leds),
@@ -151,30 +153,30 @@ def gelsight_mini(
 
 @tells_of_dimensions("gelsight-mini")
 def gelsight_mini_cylindrical(rise: float = 6.0, **dimensions: Any) -> SensorDesign:
-    """A GelSight Mini whose gel is bent to a cylinder along the short side (y).
+    """Build a GelSight Mini whose gel is bent to a cylinder along the short side (y).
 
     Args:
-        rise: mm, how far the three top control points at middle x are moved along +z (the
+        rise: distance by which the three top control points at middle x are moved along +z, mm (the
             OptiSense paper moves the middle row by 6 mm). The gel rises by half of it.
         dimensions: arguments of `gelsight_mini`.
 
     Raises:
-        DesignError: as `gelsight_mini`, or a rise that presses the gel through its tray.
+        DesignError: see `gelsight_mini`; or the rise presses the gel through its tray.
     """
     return _bent("cylindrical", "cylinder", [(1, j, 2) for j in range(3)], (rise, 0.5), dimensions)
 
 
 @tells_of_dimensions("gelsight-mini")
 def gelsight_mini_spherical(rise: float = 9.0, **dimensions: Any) -> SensorDesign:
-    """A GelSight Mini whose gel is bent to a dome.
+    """Build a GelSight Mini whose gel is bent to a dome.
 
     Args:
-        rise: mm, how far the top centre control point is moved along +z (the OptiSense paper
-            moves it by 9 mm). The gel rises by a quarter of it.
+        rise: distance by which the top centre control point is moved along +z, mm (the OptiSense
+            paper moves it by 9 mm). The gel rises by a quarter of it.
         dimensions: arguments of `gelsight_mini`.
 
     Raises:
-        DesignError: as `gelsight_mini`, or a rise that presses the gel through its tray.
+        DesignError: see `gelsight_mini`; or the rise presses the gel through its tray.
     """
     return _bent("spherical", "dome", [(1, 1, 2)], (rise, 0.25), dimensions)
 
@@ -186,10 +188,11 @@ def _bent(
     rise: tuple[float, float],
     dimensions: dict[str, Any],
 ) -> SensorDesign:
-    """A flat sensor with some control points raised.
+    """Return a flat sensor with some control points raised.
 
     Args:
-        rise: mm of the control points, and what share of it the gel rises in the middle.
+        rise: displacement of the control points, mm, and the share of it by which the gel rises in
+            the middle.
     """
     design = gelsight_mini(**dimensions)
     height, share = rise
@@ -221,7 +224,7 @@ def _check(
     pupil_distance: float,
     row: tuple[int, float],
 ) -> None:
-    """All lengths in mm; `row` is the number of LEDs and their pitch."""
+    """Check lengths in mm; `row` is the number of LEDs and their pitch."""
     require(
         gel_size[0] <= tray_size[0] and gel_size[1] <= tray_size[1],
         NAME,
@@ -252,10 +255,11 @@ def _index(material: Material) -> float:
 
 
 def _field_of_view(view_width: float, layers: list[tuple[float, float]]) -> float:
-    """Degrees a pinhole needs to see `view_width` (mm) behind flat layers.
+    """Return the field of view with which a pinhole sees `view_width` (mm) behind flat layers,
+    degrees.
 
     Args:
-        layers: thickness (mm) and refractive index of each, from the pinhole on.
+        layers: thickness (mm) and refractive index of each layer, from the pinhole on.
     """
 
     def too_wide(sine: float) -> bool:  # Snell: the index times the sine is the same throughout
@@ -278,7 +282,9 @@ def _field_of_view(view_width: float, layers: list[tuple[float, float]]) -> floa
 
 
 def _gel(size: tuple[float, float], thickness: float, tessellation: float) -> TriangleMesh:
-    """A closed box with its top at z = 0, cut finely so that the cage bends it smoothly."""
+    """Return a closed box with its top at z = 0, divided finely so that the cage bends it
+    smoothly.
+    """
     divisions = (
         max(1, round(size[0] / tessellation)),
         max(1, round(size[1] / tessellation)),
@@ -289,7 +295,7 @@ def _gel(size: tuple[float, float], thickness: float, tessellation: float) -> Tr
 
 
 def _top(gel: TriangleMesh) -> TriangleMesh:
-    """The top faces of the gel, on the very same vertices, looking into the gel."""
+    """Return the top faces of the gel, on the same vertices, turned into the gel."""
     on_top = (gel.triangles[:, :, 2] == 0.0).all(axis=1)
     used, faces = np.unique(gel.faces[on_top], return_inverse=True)
     inward = faces.astype(np.int32).reshape(-1, 3)[:, ::-1]
@@ -310,7 +316,7 @@ def _row(
     pitch: float,
     flux: float,
 ) -> LightGroup:
-    """LEDs in a row on one side of the guide, facing it."""
+    """Return LEDs in a row on one side of the guide, facing it."""
     x, y = side
     offsets = [(index - 0.5 * (count - 1)) * pitch for index in range(count)]
     lights = [

@@ -1,8 +1,8 @@
-"""GelSight Mini as photographs of a real unit show it.
+"""GelSight Mini, fitted to photographs of a real unit.
 
 `optisense calibrate` has fitted the powers of the lights, the camera's view and its processing to
-published photographs; `scripts/fitted_mini.py` does it again. The numbers are in a YAML file beside
-this module.
+published photographs; `scripts/fitted_mini.py` repeats the fit. The numbers are in a YAML file
+beside this module.
 """
 
 from __future__ import annotations
@@ -14,19 +14,23 @@ from optisense.design.yaml_reader import read_yaml
 from optisense.sensors.gelsight_mini import NAME, gelsight_mini
 
 FITTED_NUMBERS = "gelsight_mini_fitted.yaml"
-"""Name of the file with the value at each fitted path, and where it is from."""
+"""Name of the file with the value at each fitted path, and its source."""
 
 VIEW_WIDTH = 20.3
-"""mm of the skin that pictures of real units show across, from the size of balls in them; the
-maker's datasheet says 18.6."""
+"""Width of the skin that pictures of real units show, mm, from the size of balls in them; the
+maker's datasheet states 18.6.
+"""
 
 GUIDE_SIZE = 28.23, 23.73
-"""mm, of a light guide as large as the tray: with one as large as the gel, pictures have a green
-border that no real unit shows."""
+"""Size of a light guide as large as the tray, mm: with one as large as the gel, pictures have a
+green border that no real unit shows.
+"""
 
 
 def before_the_fit() -> SensorDesign:
-    """The design that the fit starts from: a flat GelSight Mini with a wide view and guide."""
+    """Return the design that the fit starts from: a flat GelSight Mini with a wide view and
+    guide.
+    """
     design = gelsight_mini(view_width=VIEW_WIDTH, guide_size=GUIDE_SIZE)
     design.name = f"{NAME}-fitted"
     design.description = "GelSight Mini, flat gel, fitted to photographs of a real unit"
@@ -41,11 +45,11 @@ def before_the_fit() -> SensorDesign:
 
 
 def gelsight_mini_fitted() -> SensorDesign:
-    """A GelSight Mini whose light and camera are those of a real unit.
+    """Build a GelSight Mini whose light and camera are those of a real unit.
 
-    Its camera mixes colours, has a tone curve, a level in the dark and dark corners. So its
-    pictures look like those of the unit, and scores that judge pictures differ from those of
-    `gelsight_mini`, whose camera is ideal.
+    Its camera mixes colours, and has a tone curve, a black level and dark corners. So its pictures
+    resemble those of the unit, and scores of pictures differ from those of `gelsight_mini`, whose
+    camera is ideal.
     """
     design = before_the_fit()
     with as_file(files("optisense.sensors") / FITTED_NUMBERS) as path:

@@ -1,12 +1,12 @@
-"""GelSight Svelte: a finger whose one camera sees the whole palm over a flat and a curved mirror.
+"""GelSight Svelte: a finger whose single camera sees the whole palm by a flat and a curved mirror.
 
-Frame: origin at the camera's entrance pupil, x from the back of the finger to its palm, z from the
-base to the tip, y across. Light from the palm goes to the curved mirror M1 on the back, to the
-flat mirror M2 under the palm, and into the camera.
+Frame: the origin is the camera's entrance pupil, x points from the back of the finger to its palm,
+z from the base to the tip, y across. Light from the palm is reflected by the curved mirror M1 on
+the back and the flat mirror M2 under the palm, and enters the camera.
 
-No drawing of the sensor is published. The side view was measured from an animation on its first
-author's web site, to about a pixel, at an assumed scale of 0.70 mm a pixel. What is derived from
-it, and what is assumed, is marked in the design.
+No drawing of the sensor is published. The side view was measured in an animation on its first
+author's web site, to about a pixel, at an assumed scale of 0.70 mm a pixel. Derived and assumed
+numbers are marked in the design.
 """
 
 from __future__ import annotations
@@ -56,13 +56,14 @@ PALM_OUTLINE = (
     (18.1, 67.6), (19.2, 76.6), (20.3, 84.6), (19.2, 89.5), (15.3, 92.4),
 )  # fmt: skip
 """Outline of the palm as (x, z) in mm, from its base to its tip; its provenance is in
-`svelte_sources`."""
+`svelte_sources`.
+"""
 
 BACK_OUTLINE = (
     (-9.0, -7.7), (-9.0, 5.0), (-1.7, 10.2), (-2.9, 14.4), (-4.8, 26.5), (-5.7, 35.6),
     (-5.7, 43.3), (-4.1, 56.9), (-1.3, 72.9), (2.9, 85.0), (6.6, 93.0),
 )  # fmt: skip
-"""(x, z) mm: the back from the bottom of the base to the tip."""
+"""Outline of the back as (x, z) in mm, from the bottom of the base to the tip."""
 
 
 @tells_of_dimensions("gelsight-svelte")
@@ -94,45 +95,46 @@ def gelsight_svelte(
     coating: str = "diffuse-grey",
     tessellation: Positive = 0.5,
 ) -> SensorDesign:
-    """A GelSight Svelte.
+    """Build a GelSight Svelte.
 
-    The mirror M1 is stored flat. Its cage of 27 points takes it from flat (`c_min`) to the
-    largest curvature that keeps `clearance` from the skin (`c_max`, found from the shapes), with
-    its middle at rest; `blend` is set so that it has the measured curvature, `m1_sagitta`.
+    The mirror M1 is stored flat. Its cage of 27 points takes it from flat (`c_min`) to the largest
+    curvature that keeps `clearance` from the skin (`c_max`, found from the shapes), with its middle
+    at rest; `blend` is set so that it has the measured curvature, `m1_sagitta`.
 
     Args:
-        palm_outline: (x, z) mm, points of the coated face of the skin, from base to tip.
-        back_outline: (x, z) mm, corners of the body's back, from base to tip.
-        gel_thickness: mm.
-        gel_width: mm, of gel and skin.
-        m1_ends: (x, z) mm, ends of M1 at the base and at the tip, when bent by `m1_sagitta`.
-        m1_sagitta: mm, how far the middle of M1 lies behind the chord between its ends.
-        m1_width: mm.
-        m1_grid: vertices of M1 along and across the finger.
-        mirror_thickness: mm that M1 and M2 are made with, behind their faces; light sees the faces.
-        wall_thickness: mm that body, side walls and LED covers are made with, outside of their
-            inner faces.
-        clearance: mm, between the most curved M1 and the skin.
-        m2_bottom: (x, z) mm, the end of M2 at the base.
-        m2_tilt: degrees, of M2 from the z axis, its upper end towards the palm.
-        m2_length: mm; None takes 24.3 mm or as much of it as can see M1 past the gel.
-        m2_width: mm.
-        view: "m2" aims the camera at the whole length of M2, of which the lowest part looks past
-            M1; "palm" only at what M1 shows of the palm, as a picture cropped to the finger.
-        fov: degrees, across the image width, which runs along the finger; None takes what `view`
-            needs.
-        resolution: pixels, width and height.
-        leds_per_side: LEDs in each of the two rows along the finger.
-        led_pitch: mm, between LEDs of a row.
-        led_gap: mm of air between an LED's window and the gel; must be above 0.
-        led_flux: mW, radiant, of each LED; None takes what its weakest colour gives (library).
-        tip_leds: blue LEDs behind the gel's end at the tip.
-        coating: a coating of the library.
-        tessellation: mm, edge length of the triangles of the skin.
+        palm_outline: points (x, z) of the coated face of the skin, from base to tip, mm.
+        back_outline: corners (x, z) of the body's back, from base to tip, mm.
+        gel_thickness: thickness of the gel, mm.
+        gel_width: width of gel and skin, mm.
+        m1_ends: ends (x, z) of M1 at the base and at the tip, when bent by `m1_sagitta`, mm.
+        m1_sagitta: distance of the middle of M1 behind the chord between its ends, mm.
+        m1_width: width of M1, mm.
+        m1_grid: number of vertices of M1 along and across the finger.
+        mirror_thickness: thickness of M1 and M2 for manufacturing, behind their faces, mm; light
+            meets the faces.
+        wall_thickness: thickness of body, side walls and LED covers for manufacturing, outside of
+            their inner faces, mm.
+        clearance: distance between the most curved M1 and the skin, mm.
+        m2_bottom: end (x, z) of M2 at the base, mm.
+        m2_tilt: angle of M2 to the z axis, degrees, its upper end towards the palm.
+        m2_length: length of M2, mm; None takes 24.3 mm or as much of it as can see M1 past the gel.
+        m2_width: width of M2, mm.
+        view: aim of the camera: "m2" is the whole length of M2, of which the lowest part looks past
+            M1; "palm" is only the part that shows the palm, as a picture cropped to the finger.
+        fov: field of view across the image width, which runs along the finger, degrees; None takes
+            the one for `view`.
+        resolution: width and height of the picture, pixels.
+        leds_per_side: number of LEDs in each of the two rows along the finger.
+        led_pitch: distance between LEDs of a row, mm.
+        led_gap: air gap between an LED's window and the gel, mm; above 0.
+        led_flux: radiant flux of each LED, mW; None takes that of its weakest colour (library).
+        tip_leds: number of blue LEDs behind the gel's end at the tip.
+        coating: name of a coating of the library.
+        tessellation: edge length of the triangles of the skin, mm.
 
     Raises:
-        DesignError: the dimensions contradict each other (a mirror through the skin, a gel
-            thicker than the palm's bends, ...); says which one and what to change.
+        DesignError: the dimensions contradict each other (a mirror through the skin, a gel thicker
+            than the palm's bends, ...); the message says which one, and the remedy.
         LibraryError: there is no such coating.
     """
     given = dict(locals())
@@ -218,10 +220,10 @@ def gelsight_svelte(
 
 
 def _mirror_cage(mesh: TriangleMesh, mirror: CurvedMirror, most: float, blend: float) -> Cage:
-    """27 points over the flat mirror, from there to a sagitta of `most` mm.
+    """Return a cage of 27 points over the flat mirror, with a range up to a sagitta of `most` mm.
 
     Three points in a row give a parabola of degree 2 along z: with its ends `s` forward and its
-    middle point `s` back, the middle of the mirror stays where it is.
+    middle point `s` back, the middle of the mirror stays in place.
     """
     cage = Cage.around(["M1"], mesh.bounds)
     flat = cage_points(mesh.bounds, (3, 3, 3)).reshape(3, 3, 3, 3)
@@ -249,7 +251,9 @@ def _lights(
     flux: float,
     tip_count: int,
 ) -> dict[str, LightGroup]:
-    """Rows along both sides of the gel, in the middle of its thickness, that shine across it."""
+    """Return rows of lights along both sides of the gel, in the middle of its thickness, that shine
+    across it.
+    """
     shares = 0.5 + (np.arange(count) - 0.5 * (count - 1)) * pitch / palm.length
     if shares[0] < 0.0:
         raise DesignError(

@@ -18,13 +18,13 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HalfRound:
-    """An outline of two straight sides, a half round towards +y, and a straight end towards -y.
+    """Outline of two straight sides, a half round towards +y, and a straight end towards -y.
 
     Attributes:
-        width: mm, along x; the half round has half of it as its radius.
-        straight: mm, from the straight end to the centre of the half round.
-        corner: mm, radius of the two corners of the straight end.
-        centre: mm, y of the centre of the half round; its x is 0.
+        width: width along x, mm; the half round has half of it as its radius.
+        straight: distance from the straight end to the centre of the half round, mm.
+        corner: radius of the two corners of the straight end, mm.
+        centre: y of the centre of the half round, mm; its x is 0.
     """
 
     width: float
@@ -34,41 +34,41 @@ class HalfRound:
 
     @property
     def radius(self) -> float:
-        """mm, of the half round."""
+        """Radius of the half round, mm."""
         return 0.5 * self.width
 
     @property
     def end(self) -> float:
-        """mm, y of the straight end."""
+        """y of the straight end, mm."""
         return self.centre - self.straight
 
     @property
     def length(self) -> float:
-        """mm, along y."""
+        """Length along y, mm."""
         return self.straight + self.radius
 
     def inset(self, distance: float) -> HalfRound:
-        """The outline that lies `distance` mm inside this one."""
+        """Return the outline that lies `distance` mm inside this one."""
         corner = max(self.corner - distance, 0.25 * self.corner)
         return HalfRound(self.width - 2.0 * distance, self.straight - distance, corner, self.centre)
 
     def points(self, tessellation: float) -> FloatArray:
-        """(n, 2) corners of a polygon in the outline, counter-clockwise, in mm.
+        """Return the corners (n, 2) of a polygon in the outline, counter-clockwise, mm.
 
-        Each piece is cut into an odd number, so that no corner lies on the y axis. The numbers
+        Each piece is divided into an odd number, so that no corner lies on the y axis. The numbers
         follow from this outline's `tessellation`; use `like` for outlines inside it.
 
         Args:
-            tessellation: mm, about the length of the sides.
+            tessellation: approximate length of the sides, mm.
         """
         return self._cut(self._pieces(tessellation))
 
     def like(self, outer: HalfRound, tessellation: float) -> FloatArray:
-        """`points` with as many corners on each piece as those of another outline."""
+        """Return `points` with as many corners on each piece as those of another outline."""
         return self._cut(outer._pieces(tessellation))
 
     def _pieces(self, tessellation: float) -> tuple[int, int, int, int]:
-        """The numbers of points of the end, a corner, a side and the half round."""
+        """Return the numbers of points of the end, a corner, a side and the half round."""
 
         def odd(length: float, least: int) -> int:
             return 2 * (max(least, math.ceil(length / tessellation)) // 2) + 1
@@ -95,11 +95,11 @@ class HalfRound:
         return np.concatenate([part[:-1] for part in parts])
 
     def at(self, distance: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """A place on the outline, and the unit vector that looks out of it there.
+        """Return a point on the outline, and its outward unit normal.
 
         Args:
-            distance: mm along the outline from the middle of the straight end; towards +x first
-                where it is positive.
+            distance: distance along the outline from the middle of the straight end, mm; towards +x
+                first if positive.
         """
         along = abs(distance)
         sign = math.copysign(1.0, distance)
@@ -122,19 +122,21 @@ class HalfRound:
 
     @property
     def half_way(self) -> float:
-        """mm along the outline from the middle of the straight end to the middle of the round."""
+        """Distance along the outline from the middle of the straight end to the middle of the
+        round, mm.
+        """
         flat, bend = self.radius - self.corner, 0.5 * math.pi * self.corner
         return flat + bend + self.straight - self.corner + 0.5 * math.pi * self.radius
 
 
 def stacked(rings: Sequence[FloatArray]) -> TriangleMesh:
-    """A closed solid whose outside is a sequence of rings, closed by a fan at both ends.
+    """Return a closed solid whose outside is a sequence of rings, closed by a fan at both ends.
 
     Args:
-        rings: (n, 3) mm each; rings of one length are joined corner by corner, others by the
-            share of the way around. Seen from outside of the solid, the rings run
-            counter-clockwise about +z from the first (below) to the last (above); a solid with
-            a cavity goes from the cavity's floor up, over its rim and down outside.
+        rings: rings (n, 3), mm; rings of one length are joined corner by corner, others by the
+            share of the perimeter. Seen from outside of the solid, the rings run counter-clockwise
+            about +z from the first (below) to the last (above); a solid with a cavity goes from the
+            cavity's floor up, over its rim and down outside.
     """
     vertices = np.concatenate([*rings, [_pole(rings[0])], [_pole(rings[-1])]])
     starts = np.cumsum([0, *(len(ring) for ring in rings)])
@@ -151,10 +153,12 @@ def stacked(rings: Sequence[FloatArray]) -> TriangleMesh:
 
 
 def _joined(below: int, above: int) -> NDArray[np.int64]:
-    """(below + above, 3) faces between two rings of so many corners, those above numbered on."""
+    """Return the faces (below + above, 3) between two rings; the corners of the upper ring are
+    numbered after those of the lower.
+    """
     ends = np.concatenate([(np.arange(below) + 1.0) / below, (np.arange(above) + 1.0) / above])
     is_below = np.arange(below + above) < below
-    order = np.lexsort((is_below, ends))  # the way around; each step is one triangle
+    order = np.lexsort((is_below, ends))  # in the order around the ring; each step is one triangle
     steps = is_below[order]
     i = np.concatenate([[0], np.cumsum(steps)[:-1]])
     j = np.concatenate([[0], np.cumsum(~steps)[:-1]])
@@ -163,7 +167,9 @@ def _joined(below: int, above: int) -> NDArray[np.int64]:
 
 
 def _pole(ring: FloatArray) -> FloatArray:
-    """The middle of a ring, a little aside: a camera on the axis would look along edges there."""
+    """Return the middle of a ring, slightly off it: a camera on the axis would look along edges
+    there.
+    """
     middle = 0.5 * (ring.min(axis=0) + ring.max(axis=0))
     reach = np.abs(ring - middle).max(axis=0)
     return np.asarray(middle + ASIDE * reach * np.array([0.61, 0.79, 0.0]))

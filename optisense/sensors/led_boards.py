@@ -18,19 +18,19 @@ BOARDS = 4
 
 LED_MODEL = "smd-0805"
 LED = (1.25, 2.0)
-"""mm, width (along the radius) and length of the emitting window."""
+"""Width (along the radius) and length of an LED's emitting window, mm."""
 WINDOW_GAP = 0.01
-"""mm between an LED's body and the window in front of it: wide enough not to count as contact."""
+"""Distance between an LED's body and its window, mm: wide enough not to count as contact."""
 WALL_MARGIN = 0.15
-"""mm of wall left on both sides of a board."""
+"""Thickness of the wall that remains on both sides of a board, mm."""
 RING_HEIGHT = 0.3
-"""mm, z of the windows of a ring of LEDs at the foot of the wall."""
+"""z of the windows of a ring of LEDs at the foot of the wall, mm."""
 
 FloatArray = NDArray[np.float64]
 
 
 def led_height() -> float:
-    """mm by which an LED stands off its board: the height of its package in the library."""
+    """Return the height of an LED above its board, mm: that of its package in the library."""
     return package(LED_MODEL)[2]
 
 
@@ -39,12 +39,12 @@ class LedBoards:
     """Four boards at 0, 90, 180 and 270 degrees, with LEDs on both faces.
 
     Attributes:
-        radius: mm, from the axis to the middle of the wall.
-        depth: mm, of the wall.
-        bottom: mm, z of the lower edge.
-        height: mm.
-        thickness: mm, of a board without LEDs.
-        leds: on each face.
+        radius: distance from the axis to the middle of the wall, mm.
+        depth: thickness of the wall, mm.
+        bottom: z of the lower edge, mm.
+        height: height of a board, mm.
+        thickness: thickness of a board without LEDs, mm.
+        leds: number of LEDs on each face.
     """
 
     radius: float
@@ -56,7 +56,7 @@ class LedBoards:
 
     @property
     def outermost(self) -> float:
-        """mm from the axis to the farthest corner of a board or an LED's window."""
+        """Distance from the axis to the farthest corner of a board or an LED's window, mm."""
         board = math.hypot(self.radius + self._half_depth, 0.5 * self.thickness)
         return max(board, math.hypot(self.radius + 0.5 * LED[0], self._window))
 
@@ -66,16 +66,16 @@ class LedBoards:
 
     @property
     def _window(self) -> float:
-        """mm from the middle of a board to the windows of its LEDs."""
+        """Distance from the middle of a board to the windows of its LEDs, mm."""
         return 0.5 * self.thickness + led_height() + WINDOW_GAP
 
     def _heights(self) -> FloatArray:
-        """(leds,) mm, z of the middle of the LEDs."""
+        """Return z of the middles of the LEDs, (leds,) mm."""
         pitch = self.height / self.leds
         return np.asarray(self.bottom + pitch * (np.arange(self.leds) + 0.5), dtype=np.float64)
 
     def mesh(self) -> TriangleMesh:
-        """The boards and the bodies of the LEDs on them: closed boxes that touch."""
+        """Return the boards and the bodies of the LEDs on them: closed boxes that touch."""
         across, half, high = 0.5 * self.thickness, self._half_depth, led_height()
         top = self.bottom + self.height
         bodies = [
@@ -93,12 +93,12 @@ class LedBoards:
         )
 
     def light_groups(self, colours: str, flux: float) -> dict[str, LightGroup]:
-        """One group a face, `lg1` to `lg8`, anticlockwise seen from +z.
+        """Return one light group per face, `lg1` to `lg8`, anticlockwise seen from +z.
 
         Args:
-            colours: a letter a group. Group 1 is on the board at 0 degrees and shines
+            colours: one letter per group. Group 1 is on the board at 0 degrees and shines
                 anticlockwise; group 2 faces it from the next board, and so on.
-            flux: mW of each LED.
+            flux: radiant flux of each LED, mW.
         """
         groups = {}
         for number, letter in enumerate(colours, start=1):
@@ -117,13 +117,14 @@ class LedBoards:
 
 
 def ring(colour: str, radius: float, count: int, flux: float) -> LightGroup:
-    """LEDs in a ring at the foot of a wall, shining up along it; none at 0 or 90 degrees.
+    """Return LEDs in a ring at the foot of a wall that shine up along it; none is at 0 or 90
+    degrees.
 
     Args:
-        colour: a letter.
-        radius: mm, from the axis to the middle of the LEDs.
-        count: how many; a multiple of four keeps clear of the boards.
-        flux: mW of each LED.
+        colour: letter of the colour.
+        radius: distance from the axis to the middle of the LEDs, mm.
+        count: number of LEDs; a multiple of four keeps clear of the boards.
+        flux: radiant flux of each LED, mW.
     """
     lights = [
         _light(
@@ -137,7 +138,9 @@ def ring(colour: str, radius: float, count: int, flux: float) -> LightGroup:
 
 
 def _turned(board: int) -> FloatArray:
-    """(3, 3): the turn about z that takes the first board to another, without rounding."""
+    """Return the rotation matrix (3, 3) about z that takes the first board to another, without
+    rounding.
+    """
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[board]
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 

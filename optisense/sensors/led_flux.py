@@ -1,4 +1,4 @@
-"""Sizes of the LEDs of the built-in sensors, and their power where no source states it."""
+"""Sizes of the LEDs of the built-in sensors, and their flux where no source states it."""
 
 from __future__ import annotations
 
@@ -10,29 +10,29 @@ BALANCED = (
     "what the LED's weakest colour gives at its nominal current (library); the brighter colours "
     "are taken to be dimmed to it with resistors, as on boards of sister sensors"
 )
-"""The source of a flux from `balanced_flux`."""
+"""Source text of a flux from `balanced_flux`."""
 
 
 def balanced_flux(model: str) -> float:
-    """The radiant flux (mW) that an LED gives in each of its colours.
+    """Return the radiant flux that an LED has in each of its colours, mW.
 
     Boards of GelSight sensors bring their colours to one brightness with resistors (the published
     board of GraspEveryThing has 45, 400 and 600 ohm for red, green and blue): the weakest colour
     runs at its nominal current.
 
     Args:
-        model: a light of the library.
+        model: name of a light of the library.
     """
     return min(_nominal(model).values())
 
 
 def nominal_flux(model: str, colour: str) -> float:
-    """The radiant flux (mW) of one colour ("red", ...) of an LED at its nominal current."""
+    """Return the radiant flux of one colour ("red", ...) of an LED at its nominal current, mW."""
     return _nominal(model)[colour]
 
 
 def package(model: str) -> tuple[float, float, float]:
-    """mm: width, length and height of an LED's body, as the library has them."""
+    """Return width, length and height of an LED's body, as in the library, mm."""
     entry = library.entry("light", model)
     assert isinstance(entry, LightEntry) and entry.package is not None
     return entry.package

@@ -1,4 +1,4 @@
-"""The built-in sensors by name, and opening a design by name or folder."""
+"""Registry of the built-in sensors, and loading of a design by name or folder."""
 
 from __future__ import annotations
 
@@ -34,22 +34,22 @@ BUILT_IN = "builtin:"
 
 
 def build(name: str) -> SensorDesign:
-    """A built-in sensor with its default dimensions.
+    """Build a sensor with its default dimensions.
 
     Raises:
-        DesignError: there is no such sensor; names the near match.
+        DesignError: there is no such sensor; the message suggests a similar name.
     """
     return SENSORS.find(name)()
 
 
 def load(name_or_folder: str | Path) -> SensorDesign:
-    """A built-in sensor by its name, or a design by its folder (or its design.yaml).
+    """Load a built-in sensor by its name, or a design by its folder (or its design.yaml).
 
-    `builtin:NAME` always means the built-in sensor and `./NAME` the folder; a plain name must
-    not be both.
+    `builtin:NAME` always means the built-in sensor and `./NAME` the folder; a plain name must not
+    be both.
 
     Raises:
-        OptiSenseError: there is neither, both, or the design can't be read.
+        OptiSenseError: there is neither, there are both, or the design can't be read.
     """
     text = str(name_or_folder)
     if text.startswith(BUILT_IN):
@@ -75,19 +75,19 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
     don't have them.
 
     Raises:
-        OptiSenseError: the design can't be saved, or an own part not be read.
+        OptiSenseError: the design can't be saved, or an own part can't be read.
     """
     storage.save_design(library.with_own_lights(design), folder, new=new)
 
 
 def check(design: SensorDesign) -> list[Diagnostic]:
-    """Check a design without rendering it, and that the library knows its lights.
+    """Check a design without rendering it, and whether the library knows its lights.
 
     Returns:
-        What looks odd but can be simulated (problems of severity "warning").
+        Problems of severity "warning": unusual, but they can be simulated.
 
     Raises:
-        DesignError: anything that can't be simulated, or only wrongly.
+        DesignError: the design can't be simulated, or its simulation would be wrong.
     """
     problems = check_design(design, light_names=library.names("light"))
     raise_problems(problems, f"design '{design.name}'")

@@ -1,7 +1,7 @@
-"""Shapes that the sensors are put together from: turned solids, bent strips, rows of lights.
+"""Basic shapes of sensors: solids of revolution, bent strips, rows of lights.
 
-Solids that share a surface take it from the same points, so that their vertices agree bit for
-bit there and the media on both its sides are found face by face.
+Solids that share a surface take it from the same points, so that their vertices agree bit for bit
+there and the media on both sides are found face by face.
 """
 
 from __future__ import annotations
@@ -21,31 +21,36 @@ FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 ON_AXIS = 1e-12
-"""mm: a profile point nearer to the axis is a pole."""
+"""Largest distance from the axis of a profile point that counts as a pole, mm; a margin for
+rounding.
+"""
 
 TWIST = 0.31
 """Angle by which turned shapes are rotated, in segments. No vertex then lies exactly on a plane of
-symmetry, where rays of regular grids would meet edges."""
+symmetry, where rays of regular grids would meet edges.
+"""
 
 ASIDE = 0.01
-"""Fraction of the radius of the ring next to it by which a pole is moved off the axis."""
+"""Distance by which a pole is moved off the axis, as a share of the radius of the ring next to
+it.
+"""
 
 
 def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
-    """A profile turned about the z axis.
+    """Return a profile turned about the z axis.
 
-    Faces look to the right of the way along the profile (r to the right, z up): out of a solid
-    whose outline runs counter-clockwise. Two neighbouring points on the axis make no faces.
+    Normals point to the right of the direction along the profile (r to the right, z up): out of a
+    solid whose outline runs counter-clockwise. Two neighbouring points on the axis make no faces.
 
     Args:
-        profile: (n, 2) r and z, mm, r >= 0; an outline of a ring ends on its first point.
-        segments: corners of a full turn.
+        profile: r and z, (n, 2) mm, r >= 0; an outline of a ring ends on its first point.
+        segments: number of corners of a full turn.
 
     Returns:
-        n rings of `segments` vertices, one vertex where r is 0; welded, so closed outlines and
-        outlines from axis to axis make closed meshes. No edge lies in the xz or yz plane and no
-        corner on the axis, where a camera's rays would run exactly along edges: a ray tracer
-        may miss both faces there.
+        A mesh of n rings of `segments` vertices, one vertex where r is 0; welded, so closed
+        outlines and outlines from axis to axis make closed meshes. No edge lies in the xz or yz
+        plane and no corner on the axis, where a camera's rays would run exactly along edges: a ray
+        tracer may miss both faces there.
     """
     points = np.asarray(profile, dtype=np.float64)
     turn = 2.0 * np.pi * (np.arange(segments) + TWIST) / segments
@@ -65,7 +70,8 @@ def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
         start += len(ring)
     faces = []
     for index, (one, other) in enumerate(pairwise(rings)):
-        # The diagonal of a quad hangs on its corners only, not on the way along the profile.
+        # The diagonal of a quad depends on its corners only, not on the direction along the
+        # profile.
         upward = tuple(points[index, ::-1]) <= tuple(points[index + 1, ::-1])
         low, high = (one, other) if upward else (other, one)
         beside_low, beside_high = np.roll(low, -1), np.roll(high, -1)
@@ -79,17 +85,17 @@ def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:
 
 
 def ribbon(path: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
-    """A path in the xz plane drawn out along y, to both sides; an open sheet.
+    """Return a path in the xz plane extruded along y, to both sides; an open sheet.
 
-    Faces look to the left of the way along the path (x to the right, z up).
+    Normals point to the left of the direction along the path (x to the right, z up).
 
     Args:
-        path: (n, 2) x and z, mm.
-        half_width: mm.
-        rows: strips that the width is cut into.
+        path: x and z, (n, 2) mm.
+        half_width: half of the width along y, mm.
+        rows: number of strips across the width.
 
     Returns:
-        n times (rows + 1) vertices, row by row along the path.
+        A mesh of n times (rows + 1) vertices, row by row along the path.
     """
     points = np.asarray(path, dtype=np.float64)
     y = np.linspace(-half_width, half_width, rows + 1)
@@ -99,13 +105,13 @@ def ribbon(path: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
 
 
 def strip(lower: ArrayLike, upper: ArrayLike, half_width: float, rows: int) -> TriangleMesh:
-    """The closed solid between two paths in the xz plane, drawn out along y.
+    """Return the closed solid between two paths in the xz plane, extruded along y.
 
     Args:
-        lower, upper: (n, 2) x and z, mm; `upper` lies to the left of the way along them. Each
+        lower, upper: x and z, (n, 2) mm; `upper` lies to the left of the direction along them. Each
             point is joined to its partner.
-        half_width: mm.
-        rows: strips that the width is cut into.
+        half_width: half of the width along y, mm.
+        rows: number of strips across the width.
 
     Returns:
         A mesh that has, bit for bit, the vertices of `ribbon(upper)` and `ribbon(lower)`.
@@ -129,11 +135,11 @@ def strip(lower: ArrayLike, upper: ArrayLike, half_width: float, rows: int) -> T
 
 
 def rod(outline: ArrayLike, half_width: float) -> TriangleMesh:
-    """A convex outline in the xz plane drawn out along y: a closed prism.
+    """Return a convex outline in the xz plane extruded along y: a closed prism.
 
     Args:
-        outline: (n, 2) x and z, mm, counter-clockwise (x to the right, z up).
-        half_width: mm.
+        outline: x and z, (n, 2) mm, counter-clockwise (x to the right, z up).
+        half_width: half of the width along y, mm.
     """
     points = np.asarray(outline, dtype=np.float64)
     count = len(points)
@@ -154,17 +160,19 @@ def rod(outline: ArrayLike, half_width: float) -> TriangleMesh:
 def arc(
     centre: tuple[float, float], radius: float, start: float, end: float, pieces: int
 ) -> FloatArray:
-    """Points on an arc in a plane, (pieces + 1, 2) mm.
+    """Return points on an arc in a plane, (pieces + 1, 2) mm.
 
     Args:
-        start, end: degrees from the first axis towards the second.
+        start, end: angles from the first axis towards the second, degrees.
     """
     angle = np.radians(np.linspace(start, end, pieces + 1))
     return np.column_stack([centre[0] + radius * np.cos(angle), centre[1] + radius * np.sin(angle)])
 
 
 def pieces_of_arc(radius: float, degrees: float, tessellation: float, least: int = 2) -> int:
-    """How many pieces of about `tessellation` mm an arc is cut into, of 15 degrees at most."""
+    """Return the number of pieces of about `tessellation` mm for an arc; each is 15 degrees at
+    most.
+    """
     length = abs(math.radians(degrees)) * radius
     return max(least, math.ceil(length / tessellation), math.ceil(abs(degrees) / 15.0))
 
@@ -172,14 +180,14 @@ def pieces_of_arc(radius: float, degrees: float, tessellation: float, least: int
 def row_of_lights(
     centre: Vector, along: Vector, count: int, pitch: float, direction: Vector
 ) -> list[Light]:
-    """Lights side by side that all shine the same way.
+    """Return lights side by side that all shine in one direction.
 
     Args:
-        centre: mm, the middle of the row.
+        centre: middle of the row, mm.
         along: unit vector of the row, which is also the `up` of each light.
-        count: how many.
-        pitch: mm between neighbours.
-        direction: where they shine.
+        count: number of lights.
+        pitch: distance between neighbours, mm.
+        direction: direction in which they shine.
     """
     offsets: Sequence[float] = [(index - 0.5 * (count - 1)) * pitch for index in range(count)]
     places = [

@@ -1,4 +1,4 @@
-"""The dark body of GelSight Svelte around its mirrors, open where the skin is."""
+"""Dark body of GelSight Svelte around its mirrors, open at the skin."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from optisense.sensors.shapes import ribbon
 from optisense.sensors.svelte_profile import CurvedMirror, FlatMirror, FloatArray, Palm, Points
 
 LED = "smd-3528"
-"""The light of the library that stands beside the gel."""
+"""Light of the library beside the gel."""
 
 BEHIND_M2 = 1.0
-"""Distance in mm between mirror M2 and the body behind it; no light passes there."""
+"""Distance between mirror M2 and the body behind it, mm; no light passes there."""
 
 BESIDE_MIRROR = 0.5
-"""mm between the edges of the mirrors and the side walls."""
+"""Distance between the edges of the mirrors and the side walls, mm."""
 
 
 def check_mirrors(
     m1: CurvedMirror, sagitta: float, m2: FlatMirror, gel_outline: FloatArray
 ) -> None:
-    """M2 must be clear of the gel, and M1 of M2 and of what the camera sees of it.
+    """Check that M2 is clear of the gel, and M1 of M2 and of what the camera sees of it.
 
     Args:
-        m1, sagitta: the curved mirror as it is, mm.
-        m2: the flat mirror.
-        gel_outline: (n, 2) mm, closed.
+        m1, sagitta: curved mirror, and its sagitta, mm.
+        m2: flat mirror.
+        gel_outline: outline of the gel, (n, 2) mm, closed.
 
     Raises:
-        DesignError: says which is in the way, and where.
+        DesignError: a part is in the way; the message says which, and where.
     """
     flat, curved = shapely.LineString(m2.ends()), shapely.LineString(m1.curve(sagitta))
     crossed = flat.intersection(shapely.Polygon(gel_outline))
@@ -65,17 +65,17 @@ def housing(
     led_gap: float,
     wall_thickness: float,
 ) -> dict[str, TriangleMesh]:
-    """Walls around everything but the palm: `body`, the back and the base, and `side-walls`; sheets
-    that absorb light, with their normals to the inside.
+    """Return the walls around everything except the palm: `body`, the back and the base, and
+    `side-walls`. They are sheets that absorb light, with inward normals.
 
     Args:
-        palm: the coated face.
-        back_outline: (x, z) mm from base to tip.
-        m1, most: the curved mirror and its largest sagitta, mm.
-        m2: the flat mirror.
-        widths: mm, of the gel and of the widest mirror.
-        led_gap: mm.
-        wall_thickness: mm.
+        palm: coated face.
+        back_outline: points (x, z) from base to tip, mm.
+        m1, most: curved mirror, and its largest sagitta, mm.
+        m2: flat mirror.
+        widths: widths of the gel and of the widest mirror, mm.
+        led_gap: air gap between LEDs and gel, mm.
+        wall_thickness: thickness of the walls, mm.
 
     Raises:
         DesignError: the outline crosses itself, or a mirror or the camera is not inside.
@@ -88,7 +88,7 @@ def housing(
     outline = np.concatenate([palm.points, rest[-2::-1], base[-2:0:-1]])
     _check_inside(outline, m1, most, m2)
     half = _half_width(widths, led_gap)
-    # The sides stand between back and base, which reach as far as their outer faces.
+    # The sides stand between back and base, which extend to their outer faces.
     wide = half + wall_thickness
     around = TriangleMesh.joined(
         [ribbon(rest, wide, 1).flipped(), ribbon(base, wide, 1).flipped()]
@@ -100,14 +100,14 @@ def housing(
 def led_covers(
     palm: Palm, inner: FloatArray, widths: tuple[float, float], led_gap: float
 ) -> TriangleMesh:
-    """A channel along each side of the gel that hides the LEDs in it from the camera; a sheet that
-    absorbs light, with its normals to the LEDs.
+    """Return a channel along each side of the gel that hides the LEDs in it from the camera: a
+    sheet that absorbs light, with its normals towards the LEDs.
 
     Args:
-        palm: the coated face.
-        inner: (n, 2) mm, the inner face of the gel.
-        widths: mm, of the gel and of the widest mirror.
-        led_gap: mm.
+        palm: coated face.
+        inner: inner face of the gel, (n, 2) mm.
+        widths: widths of the gel and of the widest mirror, mm.
+        led_gap: air gap between LEDs and gel, mm.
     """
     gel_half, half = 0.5 * widths[0], _half_width(widths, led_gap)
     channel = np.concatenate([palm.points, inner[::-1], palm.points[:1]])
@@ -119,8 +119,9 @@ def led_covers(
 
 
 def _half_width(widths: tuple[float, float], led_gap: float) -> float:
-    """mm from the middle of the finger to the inside of its walls, which leave room for the LEDs
-    beside the gel."""
+    """Return the distance from the middle of the finger to the inside of its walls, mm, which leave
+    room for the LEDs beside the gel.
+    """
     return max(0.5 * widths[0] + led_gap + package(LED)[2], 0.5 * widths[1] + BESIDE_MIRROR)
 
 
@@ -150,7 +151,7 @@ def _check_inside(outline: FloatArray, m1: CurvedMirror, most: float, m2: FlatMi
 
 
 def _wall(outline: FloatArray, y: float) -> TriangleMesh:
-    """The outline's flat inside at one y; its normal is -y."""
+    """Return the area inside of the outline at one y; its normal is -y."""
     turned = outline if shapely.LinearRing(outline).is_ccw else outline[::-1]
     faces = np.asarray(manifold3d.triangulate([turned]))
     return TriangleMesh(

@@ -1,6 +1,6 @@
-"""The side view of a finger with two mirrors: curves in the plane y = 0, as (x, z) in mm.
+"""Side view of a finger with two mirrors: curves in the plane y = 0, as (x, z) in mm.
 
-x runs from the back of the finger to its palm, z from the base to the tip, and the origin is the
+x points from the back of the finger to its palm, z from the base to the tip, and the origin is the
 camera's entrance pupil.
 """
 
@@ -19,26 +19,28 @@ FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
 SAGITTA_STEP = 0.1
-"""mm: the bent mirror is tried against the skin in steps of this sagitta, then by halving."""
+"""Step of the sagitta in the search for the largest one that is clear of the skin, mm; bisection
+follows.
+"""
 
 PROFILE_SAMPLES = 200
 """Number of points along the mirror's profile, which keep the polygon within 1 um of the curve."""
 
 LONGEST_M2 = 24.3
-"""mm: the length of M2 as measured in the animation of the sensor."""
+"""Length of M2 as measured in the animation of the sensor, mm."""
 
 SIGHT_MARGIN = 0.2
-"""mm at the end of M2: no line of sight grazes the gel."""
+"""Length at the end of M2 that is left out, mm, so that no line of sight grazes the gel."""
 
 
 @dataclass(frozen=True)
 class Palm:
-    """The coated face of the skin in side view, from the base to the tip.
+    """Coated face of the skin in side view, from the base to the tip.
 
     Attributes:
-        points: (n, 2) mm, evenly spaced.
-        inward: (n, 2) unit normals, into the gel.
-        length: mm, along the curve.
+        points: points (n, 2), evenly spaced, mm.
+        inward: unit normals (n, 2) into the gel.
+        length: length along the curve, mm.
     """
 
     points: FloatArray
@@ -47,10 +49,10 @@ class Palm:
 
     @staticmethod
     def through(outline: Points, spacing: float) -> Palm:
-        """A smooth curve (cubic spline over chord length) through points from base to tip.
+        """Return a smooth curve (cubic spline over chord length) through points from base to tip.
 
         Raises:
-            DesignError: fewer than three points, or two neighbours in one place.
+            DesignError: there are fewer than three points, or two neighbours coincide.
         """
         corners = np.asarray(outline, dtype=np.float64).reshape(-1, 2)
         steps = np.linalg.norm(np.diff(corners, axis=0), axis=1)
@@ -73,10 +75,10 @@ class Palm:
         return Palm(points, inward, float(along[-1]))
 
     def offset(self, depth: float) -> FloatArray:
-        """(n, 2) mm: the curve `depth` mm inside the skin.
+        """Return the curve `depth` mm inside the skin, (n, 2) mm.
 
         Raises:
-            DesignError: the skin is thicker than a bend of the palm is wide.
+            DesignError: the skin is thicker than the radius of a bend of the palm.
         """
         inner = self.points + depth * self.inward
         forward = np.einsum("ij,ij->i", np.diff(inner, axis=0), np.diff(self.points, axis=0))
@@ -90,7 +92,9 @@ class Palm:
         return inner
 
     def at(self, share: float, depth: float) -> tuple[FloatArray, FloatArray]:
-        """The point `depth` mm inside at a share (0..1) of the length, and the tangent there."""
+        """Return the point `depth` mm inside at a share (0..1) of the length, and the tangent
+        there.
+        """
         rows = np.arange(len(self.points)) / (len(self.points) - 1)
         middle = self.points + depth * self.inward
         point = np.array([np.interp(share, rows, middle[:, k]) for k in (0, 1)])
@@ -101,13 +105,13 @@ class Palm:
 
 @dataclass(frozen=True)
 class CurvedMirror:
-    """M1 in side view: a parabola through a fixed middle, whose ends come forward as it bends.
+    """M1 in side view: a parabola through a fixed middle, whose ends move forward as it bends.
 
     Attributes:
-        middle: (2,) mm.
-        along: (2,) unit vector from the base's end to the tip's.
-        forward: (2,) unit normal, towards the palm.
-        length: mm, of the chord.
+        middle: middle point, (2,) mm.
+        along: unit vector (2,) from the base's end to the tip's.
+        forward: unit normal (2,) towards the palm.
+        length: length of the chord, mm.
     """
 
     middle: FloatArray
@@ -117,8 +121,8 @@ class CurvedMirror:
 
     @staticmethod
     def from_arc(lower: ArrayLike, upper: ArrayLike, sagitta: float) -> CurvedMirror:
-        """The mirror of an arc by its ends (2,) mm and how far (mm) its middle lies behind the
-        chord.
+        """Return the mirror of an arc by its ends, (2,) mm, and the distance of its middle behind
+        the chord, mm.
         """
         first, last = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
         along = (last - first) / np.linalg.norm(last - first)
@@ -127,16 +131,16 @@ class CurvedMirror:
         return CurvedMirror(middle, along, forward, float(np.linalg.norm(last - first)))
 
     def curve(self, sagitta: float, count: int = PROFILE_SAMPLES) -> FloatArray:
-        """(count, 2) mm: the mirror with its ends `sagitta` mm before its middle."""
+        """Return the mirror with its ends `sagitta` mm before its middle, (count, 2) mm."""
         t = np.linspace(-1.0, 1.0, count)[:, None]
         straight = self.middle + 0.5 * self.length * t * self.along
         return np.asarray(straight + sagitta * t * t * self.forward)
 
     def largest_sagitta(self, obstacle: FloatArray, clearance: float) -> float:
-        """How far (mm) it can bend before it comes closer than `clearance` to a closed outline.
+        """Return the largest sagitta with which it keeps `clearance` from a closed outline, mm.
 
         Args:
-            obstacle: (n, 2) mm, the outline of the skin.
+            obstacle: outline of the skin, (n, 2) mm.
 
         Raises:
             DesignError: even the flat mirror is closer.
@@ -169,10 +173,11 @@ class CurvedMirror:
 
 
 def _spline_slopes(knots: FloatArray, values: FloatArray) -> FloatArray:
-    """Slopes at the knots (n,) of the cubic spline through values (n, 2), with continuous
-    curvature; its first and its last two pieces are one cubic each (three knots: one parabola).
+    """Return the slopes at the knots (n,) of the cubic spline through values (n, 2), with
+    continuous curvature; its first and its last two pieces are one cubic each (three knots: one
+    parabola).
 
-    As `scipy.interpolate.CubicSpline`, whose import takes longer than building the sensor.
+    It equals `scipy.interpolate.CubicSpline`, whose import takes longer than building the sensor.
     """
     count, width = len(knots), np.diff(knots)
     rise = np.diff(values, axis=0) / width[:, None]
@@ -197,7 +202,9 @@ def _spline_slopes(knots: FloatArray, values: FloatArray) -> FloatArray:
 def _hermite(
     at: FloatArray, knots: FloatArray, values: FloatArray, slopes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Points and slopes (n, 2) of the piecewise cubic with these values and slopes at the knots."""
+    """Return points and slopes (n, 2) of the piecewise cubic with these values and slopes at the
+    knots.
+    """
     piece = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
     width = np.diff(knots)[piece, None]
     t = (at[:, None] - knots[piece, None]) / width
@@ -209,7 +216,7 @@ def _hermite(
 
 
 def mirrored(point: ArrayLike, on: ArrayLike, direction: ArrayLike) -> FloatArray:
-    """(2,) mm: a point mirrored in the line through `on` along a unit `direction`."""
+    """Return a point mirrored in the line through `on` along a unit `direction`, (2,) mm."""
     away = np.asarray(point, dtype=float) - np.asarray(on, dtype=float)
     way = np.asarray(direction, dtype=float)
     return np.asarray(np.asarray(on, dtype=float) + 2.0 * (away @ way) * way - away)
@@ -218,7 +225,9 @@ def mirrored(point: ArrayLike, on: ArrayLike, direction: ArrayLike) -> FloatArra
 def crossing(
     start: FloatArray, ends: FloatArray, on: FloatArray, direction: FloatArray
 ) -> FloatArray:
-    """(n,) mm along a line where the lines from `start` (2,) to `ends` (n, 2) cross it."""
+    """Return the distances along a line at which the lines from `start` (2,) to `ends` (n, 2) cross
+    it, (n,) mm.
+    """
     way = ends - start
     normal = np.array([-direction[1], direction[0]])
     step = ((on - start) @ normal) / (way @ normal)
@@ -230,9 +239,9 @@ class FlatMirror:
     """M2 in side view, seen from the pupil at the origin.
 
     Attributes:
-        bottom: (2,) mm, its end at the base.
-        along: (2,) unit vector towards its upper end.
-        length: mm.
+        bottom: end at the base, (2,) mm.
+        along: unit vector (2,) towards its upper end.
+        length: length, mm.
     """
 
     bottom: FloatArray
@@ -243,16 +252,16 @@ class FlatMirror:
     def facing(
         bottom: ArrayLike, tilt: float, length: float | None, inner: FloatArray
     ) -> FlatMirror:
-        """A mirror that ends where lines of sight over it would meet the gel before M1.
+        """Return a mirror that ends where lines of sight over it would meet the gel before M1.
 
         Args:
-            bottom: (2,) mm.
-            tilt: degrees from the z axis.
-            length: mm; None for LONGEST_M2 or as much of it as sees past the gel.
-            inner: (n, 2) mm, the inner face of the gel from base to tip.
+            bottom: end at the base, (2,) mm.
+            tilt: angle to the z axis, degrees.
+            length: length, mm; None for `LONGEST_M2` or as much of it as sees past the gel.
+            inner: inner face of the gel from base to tip, (n, 2) mm.
 
         Raises:
-            DesignError: it has its back to the camera, or its sight past the gel is blocked.
+            DesignError: its back is to the camera, or its sight past the gel is blocked.
         """
         start = np.asarray(bottom, dtype=np.float64)
         along = np.array([np.sin(np.radians(tilt)), np.cos(np.radians(tilt))])
@@ -278,16 +287,20 @@ class FlatMirror:
         return FlatMirror(start, along, wanted)
 
     def ends(self) -> FloatArray:
-        """(2, 2) mm: lower and upper end."""
+        """Return lower and upper end, (2, 2) mm."""
         return np.array([self.bottom, self.bottom + self.length * self.along])
 
     def seen_between(self) -> tuple[float, float]:
-        """Radians from the x axis towards the tip, from the pupil to its ends."""
+        """Return the angles of its ends seen from the pupil, from the x axis towards the tip,
+        radians.
+        """
         low, high = np.arctan2(self.ends()[:, 1], self.ends()[:, 0])
         return float(low), float(high)
 
     def angle_of(self, point: FloatArray) -> float:
-        """Radians from the x axis towards the tip, where the camera sees a point (2,) in it."""
+        """Return the angle at which the camera sees a point (2,) in it, from the x axis towards the
+        tip, radians.
+        """
         pupil = mirrored((0.0, 0.0), self.bottom, self.along)
         at = self.bottom + crossing(pupil, point[None], self.bottom, self.along)[0] * self.along
         return float(np.arctan2(at[1], at[0]))

@@ -12,7 +12,7 @@ ANIMATION = (
 
 
 def provenance(tip: bool) -> dict[str, Provenance]:
-    """Provenance by dotted path; `tip` says whether there is a blue light group."""
+    """Return the provenance by dotted path; `tip` tells whether there is a blue light group."""
     assumed, derived, sourced = Status.ASSUMED, Status.DERIVED, Status.SOURCED
     table: dict[str, tuple[Status, str]] = {
         "coating": (assumed, "opaque grey; the coating of the sensor is not published"),

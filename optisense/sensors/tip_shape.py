@@ -1,9 +1,9 @@
-"""The profile of a round fingertip, from flat over round to conical, and its parallel curves.
+"""Profile of a round fingertip, from flat over round to conical, and its parallel curves.
 
-The tip is all that lies within a rounding of a core. The core is a cone; with a height of 0 it is
-a disc and the tip is flat, with a radius of 0 too it is a point and the tip is a hemisphere.
-Because every surface of the sensor (coating, gel, shell) has the same core and its own rounding,
-they are parallel to one another.
+The tip is the set of points within a rounding radius of a core. The core is a cone; with a height
+of 0 it is a disc and the tip is flat, with a radius of 0 too it is a point and the tip is a
+hemisphere. Because every surface of the sensor (coating, gel, shell) has the same core and its own
+rounding, they are parallel to one another.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ FEWEST = 6
 
 @dataclass(frozen=True)
 class TipShape:
-    """A family of parallel profiles: a wall, a rounded edge, a cone, a rounded nose.
+    """Family of parallel profiles: a wall, a rounded edge, a cone, a rounded nose.
 
     Attributes:
-        core: mm, radius of the cone inside.
-        cone: mm, its height.
-        shoulder: mm, z where the wall ends and the edge begins.
-        edge: mm, the largest rounding, which sets into how many pieces the profiles are cut.
+        core: radius of the cone inside, mm.
+        cone: height of this cone, mm.
+        shoulder: z at which the wall ends and the edge begins, mm.
+        edge: largest rounding, mm, which determines the number of pieces of the profiles.
     """
 
     core: float
@@ -40,11 +40,11 @@ class TipShape:
     def of_family(
         position: float, radius: float, height: float, least_edge: float, cone: float
     ) -> TipShape:
-        """A member of the family from flat (0) over a hemisphere (0.5) to conical (1).
+        """Return a member of the family from flat (0) over a hemisphere (0.5) to conical (1).
 
         Halfway the core is a point. Towards both ends its radius grows evenly to `radius -
         least_edge`, and towards 1 its height grows evenly to `cone` (all mm). The points of a
-        profile of one normal so move on straight lines, as those of a mesh in a cage do.
+        profile with one normal therefore move on straight lines, like those of a mesh in a cage.
         """
         away = abs(2.0 * position - 1.0)
         core = (radius - least_edge) * away
@@ -54,19 +54,19 @@ class TipShape:
 
     @property
     def lean(self) -> float:
-        """Degrees by which the normal of the cone is raised from the horizontal; 90 is flat."""
+        """Angle of the cone's normal above the horizontal, degrees; 90 is flat."""
         return math.degrees(math.atan2(self.core, self.cone)) if self.cone > 0.0 else 90.0
 
     def profile(self, rounding: float, tessellation: float) -> NDArray[np.float64]:
-        """The curve that lies `rounding` (mm) outside the core.
+        """Return the curve that lies `rounding` (mm) outside the core.
 
         Args:
-            rounding: mm, above 0, `edge` at most.
-            tessellation: mm, about the length of a piece of the largest profile.
+            rounding: rounding radius, above 0, at most `edge`, mm.
+            tessellation: approximate length of a piece of the largest profile, mm.
 
         Returns:
-            (n, 2) r and z, mm, from the foot of the wall (core + rounding, 0) to the axis; n is
-            the same for all roundings, and so is the normal at each point.
+            r and z, (n, 2) mm, from the foot of the wall (core + rounding, 0) to the axis; n is the
+            same for all roundings, and so is the normal at each point.
         """
         lean = self.lean
         slant = math.hypot(self.core, self.cone)
@@ -90,9 +90,10 @@ class TipShape:
         return points
 
     def volume(self, rounding: float) -> float:
-        """mm^3 inside a profile, above z = 0, if it were not cut into pieces.
+        """Return the volume inside a smooth profile, above z = 0, mm^3.
 
-        By Steiner's formula for the body that is parallel to a cone, without its lower half.
+        It follows from Steiner's formula for the body that is parallel to a cone, without its lower
+        half.
         """
         lean = math.radians(self.lean)
         slant = math.hypot(self.core, self.cone)
@@ -105,7 +106,7 @@ class TipShape:
         return math.pi * ((self.core + rounding) ** 2 * self.shoulder + tip)
 
     def area(self, rounding: float) -> float:
-        """mm^2 of the surface of a profile (wall and tip, no bottom)."""
+        """Return the area of a smooth profile (wall and tip, no bottom), mm^2."""
         lean = math.radians(self.lean)
         slant = math.hypot(self.core, self.cone)
         tip = self.core * slant + 2.0 * (self.cone + self.core * lean) * rounding
@@ -115,6 +116,6 @@ class TipShape:
 def _between(
     start: NDArray[np.float64], end: NDArray[np.float64], pieces: int
 ) -> NDArray[np.float64]:
-    """Points from `start` on, without `end`: (pieces, 2)."""
+    """Return points from `start` on, without `end`, (pieces, 2)."""
     share = np.arange(pieces)[:, None] / pieces
     return np.asarray((1.0 - share) * start + share * end)

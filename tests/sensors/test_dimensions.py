@@ -36,4 +36,4 @@ def test_what_no_sensor_can_have(builder: Builder, given: dict[str, Any], messag
 
 def test_help_still_names_the_arguments() -> None:
     assert inspect.signature(sensors.gelsight_mini).parameters["gel_thickness"].default == 4.25
-    assert "gel_thickness: mm" in str(sensors.gelsight_mini.__doc__)
+    assert "gel_thickness: thickness of the gel, mm" in str(sensors.gelsight_mini.__doc__)

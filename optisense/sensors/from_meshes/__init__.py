@@ -1,7 +1,7 @@
-"""Designs made of the user's own CAD files: a recipe says which file is what.
+"""Designs made of the user's own CAD files, by a recipe that states the role of each file.
 
-`read_recipe` reads one, `guess_recipe` makes one for a folder of CAD files, `save_recipe` writes
-one, and `design_from_meshes` turns one into a design.
+`read_recipe` reads a recipe, `guess_recipe` makes one for a folder of CAD files, `save_recipe`
+writes one, and `design_from_meshes` turns one into a design.
 """
 
 from optisense.sensors.from_meshes.building import FromMeshes, design_from_meshes

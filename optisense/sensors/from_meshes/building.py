@@ -1,4 +1,6 @@
-"""The design of a recipe: its files are read, contacts settled, lights and camera placed."""
+"""Builder of the design of a recipe: it reads the files, closes contacts, and places lights and
+camera.
+"""
 
 from __future__ import annotations
 
@@ -48,11 +50,11 @@ USUAL_MATERIAL = {
 
 @dataclass
 class FromMeshes:
-    """A design made of CAD files.
+    """Design made of CAD files.
 
     Attributes:
-        design: ready to be saved and rendered.
-        notes: what was mended, moved, chosen or looks odd, a sentence each.
+        design: design, ready to be saved and rendered.
+        notes: repairs, moves, choices and unusual findings, one sentence each.
     """
 
     design: SensorDesign
@@ -66,9 +68,9 @@ def design_from_meshes(recipe: Recipe | str | Path) -> FromMeshes:
         recipe: a recipe, or the path of a recipe file.
 
     Raises:
-        SetupError: a STEP file, but the extra for it is missing.
-        MeshError: a file is missing or holds no fit shape; names the part, the place and what
-            to do in the CAD tool.
+        SetupError: a file is a STEP file, but the extra for it is missing.
+        MeshError: a file is missing or has no usable shape; the message names the part, the place
+            and the remedy in the CAD tool.
         DesignError: the recipe does not fit the shapes.
         LibraryError: a material, coating, light or camera is not in the library.
     """
@@ -79,7 +81,7 @@ def design_from_meshes(recipe: Recipe | str | Path) -> FromMeshes:
 
 
 class _Builder(RecipeState):
-    """The steps, in their order."""
+    """Steps of the construction, in their order."""
 
     def build(self) -> SensorDesign:
         materials = self._materials()
@@ -106,7 +108,7 @@ class _Builder(RecipeState):
     # ---- shapes
 
     def _read_parts(self) -> None:
-        """Every part that has a file of its own, mended."""
+        """Load and repair every part that has a file of its own."""
         parts = self.recipe.parts
         for name, part in parts.items():
             if part.file is not None:
@@ -139,7 +141,7 @@ class _Builder(RecipeState):
             self.provenance[f"parts.{name}"] = Provenance(status=Status.SOURCED, source=source)
 
     def _pick_faces(self) -> None:
-        """Parts that are faces of other parts, on the very same vertices."""
+        """Make the parts that are faces of other parts, on the same vertices."""
         for name, part in self.recipe.parts.items():
             if part.faces_of is not None:
                 self.meshes[name] = self._chosen(name, self.meshes[part.faces_of])
@@ -160,7 +162,7 @@ class _Builder(RecipeState):
             raise MeshError(error.message, where=self.label(name), hint=error.hint) from None
 
     def _lay_skins(self) -> None:
-        """Sensing surfaces on the faces of the gel, looking into it."""
+        """Lay the sensing surfaces on the faces of the gel, with normals into it."""
         gels = {n: self.meshes[n] for n in self.of(Role.ELASTOMER)}
         eye = self.recipe.camera.at
         seen_from = np.array(eye) if isinstance(eye, tuple) else None
@@ -178,7 +180,7 @@ class _Builder(RecipeState):
             if part.faces_of is None and gels:
                 skin, notes = lay_on_elastomer(name, skin, gels, self.recipe.join)
             if part.faces_of is not None:
-                skin = skin.flipped()  # a solid's faces look out of it
+                skin = skin.flipped()  # a solid's normals point out of it
             else:
                 skin, turned = look_inward(name, skin, self.solids(), seen_from)
                 notes += turned
@@ -192,7 +194,7 @@ class _Builder(RecipeState):
     # ---- the design
 
     def _materials(self) -> dict[str, Material]:
-        """The materials of all parts, from the library."""
+        """Return the materials of all parts, from the library."""
         used: dict[str, Material] = {}
         for name, part in self.recipe.parts.items():
             material = part.material or USUAL_MATERIAL.get(part.role)

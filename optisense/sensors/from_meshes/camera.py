@@ -19,17 +19,20 @@ from optisense.sensors.from_meshes.recipe import CameraChoice
 FloatArray = NDArray[np.float64]
 
 WIDTH = 320
-"""Pixels across a picture where the recipe gives no resolution; the height follows the camera."""
+"""Width of a picture if the recipe gives no resolution, pixels; the height follows the camera."""
 
 WIDEST_FIT = 100.0
-"""Degrees: a wider camera is placed as if it saw this much, so that its rim is not needed."""
+"""Largest field of view that is used to place a camera, degrees: a wider camera is placed as if it
+saw this much, so that its rim is not needed.
+"""
 
 CLEARANCE = 1.0
-"""mm that a camera placed by itself keeps from the parts behind which it stands."""
+"""Distance that an automatically placed camera keeps from the parts in front of it, mm."""
 
 LARGEST_STEP_BACK = 200.0
-"""Largest distance in mm that a camera placed by itself steps back in search of a view; no tactile
-sensor is longer."""
+"""Largest distance that an automatically placed camera steps back in search of a view, mm; no
+tactile sensor is longer.
+"""
 
 
 def make_camera(
@@ -39,18 +42,19 @@ def make_camera(
     target: FloatArray,
     parts: dict[str, TriangleMesh],
 ) -> Camera:
-    """The camera of a design.
+    """Return the camera of a design.
 
     Args:
-        choice: from the recipe.
-        skin: the sensing surface, looking inward, mm.
-        place: (3,) mm, of the pupil; None puts it behind the skin, which then fills the picture.
-        target: (3,) mm, what it looks at unless the choice has a direction.
-        parts: a camera that is placed by itself stands outside of these.
+        choice: choice of the recipe.
+        skin: sensing surface with inward normals, mm.
+        place: position of the pupil, (3,) mm; None puts it behind the skin, which then fills the
+            picture.
+        target: point that it looks at, (3,) mm, unless the choice has a direction.
+        parts: parts; an automatically placed camera is outside of these.
 
     Raises:
         LibraryError: there is no such camera.
-        DesignError: it looks at its own place, or `up` points where it looks.
+        DesignError: the camera looks at its own position, or `up` is the viewing direction.
     """
     model = library.camera(choice.model)
     width, height = choice.resolution or standard_resolution(model)
@@ -99,13 +103,15 @@ def make_camera(
 
 
 def standard_resolution(model: CameraModel) -> tuple[int, int]:
-    """WIDTH pixels across, in the camera's own shape of picture."""
+    """Return `WIDTH` pixels across, and the height by the camera's aspect ratio."""
     width, height = model.resolution
     return WIDTH, max(1, round(WIDTH * height / width))
 
 
 def upward(choice: CameraChoice, look: FloatArray) -> FloatArray:
-    """What points to the top of the picture: as chosen, else +y, or +z where that is ahead."""
+    """Return the direction to the top of the picture: as chosen, else +y, or +z if +y is near the
+    viewing direction.
+    """
     if choice.up is not None:
         return vector(choice.up)
     y, z = np.eye(3)[1], np.eye(3)[2]
@@ -113,11 +119,12 @@ def upward(choice: CameraChoice, look: FloatArray) -> FloatArray:
 
 
 def share_seen(camera: Camera, skin: TriangleMesh) -> tuple[float, float]:
-    """How much of a sensing surface a camera would see along straight lines, past all parts.
+    """Return the shares of a sensing surface and of the picture that a camera would see along
+    straight lines, ignoring other parts.
 
     Returns:
-        The share of its area that lies in the picture and faces the camera, and the share of the
-        picture's width or height (the larger) over which that spreads.
+        The share of the surface's area that lies in the picture and faces the camera, and the share
+        of the picture's width or height (the larger) that it covers.
     """
     centres, areas = skin.triangles.mean(axis=1), skin.face_areas
     way = centres - np.array(camera.position)
@@ -140,8 +147,8 @@ def _behind(
     aspect: float,
     parts: dict[str, TriangleMesh],
 ) -> FloatArray:
-    """The nearest place along `way` from the target from which all of the skin is in the picture,
-    outside of all parts.
+    """Return the nearest position along `way` from the target from which all of the skin is in the
+    picture, outside of all parts.
     """
     right = np.cross(-way, up)
     right /= np.linalg.norm(right)

@@ -1,4 +1,4 @@
-"""Directions as people write them: +x, -z, or three numbers."""
+"""Parser of directions: +x, -z, or three numbers."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _read(value: Any) -> Direction:
 
 
 def or_words(*words: str) -> PlainValidator:
-    """A validator for a direction or one of some words."""
+    """Return a validator for a direction or one of several words."""
 
     def read(value: Any) -> Direction:
         if isinstance(value, str) and value in words:
@@ -54,14 +54,14 @@ def _read_axis(value: Any) -> str:
 
 
 Way = Annotated[Direction, PlainValidator(_read)]
-"""+x, -x, +y, -y, +z, -z or three numbers."""
+"""Direction: +x, -x, +y, -y, +z, -z or three numbers."""
 
 Side = Annotated[str, PlainValidator(_read_axis)]
-"""+x, -x, +y, -y, +z or -z."""
+"""Direction along an axis: +x, -x, +y, -y, +z or -z."""
 
 
 def vector(way: Direction) -> FloatArray:
-    """(3,) the unit vector of a direction."""
+    """Return the unit vector (3,) of a direction."""
     if isinstance(way, str):
         axis, sign = axis_of(way)
         result = np.zeros(3)
@@ -72,16 +72,16 @@ def vector(way: Direction) -> FloatArray:
 
 
 def axis_of(side: str) -> tuple[int, float]:
-    """0, 1 or 2 for x, y or z; and 1.0 or -1.0."""
+    """Return 0, 1 or 2 for x, y or z, and the sign 1.0 or -1.0."""
     return "xyz".index(side[-1]), -1.0 if side.startswith("-") else 1.0
 
 
 def nearest_side(direction: FloatArray) -> str:
-    """The axis that a direction comes nearest to, such as -z."""
+    """Return the axis nearest to a direction, such as -z."""
     axis = int(np.argmax(np.abs(direction)))
     return ("-" if direction[axis] < 0.0 else "+") + "xyz"[axis]
 
 
 def said(way: Direction) -> str:
-    """A direction in a sentence."""
+    """Return a direction as text for a sentence."""
     return way if isinstance(way, str) else "({:g}, {:g}, {:g})".format(*way)

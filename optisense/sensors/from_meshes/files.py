@@ -1,4 +1,4 @@
-"""CAD files as meshes in millimetres, each read once; and whether their units can be right."""
+"""CAD files as meshes in millimetres, each read once, and a check of their units."""
 
 from __future__ import annotations
 
@@ -21,13 +21,17 @@ from optisense.untrusted_files import is_file, is_folder
 ALL_FORMATS = (*FORMATS, *STEP_FORMATS)
 
 SMALLEST, LARGEST = 4.0, 400.0
-"""mm: the largest dimension of a tactile sensor is between these."""
+"""Range of the largest dimension of a tactile sensor, mm; other sizes come from a wrong unit."""
 
 ODD_PART = 200.0
-"""A part so many times smaller or larger than the others is in another unit."""
+"""Ratio of sizes from which on a part that is smaller or larger than the others is taken to be in
+another unit.
+"""
 
 SMALL_PART = 15.0
-"""A part so many times smaller or larger than the others may be."""
+"""Ratio of sizes from which on a part that is smaller or larger than the others is reported, since
+it may be in another unit.
+"""
 
 
 COMMON_UNITS = tuple(unit for unit in MM_PER if unit != "mil")
@@ -36,13 +40,13 @@ COMMON_UNITS = tuple(unit for unit in MM_PER if unit != "mil")
 
 @dataclass(frozen=True)
 class Body:
-    """One body of a file.
+    """Body in a CAD file.
 
     Attributes:
-        file: as it was named.
-        name: of the body in a STEP file, else None.
-        mesh: in the file's own units; STEP files are in mm.
-        own_units: whether the file knows its units.
+        file: path as it was given.
+        name: name of the body in a STEP file, else None.
+        mesh: mesh in the file's own units; STEP files are in mm.
+        own_units: whether the file states its units.
     """
 
     file: str
@@ -52,18 +56,18 @@ class Body:
 
 
 class CadFiles:
-    """The CAD files of a recipe."""
+    """CAD files of a recipe."""
 
     def __init__(self, folder: Path) -> None:
-        """`folder`: what the paths of files start from."""
+        """Store `folder`, the base of the files' paths."""
         self._folder = folder
         self._read: dict[Path, list[Body]] = {}
 
     def bodies(self, file: str) -> list[Body]:
-        """All that is in a file; STEP files may hold several bodies, others hold one.
+        """Return all bodies in a file; STEP files may contain several, others contain one.
 
         Raises:
-            SetupError: a STEP file, but the extra for it is missing.
+            SetupError: the file is a STEP file, but the extra for it is missing.
             MeshError: the file is missing, of another format, malformed or empty.
         """
         path = self._folder / file
@@ -76,15 +80,15 @@ class CadFiles:
         return self._read[path]
 
     def load(self, shape: ShapeReference, units: str, where: str) -> TriangleMesh:
-        """The mesh of a shape that comes from a file, mm.
+        """Return the mesh of a shape that comes from a file, mm.
 
         Args:
-            units: of the files that don't know theirs and for which the shape gives none.
-            where: for messages, such as 'part gel (gel.stl)'.
+            units: unit of the files that don't state theirs and for which the shape gives none.
+            where: name for messages, such as 'part gel (gel.stl)'.
 
         Raises:
-            OptiSenseError: see `bodies`; or a STEP file has no such body, or several and none
-                is named.
+            OptiSenseError: see `bodies`; or a STEP file has no such body, or it has several and
+                none is named.
         """
         assert shape.file is not None
         bodies = self.bodies(shape.file)
@@ -151,33 +155,35 @@ def _named(bodies: list[Body], name: str | None, where: str) -> Body:
 
 
 def largest_dimension(meshes: Iterable[TriangleMesh]) -> float:
-    """mm: the longest side of the box around all meshes."""
+    """Return the longest side of the bounding box of all meshes, mm."""
     corners = np.array([mesh.bounds for mesh in meshes])
     return float((corners[:, 1].max(axis=0) - corners[:, 0].min(axis=0)).max())
 
 
 def likely_units(size: float) -> list[str]:
-    """The units in which a sensor whose largest dimension is the number `size` has a fair size."""
+    """Return the units in which a sensor whose largest dimension is the number `size` has a
+    plausible size.
+    """
     return [unit for unit in COMMON_UNITS if SMALLEST <= size * MM_PER[unit] <= LARGEST]
 
 
 def refuse_odd_units(
     meshes: dict[str, TriangleMesh], units: str | None, gels: Collection[str] = ()
 ) -> list[str]:
-    """Check whether the sizes of parts can be right.
+    """Check whether the sizes of parts are plausible.
 
     Args:
-        meshes: by where each is from, such as 'part gel (gel.stl)', mm; only of files that do
-            not know their units.
-        units: that were given; None where mm was taken for granted.
-        gels: those of `meshes` that are elastomers, which are as large as the sensor nearly.
+        meshes: meshes in mm by their origin, such as 'part gel (gel.stl)'; only of files that don't
+            state their units.
+        units: units that were given; None if mm was assumed.
+        gels: those of `meshes` that are elastomers, which are nearly as large as the sensor.
 
     Returns:
-        What looks odd, a sentence each.
+        Unusual findings, one sentence each.
 
     Raises:
         MeshError: the whole is too small or too large for a tactile sensor, or one part is far
-            smaller or larger than the others; says which units would do.
+            smaller or larger than the others; the message says which units would be plausible.
     """
     if not meshes:
         return []
@@ -202,10 +208,11 @@ def refuse_odd_units(
 
 
 def _odd_parts(meshes: dict[str, TriangleMesh], scale: float, gels: Collection[str]) -> list[str]:
-    """Tell parts that are much smaller or larger than the others, and refuse plain slips.
+    """Return notes on parts that are much smaller or larger than the others, and refuse obvious
+    errors.
 
     Args:
-        scale: mm in the unit of the files.
+        scale: length of the files' unit, mm.
         gels: see `refuse_odd_units`.
     """
     notes = []

@@ -1,6 +1,7 @@
-"""A first recipe for a folder of CAD files: what each is by its name, and usual lights and camera.
+"""First recipe for a folder of CAD files: roles by the names of files, and default lights and
+camera.
 
-What is guessed here is meant to be asked about or looked over; nothing is measured.
+The guesses are meant to be confirmed or reviewed by the user; nothing is measured.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, Shape
 from optisense.sensors.from_meshes.surfaces import WITHIN
 
 Use = Role | Literal["lights", "camera", "nothing"]
-"""The use of a body: a part of some role, a reference for lights or the camera, or none."""
+"""Use of a body: a part of some role, a reference for lights or the camera, or none."""
 
 WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
     ("lights", ("led", "leds", "light", "lights", "lamp", "lamps", "diode")),
@@ -52,24 +53,24 @@ WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
          "wall", "shell", "base", "mount", "holder", "black", "shade", "cap"),
     ),
 )  # fmt: skip
-"""Words in the names of parts, the ones that count first in front."""
+"""Words in the names of parts by use; those listed first take precedence."""
 
 LIGHT, CAMERA = "smd-3528", "pi-v2"
-"""Entries of the library that are taken where nothing is said."""
+"""Default light and camera of the library."""
 
 LED_PITCH = 4.5
-"""mm between guessed LEDs; a 3528 is 3.5 mm long."""
+"""Distance between guessed LEDs, mm; a 3528 is 3.5 mm long."""
 
 
 @dataclass(frozen=True)
 class CadBody:
-    """A body in the user's CAD files.
+    """Body in the user's CAD files.
 
     Attributes:
-        name: for a part of the design, made of the body's or file's name.
-        file: its path from the folder of the recipe.
-        body: what was read; its mesh is in the file's own units.
-        use: what it probably is.
+        name: name for a part of the design, made of the body's or file's name.
+        file: path of the file from the folder of the recipe.
+        body: body that was read; its mesh is in the file's own units.
+        use: probable use.
     """
 
     name: str
@@ -79,11 +80,11 @@ class CadBody:
 
     @property
     def shape(self) -> ShapeReference:
-        """How a recipe refers to it."""
+        """Reference to the body in a recipe."""
         return ShapeReference(file=self.file, solid=self.body.name)
 
     def mesh(self, units: Units | None) -> TriangleMesh:
-        """It in mm, where files that don't know their units are in `units` (mm if None)."""
+        """Return its mesh in mm; `units` is that of files that don't state theirs (mm if None)."""
         if self.body.own_units:
             return self.body.mesh
         scale = MM_PER[units or "mm"]
@@ -91,14 +92,14 @@ class CadBody:
 
 
 def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
-    """All bodies of a CAD file, or of the CAD files in a folder.
+    """Return all bodies of a CAD file, or of the CAD files in a folder.
 
     Args:
-        source: the file or folder.
+        source: file or folder.
         chosen: names of files in the folder; all CAD files there if none is given.
 
     Raises:
-        SetupError: a STEP file, but the extra for it is missing.
+        SetupError: a file is a STEP file, but the extra for it is missing.
         MeshError: there is no CAD file, or one can't be read.
     """
     folder = source if source.is_dir() else source.parent
@@ -126,7 +127,7 @@ def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
 
 
 def guess_use(name: str) -> Use | None:
-    """What a body probably is, by the words in its name; None where they say nothing."""
+    """Return the probable use of a body by the words in its name, or None if they don't tell."""
     words = set(re.split(r"[^a-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower()))
     for use, signs in WORDS:
         if words & set(signs):
@@ -135,7 +136,9 @@ def guess_use(name: str) -> Use | None:
 
 
 def guess_units(found: Iterable[CadBody]) -> Units | None:
-    """The only unit in which the files have a fair size, where mm is plainly not it; else None."""
+    """Return the only unit in which the files have a plausible size, if that is not mm; else
+    None.
+    """
     meshes = [each.body.mesh for each in found if not each.body.own_units]
     if not meshes:
         return None
@@ -145,11 +148,12 @@ def guess_units(found: Iterable[CadBody]) -> Units | None:
 
 
 def guess_outward(meshes: dict[str, TriangleMesh], carrier: str) -> str:
-    """Where the sensor is touched, such as +z: away from what lies behind the gel.
+    """Return the side on which the sensor is touched, such as +z: away from the parts behind the
+    gel.
 
     Args:
-        meshes: all bodies, by name, mm.
-        carrier: the one that carries the coating.
+        meshes: meshes of all bodies, by name, mm.
+        carrier: name of the one that carries the coating.
     """
     own = meshes[carrier]
     others = [mesh.bounds.mean(axis=0) for name, mesh in meshes.items() if name != carrier]
@@ -162,11 +166,12 @@ def guess_outward(meshes: dict[str, TriangleMesh], carrier: str) -> str:
 
 
 def guess_recipe(source: str | Path, units: Units | None = None) -> Recipe:
-    """A recipe for a CAD file, or the CAD files in a folder, to look over and change.
+    """Return a recipe for a CAD file, or the CAD files in a folder, for the user to review and
+    change.
 
     Args:
-        source: the file or folder; the recipe names files from its folder.
-        units: of the files that don't know theirs; None means mm, or the only unit that fits.
+        source: file or folder; the recipe names files relative to the folder.
+        units: unit of the files that don't state theirs; None means mm, or the only plausible unit.
 
     Raises:
         SetupError, MeshError: see `find_bodies`; or no body can carry the coating.
@@ -181,13 +186,13 @@ def recipe_of(
     units: Units | None = None,
     uses: Mapping[str, Use] | None = None,
 ) -> Recipe:
-    """A recipe for bodies that were read, with usual lights and a usual camera.
+    """Return a recipe for bodies that were read, with default lights and a default camera.
 
     Args:
-        bodies: of `find_bodies`.
-        source: the file or folder that they were found in.
-        units: of the files that don't know theirs; None means mm, or the only unit that fits.
-        uses: what bodies are by their names, where that is known better than it was guessed.
+        bodies: bodies from `find_bodies`.
+        source: file or folder in which they were found.
+        units: unit of the files that don't state theirs; None means mm, or the only plausible unit.
+        uses: uses of bodies by their names, where they are known better than by guessing.
 
     Raises:
         MeshError: no body can carry the coating.
@@ -235,20 +240,22 @@ def recipe_of(
 
 
 def usual_name(source: Path) -> str:
-    """What a sensor is called after its file or folder."""
+    """Return the name of a sensor after its file or folder."""
     path = source.resolve()
     return (path.name if source.is_dir() else path.stem)[:200] or "sensor"
 
 
 def part_of(found: CadBody, role: Role, material: str | None = None) -> PartChoice:
-    """A body as a part of the recipe."""
+    """Return a body as a part of the recipe."""
     return PartChoice(file=found.file, solid=found.body.name, role=role, material=material)
 
 
 def insert_skin(
     parts: dict[str, PartChoice], name: str, carrier: str, outward: str, tangent: bool = False
 ) -> dict[str, PartChoice]:
-    """The parts with a sensing surface on the outer faces of one of them, behind it."""
+    """Return the parts with a sensing surface on the outer faces of one of them, inserted behind
+    it.
+    """
     skin = PartChoice(
         faces_of=carrier,
         towards=outward,
@@ -264,7 +271,9 @@ def insert_skin(
 
 
 def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightChoice:
-    """A light on each face of a reference that looks to the gel; its colour by its name."""
+    """Return a light on each face of a reference that points to the gel; its colour is taken from
+    its name.
+    """
     side = nearest_side(gel.bounds.mean(axis=0) - mesh.bounds.mean(axis=0))
     colour = next(
         (c for c in ("red", "green", "blue", "white") if c in found.name.lower()), "white"
@@ -277,7 +286,7 @@ def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightC
 
 
 def lights_around(part: str, mesh: TriangleMesh, outward: str) -> dict[str, LightChoice]:
-    """Rows of red, green and blue lights along three sides of a part's box."""
+    """Return rows of red, green and blue lights along three sides of a part's box."""
     across = [axis for axis in "xyz" if axis != outward[-1]]
     size = dict(zip("xyz", np.ptp(mesh.bounds, axis=0), strict=True))
     across.sort(key=lambda axis: -size[axis])
@@ -292,13 +301,13 @@ def lights_around(part: str, mesh: TriangleMesh, outward: str) -> dict[str, Ligh
 
 
 def _as_name(text: str) -> str:
-    """Letters, digits, - and _ only, as the parts of a design are named."""
+    """Return a text with letters, digits, - and _ only, as names of parts require."""
     name = re.sub(r"[^A-Za-z0-9_-]+", "-", text).strip("-_")[:64]
     return name or "part"
 
 
 def _fresh(name: str, taken: Iterable[str]) -> str:
-    """The name, numbered where it is taken (names on disk don't tell A from a)."""
+    """Return the name, with a number if it is taken (file systems may not distinguish A from a)."""
     known = {each.casefold() for each in taken}
     result, number = name, 2
     while result.casefold() in known:

@@ -16,17 +16,17 @@ from optisense.sensors.from_meshes.recipe_lights import LightRow, Over, Ring
 FloatArray = NDArray[np.float64]
 
 FLAT = 1e-4
-"""mm: a reference surface that deviates less from a plane is flat."""
+"""Largest deviation from a plane of a reference surface that counts as flat, mm."""
 
 SPREAD = 0.2
-"""Shorter than this, the mean of a surface's normals says nothing about where it looks."""
+"""Smallest length of the mean of a surface's unit normals that defines its direction."""
 
 
 def row(choice: LightRow, bounds: FloatArray) -> list[Light]:
-    """Lights along one side of a box, their middle over the middle of the side.
+    """Return lights along one side of a box, centred on the side.
 
     Args:
-        bounds: (2, 3) mm, lower and upper corner.
+        bounds: lower and upper corner, (2, 3) mm.
     """
     across, sign = axis_of(choice.side)
     along = axis_along(choice, bounds)
@@ -44,10 +44,10 @@ def row(choice: LightRow, bounds: FloatArray) -> list[Light]:
 
 
 def axis_along(choice: LightRow, bounds: FloatArray) -> int:
-    """0, 1 or 2: the axis along which a row runs at its side of a box (2, 3).
+    """Return the axis, 0, 1 or 2, along which a row runs at its side of a box (2, 3).
 
     Raises:
-        DesignError: it is told to run into its own side.
+        DesignError: the given axis points into the side itself.
     """
     across, _ = axis_of(choice.side)
     others = [axis for axis in range(3) if axis != across]
@@ -64,13 +64,13 @@ def axis_along(choice: LightRow, bounds: FloatArray) -> int:
 
 
 def ring(choice: Ring, bounds: FloatArray) -> list[Light]:
-    """Lights in a circle, or evenly over an arc with one at each end.
+    """Return lights in a circle, or evenly over an arc with one at each end.
 
-    Angles count from the axis after the circle's own (x, y, z, x ...), anticlockwise seen from
-    where the axis points to.
+    Angles count from the axis after the circle's own (x, y, z, x ...), anticlockwise seen from the
+    direction of the axis.
 
     Args:
-        bounds: (2, 3) mm, of the part.
+        bounds: bounds of the part, (2, 3) mm.
     """
     axis, sign = axis_of(choice.axis)
     first, second = np.eye(3)[(axis + 1) % 3], sign * np.eye(3)[(axis + 2) % 3]
@@ -96,18 +96,19 @@ def ring(choice: Ring, bounds: FloatArray) -> list[Light]:
 
 
 def over(choice: Over, mesh: TriangleMesh, patches: list[Faces], where: str) -> list[Light]:
-    """Lights over a surface: one on the middle of each patch, or a row or grid on the largest.
+    """Return lights over a surface: one on the middle of each patch, or a row or grid on the
+    largest.
 
     A grid follows the longer side of the surface's outline; on a curved surface its pitch is
     measured along the surface.
 
     Args:
-        mesh: the reference surface, welded, mm.
-        patches: its chosen faces.
-        where: for messages.
+        mesh: reference surface, welded, mm.
+        patches: chosen faces, by patch.
+        where: name for messages.
 
     Raises:
-        DesignError: lights fall off the surface, or it looks everywhere at once.
+        DesignError: lights fall off the surface, or its normals point in all directions.
     """
     if choice.count is None:
         groups = patches if choice.patches != "largest" else patches[:1]
@@ -127,13 +128,15 @@ def over(choice: Over, mesh: TriangleMesh, patches: list[Faces], where: str) -> 
 
 
 def evenly(count: int, pitch: float | None, length: float) -> FloatArray:
-    """(count,) mm: places about 0; without a pitch, each in the middle of its share of `length`."""
+    """Return positions (count,) about 0, mm; without a pitch, each is in the middle of its share of
+    `length`.
+    """
     step = pitch if pitch is not None else length / count
     return np.asarray((np.arange(count) - 0.5 * (count - 1)) * step)
 
 
 def light(place: FloatArray, way: FloatArray, up: FloatArray) -> Light:
-    """A light with rounded numbers, which make a design easier to read."""
+    """Return a light with rounded numbers, which make a design easier to read."""
     clean = [np.round(v, 6) + 0.0 for v in (place, way, up)]
     (px, py, pz), (dx, dy, dz), (ux, uy, uz) = (v.tolist() for v in clean)
     parallel = np.linalg.norm(np.cross(way, up)) < 1e-6
@@ -151,7 +154,7 @@ def _direction(given: Direction, normal: FloatArray) -> FloatArray:
 def _grid(
     choice: Over, mesh: TriangleMesh, patch: Faces, where: str
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Place and normal of each light of a row or grid."""
+    """Return position and normal of each light of a row or grid."""
     along, across, normal, outline = _frame(mesh, patch, where)
     count = choice.count if isinstance(choice.count, tuple) else (choice.count or 1, 1)
     pitch = choice.pitch if isinstance(choice.pitch, tuple) else (choice.pitch, choice.pitch)
@@ -186,7 +189,7 @@ def _on_curve(
     rows: FloatArray,
     where: str,
 ) -> list[tuple[FloatArray, FloatArray]]:
-    """Place lights as on a flat surface, but with distances that run along the surface."""
+    """Return lights as on a flat surface, but with distances measured along the surface."""
     surface = SensingSurface(mesh.with_faces(mesh.faces[patch]).compacted(), centre, along, across)
     spots = []
     for v in rows:
@@ -222,8 +225,8 @@ def _mean_direction(mesh: TriangleMesh, patch: Faces, where: str) -> FloatArray:
 def _frame(
     mesh: TriangleMesh, patch: Faces, where: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[FloatArray, FloatArray]]:
-    """Unit vectors along the longer and the shorter side of a surface, its normal, and the
-    middle (3,) and the size (2,) mm of its outline.
+    """Return unit vectors along the longer and the shorter side of a surface, its normal, and the
+    middle (3,) and the size (2,) of its outline, mm.
     """
     normal = _mean_direction(mesh, patch, where)
     points = mesh.vertices[np.unique(mesh.faces[patch])]
@@ -236,7 +239,7 @@ def _frame(
     sides = np.diff(corners[:3], axis=0)
     lengths = np.linalg.norm(sides, axis=1)
     directions = [(s[0] * x + s[1] * y) / n for s, n in zip(sides, lengths, strict=True)]
-    if abs(lengths[0] - lengths[1]) < 1e-3 * lengths.max():  # a square: as x, y, z are named
+    if abs(lengths[0] - lengths[1]) < 1e-3 * lengths.max():  # a square: in the order x, y, z
         order = sorted((0, 1), key=lambda k: int(np.argmax(np.abs(directions[k]))))
     else:
         order = sorted((0, 1), key=lambda k: -lengths[k])

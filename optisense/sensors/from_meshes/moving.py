@@ -1,4 +1,4 @@
-"""Parts that were drawn in frames of their own, put into that of the sensor."""
+"""Transforms of parts that were drawn in frames of their own into the frame of the sensor."""
 
 from __future__ import annotations
 
@@ -15,11 +15,13 @@ from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReferenc
 FloatArray = NDArray[np.float64]
 
 IN_PLANE = 1e-3
-"""mm: vertices so near to the outermost plane of a part are on its flat face there."""
+"""Largest distance of vertices from the outermost plane of a part that count as on its flat face,
+mm.
+"""
 
 
 def posed(mesh: TriangleMesh, shape: ShapeReference) -> TriangleMesh:
-    """A file's mesh, mirrored, turned and moved as the recipe says, in this order.
+    """Return a file's mesh, mirrored, turned and moved by the recipe, in this order.
 
     A part that lies on another one is moved from there; see `laid_on`.
     """
@@ -35,7 +37,7 @@ def posed(mesh: TriangleMesh, shape: ShapeReference) -> TriangleMesh:
 
 
 def rotation(degrees: tuple[float, float, float]) -> FloatArray:
-    """(3, 3): a turn about x, then about y, then about z, of a frame that stands still.
+    """Return the matrix (3, 3) of rotations about x, then y, then z of a fixed frame.
 
     Quarter turns are exact, so that flat faces stay in the planes of the axes.
     """
@@ -53,10 +55,10 @@ def rotation(degrees: tuple[float, float, float]) -> FloatArray:
 
 
 def resting_order(parts: Mapping[str, PartChoice]) -> list[str]:
-    """The parts that lie on others, each after the one it lies on.
+    """Return the parts that lie on others, each after the one that it lies on.
 
     Raises:
-        DesignError: two lie on one another, or a part lies on faces of another.
+        DesignError: two parts lie on one another, or a part lies on faces of another.
     """
     order: list[str] = []
     for name in (each for each, part in parts.items() if part.on is not None):
@@ -82,16 +84,16 @@ def resting_order(parts: Mapping[str, PartChoice]) -> list[str]:
 
 
 def laid_on(mesh: TriangleMesh, below: TriangleMesh, part: PartChoice) -> TriangleMesh:
-    """A part moved onto the side of another one.
+    """Return a part moved onto the side of another one.
 
-    Its flat face there (or what is outermost) meets that of the other part, `gap` mm off. Across,
-    the middles of the two faces agree, or their ends where `flush` names a side. `move` counts
-    from there.
+    Its flat face there (or its outermost points) meets that of the other part, at a distance of
+    `gap` mm. In the plane of the side, the middles of the two faces agree, or their ends if `flush`
+    names a side. `move` is added to this.
 
     Args:
-        mesh: mm; mirrored and turned.
-        below: mm.
-        part: says how.
+        mesh: mesh of the part, mm, mirrored and turned.
+        below: mesh of the other part, mm.
+        part: choice of the recipe, with side, gap and flush sides.
     """
     axis, sign = axis_of(part.side or "+z")
     own, other = _end(mesh, axis, -sign), _end(below, axis, sign)
@@ -105,9 +107,10 @@ def laid_on(mesh: TriangleMesh, below: TriangleMesh, part: PartChoice) -> Triang
 
 
 def _end(mesh: TriangleMesh, axis: int, sign: float) -> FloatArray:
-    """(2, 3) mm: the box around what is outermost along an axis; along it, both are the end.
+    """Return the box around the outermost face along an axis, (2, 3) mm; along the axis, both
+    corners are at the end.
 
-    It is the box of the whole part where the end is no face but a point or an edge.
+    It is the box of the whole part if the end is a point or an edge.
     """
     low, high = mesh.bounds
     end = high[axis] if sign > 0 else low[axis]

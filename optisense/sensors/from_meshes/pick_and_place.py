@@ -1,7 +1,8 @@
-"""Reading where parts are on a board: pick-and-place files of KiCad, Altium, EasyEDA and others.
+"""Reader of positions of parts on a board: pick-and-place files of KiCad, Altium, EasyEDA and
+others.
 
-Columns are found by their names, so that it does not matter which program wrote the file. Lengths
-are in mm here.
+Columns are found by their names, so that any program can have written the file. Lengths are
+converted to mm.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ NAMES = {
     "rotation": ("rotation", "rot", "angle", "orientation"),
     "side": ("side", "layer", "tb", "boardside"),
 }
-"""Names of columns in lower case, without units and signs; the first that a file has counts."""
+"""Names of columns in lower case, without units and signs; the first that a file has is used."""
 
 NEEDED = ("designator", "x", "y")
 
@@ -33,12 +34,12 @@ _SAYS_UNIT = re.compile(r"unit", re.IGNORECASE)
 
 @dataclass(frozen=True)
 class BoardPart:
-    """A part on a board.
+    """Part on a board.
 
     Attributes:
-        designator: its name, such as D1.
-        x, y: mm, in the file's frame.
-        rotation: degrees, anticlockwise.
+        designator: name of the part, such as D1.
+        x, y: position in the file's frame, mm.
+        rotation: rotation, degrees, anticlockwise.
         bottom: whether it is on the board's lower side.
     """
 
@@ -50,15 +51,15 @@ class BoardPart:
 
 
 def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, BoardPart]:
-    """The parts of a pick-and-place file, by designator.
+    """Return the parts of a pick-and-place file, by designator.
 
     Args:
-        path: a table with commas, semicolons, tabs or blanks, as UTF-8 or UTF-16.
-        units: of its lengths, where it does not say.
+        path: table with commas, semicolons, tabs or blanks, as UTF-8 or UTF-16.
+        units: unit of its lengths, if the file does not state it.
 
     Raises:
-        DesignError: it is missing, has no such columns, does not say its unit, or a line holds no
-            numbers; says the line.
+        DesignError: the file is missing, lacks the columns or its unit, or a line has no numbers;
+            the message names the line.
     """
     lines = _lines(path)
     for number, line in enumerate(lines):
@@ -88,7 +89,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def _cells(line: str, delimiter: str | None) -> list[str]:
-    """The cells of a line; without a delimiter, blanks part them."""
+    """Return the cells of a line; without a delimiter, blanks separate them."""
     if delimiter is None:
         found = re.findall(r'"[^"]*"|\S+', line)
         return [cell.strip('"') for cell in found]
@@ -101,7 +102,7 @@ def _column(head: list[str], key: str) -> int | None:
 
 
 def _unit(head: list[str], columns: dict[str, int | None], before: list[str]) -> str | None:
-    """The unit that the head of the x column, or a line above that speaks of units, names."""
+    """Return the unit in the head of the x column, or in a line above that mentions units."""
     x = columns["x"]
     assert x is not None  # a file without it is refused
     told = [head[x].replace("_", " ")] + [line for line in before if _SAYS_UNIT.search(line)]
@@ -133,7 +134,7 @@ def _placed(
 
 
 def _length(text: str, unit: str | None, path: Path, number: int) -> float:
-    """mm."""
+    """Return a length in mm."""
     match = _NUMBER.match(text)
     if match is None:
         raise DesignError(

@@ -1,4 +1,4 @@
-"""The lights and the camera of a recipe, put into place."""
+"""Placement of the lights and the camera of a recipe."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ LITTLE_SEEN = 0.5
 
 
 def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGroup:
-    """A light group, each of its lights in place.
+    """Return a light group with each of its lights in place.
 
     Raises:
-        DesignError: a light falls off its surface, or a row or ring can't be made.
+        DesignError: a light falls off its surface, or a row or ring is impossible.
         LibraryError: the library lacks its model.
     """
     where = bench.recipe.where("lights", name)
@@ -81,7 +81,7 @@ def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGro
 
 
 def _note_beyond(bench: RecipeState, name: str, group: LightGroup, row: LightRow) -> None:
-    """Tell a row that is longer than the side it stands at."""
+    """Note if a row is longer than the side at which it stands."""
     part = row.part
     low, high = bench.meshes[part].bounds
     places = np.array([light.position for light in group.lights])
@@ -95,7 +95,7 @@ def _note_beyond(bench: RecipeState, name: str, group: LightGroup, row: LightRow
 
 
 def _note_crowded(bench: RecipeState, name: str, group: LightGroup) -> None:
-    """Tell lights that stand closer than their bodies are wide."""
+    """Note if lights are closer than their bodies are wide."""
     package = getattr(library.entry("light", group.model), "package", None)
     if package is None or len(group.lights) < 2:
         return
@@ -109,10 +109,10 @@ def _note_crowded(bench: RecipeState, name: str, group: LightGroup) -> None:
 
 
 def place_camera(bench: RecipeState) -> Camera:
-    """The camera; warns when it sees little of the sensing surface.
+    """Return the camera, with a warning if it sees little of the sensing surface.
 
     Raises:
-        DesignError: it can't look there.
+        DesignError: the camera can't be placed or aimed like this.
         LibraryError: the library lacks its model.
     """
     choice = bench.recipe.camera
@@ -161,10 +161,11 @@ def place_camera(bench: RecipeState) -> Camera:
 
 
 def check_places(bench: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:
-    """No camera and no light may lie in a face; those inside a transparent solid give a warning.
+    """Check that no camera and no light lies in a face; those inside a transparent solid give a
+    warning.
 
     Raises:
-        DesignError: one lies in a face.
+        DesignError: a camera or light lies in a face.
     """
     places = [("the camera", np.array(camera.position))]
     for name, group in groups.items():

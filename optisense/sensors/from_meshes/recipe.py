@@ -1,7 +1,7 @@
-"""The recipe of a sensor from CAD files: which file is what, and where lights and camera go.
+"""Recipe of a sensor from CAD files: the role of each file, and the placement of lights and camera.
 
-A recipe is a small YAML file, made by `optisense new --from-meshes` or by hand. Nothing here
-reads a mesh.
+A recipe is a small YAML file, made by `optisense new --from-meshes` or by hand. This module reads
+no mesh.
 """
 
 from __future__ import annotations
@@ -32,12 +32,13 @@ from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReferenc
 Pixels = Annotated[Count, Field(le=65_536)]
 
 SMALLEST_FOV = 0.1
-"""Degrees: of a camera whose place is to be found; one of a smaller field of view would stand half
-a kilometre away from the skin."""
+"""Smallest field of view of a camera whose position is to be found, degrees; one with a smaller
+field of view would stand half a kilometre away from the skin.
+"""
 
 
 class CameraChoice(Model):
-    """The camera and where it is."""
+    """Camera of a recipe and its placement."""
 
     model: Name = Field(description="camera of the library")
     at: Vector | ShapeReference | None = Field(
@@ -65,7 +66,7 @@ class CameraChoice(Model):
 
 
 class Recipe(Model):
-    """A recipe that makes a sensor from CAD files.
+    """Recipe that makes a sensor from CAD files.
 
     Lengths are in mm, angles in degrees, powers in mW.
     """
@@ -115,7 +116,7 @@ class Recipe(Model):
         return self
 
     def _named_parts(self) -> list[tuple[tuple[str | int, ...], str]]:
-        """Where parts are named, and their names."""
+        """Return the places of references to parts, and the names of the parts."""
         named: list[tuple[tuple[str | int, ...], str]] = []
         for name, part in self.parts.items():
             if part.faces_of is not None:
@@ -141,16 +142,18 @@ class Recipe(Model):
 
     @property
     def folder(self) -> Path:
-        """What the paths of files start from."""
+        """Folder that the paths of files are relative to."""
         return self._folder
 
     def relative_to(self, folder: Path) -> Recipe:
-        """The same recipe with paths that start from this folder."""
+        """Set the folder that the paths are relative to, and return the recipe."""
         self._folder = folder
         return self
 
     def where(self, *path: str | int) -> str:
-        """File and line of a value when the recipe was read from a file, else its dotted path."""
+        """Return file and line of a value if the recipe was read from a file, else its dotted
+        path.
+        """
         for length in range(len(path), -1, -1):
             if path[:length] in self._lines:
                 return f"{self._source}:{self._lines[path[:length]]}"
@@ -158,11 +161,11 @@ class Recipe(Model):
 
 
 def read_recipe(path: str | Path) -> Recipe:
-    """Read a recipe file; the paths in it start from its folder.
+    """Read a recipe file; the paths in it are relative to its folder.
 
     Raises:
-        DesignError: it is missing, not YAML, or a field is missing, misspelt or out of range;
-            says file and line.
+        DesignError: the file is missing, not YAML, or a field is missing, misspelt or out of range;
+            the message names file and line.
     """
     path = Path(path)
     data, lines = read_yaml(path, DesignError)

@@ -14,7 +14,7 @@ from optisense.sensors.from_meshes.directions import Direction, Side, Way, or_wo
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference, Turn, Units
 
 MOST_LIGHTS = 10_000
-"""Largest number of lights in a group; a larger one is a slip, for instance a pitch in metres."""
+"""Largest number of lights in a group; a larger one is an error, for example a pitch in metres."""
 
 Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
 
@@ -35,7 +35,7 @@ def _colour(value: Any) -> str | tuple[float, float, float]:
 
 
 def _one_or_two(least: float, whole: bool, form: str) -> PlainValidator:
-    """A validator for a number or a list of two, each at least (whole) or above `least`."""
+    """Return a validator for a number or a list of two, each at least (whole) or above `least`."""
     kinds = int if whole else int | float
 
     def fits(value: Any) -> bool:
@@ -203,7 +203,7 @@ WAYS = ("row", "ring", "over", "along", "from", "at")
 
 
 class LightChoice(Model):
-    """A light group and how its lights are placed: give one of `WAYS`."""
+    """Light group of a recipe, placed in one of `WAYS`."""
 
     model_config = ConfigDict(validate_by_name=True, serialize_by_alias=True)
 

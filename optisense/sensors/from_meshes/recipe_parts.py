@@ -29,7 +29,7 @@ Turns = tuple[Turn, Turn, Turn]
 
 
 class ShapeReference(Model):
-    """A shape: a file, or faces of another part."""
+    """Shape of a recipe: a file, or faces of another part."""
 
     file: str | None = Field(default=None, description="OBJ, STL, PLY or STEP")
     solid: str | None = Field(default=None, description="which body of a STEP file")
@@ -71,7 +71,7 @@ class ShapeReference(Model):
 
 
 class PartChoice(ShapeReference):
-    """A part of the sensor."""
+    """Part of the sensor in a recipe."""
 
     role: Role = Field(description="; ".join(role.value for role in Role))
     material: Name | None = Field(default=None, description="of the library")

@@ -1,4 +1,4 @@
-"""The state that the steps from a recipe to a design share."""
+"""State that the steps from a recipe to a design share."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 
 
 class RecipeState:
-    """A recipe, and what has come of it so far.
+    """Recipe, and the results of the steps so far.
 
     Attributes:
-        recipe: what is made.
+        recipe: recipe of the design.
         files: its CAD files.
-        meshes: of the parts, mm.
-        provenance: where numbers come from, by dotted path.
-        notes: what was mended, moved, chosen or looks odd, a sentence each.
+        meshes: meshes of the parts, mm.
+        provenance: sources of numbers, by dotted path.
+        notes: repairs, moves, choices and unusual findings, one sentence each.
     """
 
     def __init__(self, recipe: Recipe) -> None:
@@ -32,7 +32,7 @@ class RecipeState:
         self.notes: list[str] = []
 
     def load(self, shape: ShapeReference, where: str) -> TriangleMesh:
-        """The mesh of a file in its place, mm; an error also says which shape it is for."""
+        """Return the mesh of a file in its final position, mm; errors name the shape."""
         try:
             return posed(self.files.load(shape, self.recipe.units or "mm", where), shape)
         except MeshError as error:
@@ -40,7 +40,7 @@ class RecipeState:
             raise MeshError(error.message, where=place, hint=error.hint) from None
 
     def known(self, kind: str, name: str, *path: str) -> None:
-        """Look an entry of the library up, so that the recipe's line is told if it lacks it."""
+        """Check that the library has an entry; the error names the recipe's line."""
         try:
             library.entry(kind, name)
         except LibraryError as error:
@@ -48,16 +48,16 @@ class RecipeState:
             raise LibraryError(error.message, where=where, hint=error.hint) from None
 
     def label(self, name: str) -> str:
-        """A part in messages: its name and its file."""
+        """Return a part's name and file for messages."""
         part = self.recipe.parts[name]
         return f"part {name} ({part.file or f'faces of {part.faces_of}'})"
 
     def of(self, role: Role) -> list[str]:
-        """The names of the parts of a role."""
+        """Return the names of the parts with a role."""
         return [name for name, part in self.recipe.parts.items() if part.role is role]
 
     def solids(self) -> dict[str, TriangleMesh]:
-        """The transparent solids by name, rigid ones first."""
+        """Return the transparent solids by name, rigid ones first."""
         return {
             name: self.meshes[name]
             for role in (Role.SUPPORT, Role.ELASTOMER)
@@ -66,7 +66,7 @@ class RecipeState:
         }
 
     def reference(self, shape: ShapeReference, where: str) -> TriangleMesh:
-        """The mesh that lights or the camera refer to, welded."""
+        """Return the mesh that lights or the camera refer to, welded."""
         if shape.faces_of is not None:
             return self.meshes[shape.faces_of]
         mesh, _ = repaired(self.load(shape, where), where, closed=False)

@@ -1,4 +1,4 @@
-"""Writing a recipe, so that a sensor can be made of its CAD files again."""
+"""Writer of a recipe, so that a sensor can be made of its CAD files again."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.writing import write_text
 
 RECIPE_FILE = "recipe.yaml"
-"""The file name of a design's recipe in its folder."""
+"""File name of a design's recipe in its folder."""
 
 HEAD = "How a sensor is made of CAD files. Lengths in mm, angles in degrees, powers in mW."
 
 
 def save_recipe(recipe: Recipe, path: str | Path) -> None:
-    """Write a recipe with a comment on each line; its files are named from its new place.
+    """Write a recipe with a comment on each line; paths of files become relative to its new place.
 
     The file is written whole under a temporary name and then renamed.
 
     Raises:
-        OutputError: it can't be written.
+        OutputError: the file can't be written.
     """
     path = Path(path)
     moved = recipe.model_copy(deep=True)
@@ -34,7 +34,7 @@ def save_recipe(recipe: Recipe, path: str | Path) -> None:
 
 
 def _with_files(recipe: Recipe) -> list[ShapeReference | FromTable]:
-    """All that a recipe may take from files."""
+    """Return all objects of a recipe that may name files."""
     shapes: list[ShapeReference | FromTable] = list(recipe.parts.values())
     shapes += [group.table for group in recipe.lights.values() if group.table is not None]
     shapes += [group.over for group in recipe.lights.values() if group.over is not None]
@@ -44,7 +44,9 @@ def _with_files(recipe: Recipe) -> list[ShapeReference | FromTable]:
 
 
 def _from(file: Path, folder: Path) -> str:
-    """A file's path from a folder; in full where no such path leads to it (another drive)."""
+    """Return a file's path relative to a folder, or the absolute path if there is none (another
+    drive).
+    """
     try:
         return Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder))).as_posix()
     except ValueError:

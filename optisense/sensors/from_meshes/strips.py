@@ -1,4 +1,4 @@
-"""Lights along the outline of a part, and lights where a pick-and-place file puts them."""
+"""Lights along the outline of a part, and lights at the positions of a pick-and-place file."""
 
 from __future__ import annotations
 
@@ -20,21 +20,22 @@ from optisense.sensors.from_meshes.recipe_lights import Along, FromTable
 FloatArray = NDArray[np.float64]
 
 ROUND = 30.0
-"""Degrees: sides of an outline that bend less are pieces of a curve, and lights on them look as on
-the curve."""
+"""Largest angle between sides of an outline that count as pieces of a curve, degrees; lights on
+them point as on the curve.
+"""
 
 MISFIT = 0.2
-"""mm by which the distances between points on the board and in the sensor may differ."""
+"""Largest difference between distances of points on the board and in the sensor, mm."""
 
 
 def along(choice: Along, mesh: TriangleMesh) -> list[Light]:
-    """Lights along the outline of a part, cut across an axis.
+    """Return lights along the outline of a part, cut across an axis.
 
     Args:
-        mesh: of the part, closed, mm.
+        mesh: mesh of the part, closed, mm.
 
     Raises:
-        DesignError: the part is not there at this height.
+        DesignError: the part does not reach this height.
     """
     axis, sign = axis_of(choice.axis)
     first, second = np.eye(3)[(axis + 1) % 3], sign * np.eye(3)[(axis + 2) % 3]
@@ -69,7 +70,9 @@ def along(choice: Along, mesh: TriangleMesh) -> list[Light]:
 
 
 def _outline(mesh: TriangleMesh, axis: int, height: float, frame: FloatArray) -> FloatArray:
-    """(n, 2) mm: the largest outline of a section, anticlockwise, in a frame of two directions."""
+    """Return the largest outline of a section, anticlockwise, in a frame of two directions, (n, 2)
+    mm.
+    """
     level = mesh.vertices[:, axis] - height
     level[level == 0.0] = 1e-9  # a plane through a vertex passes just below it
     signs = level[mesh.faces] > 0.0
@@ -98,7 +101,9 @@ def _outline(mesh: TriangleMesh, axis: int, height: float, frame: FloatArray) ->
 
 
 def _on_outline(corners: FloatArray, distance: float) -> tuple[FloatArray, FloatArray]:
-    """(2,) mm the place at a distance along a closed outline, and the unit vector out of it."""
+    """Return the point at a distance along a closed outline, (2,) mm, and its outward unit
+    normal.
+    """
     sides = np.diff(corners, axis=0)
     lengths = np.linalg.norm(sides, axis=1)
     ends = np.cumsum(lengths)
@@ -119,11 +124,11 @@ def _round(one: FloatArray, other: FloatArray) -> bool:
 
 
 def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
-    """The lights of a pick-and-place file.
+    """Return the lights of a pick-and-place file.
 
     Args:
-        choice: which, and how the board lies in the sensor.
-        table: the parts of the file.
+        choice: choice of parts, and the position of the board in the sensor.
+        table: parts of the file.
 
     Raises:
         DesignError: there is no such designator, or the points do not fit the file.
@@ -148,7 +153,9 @@ def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
 
 
 def _frame(choice: FromTable, table: dict[str, BoardPart]) -> tuple[FloatArray, FloatArray]:
-    """(3, 3) rows: where the board's x, y and top point; and (3,) mm where its 0, 0 is."""
+    """Return the directions of the board's x, y and top as rows (3, 3), and the position of its
+    origin (3,), mm.
+    """
     if choice.points is None:
         normal = vector(choice.normal or "+z")
         right = vector(choice.right or "+x")
@@ -182,7 +189,7 @@ def _frame(choice: FromTable, table: dict[str, BoardPart]) -> tuple[FloatArray, 
 def _fitted(
     board: FloatArray, there: FloatArray, normal: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    """The frame that brings two or three points of the board where they are."""
+    """Return the frame that maps two or three points of the board to their positions."""
     side_1, side_2 = board[1] - board[0], there[1] - there[0]
     if normal is None:
         plane = np.cross(side_1, board[2] - board[0])

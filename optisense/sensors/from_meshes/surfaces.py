@@ -1,4 +1,4 @@
-"""Reference surfaces: faces picked from the mesh of a file or of another part."""
+"""Reference surfaces: faces selected from the mesh of a file or of another part."""
 
 from __future__ import annotations
 
@@ -17,19 +17,21 @@ from optisense.sensors.from_meshes.directions import said, vector
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 
 WITHIN = 30.0
-"""Degrees that faces may look aside where the recipe gives none."""
+"""Largest angle between a face's normal and the given direction if the recipe gives none,
+degrees.
+"""
 
 
 def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
-    """The faces that a shape chooses, as patches, the largest first.
+    """Return the faces that a shape selects, as patches, the largest first.
 
     Args:
         mesh: all faces, welded, mm.
-        shape: which of them; without `towards`, all.
-        where: for messages.
+        shape: shape with the selection; without `towards`, all faces are selected.
+        where: name for messages.
 
     Raises:
-        DesignError: no face looks that way.
+        DesignError: no face points in that direction.
     """
     if shape.towards is None:
         return patches(mesh, np.flatnonzero(mesh.face_areas > 0.0))
@@ -45,7 +47,8 @@ def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
         )
     if not shape.tangent:
         return patches(mesh, faces)
-    # Each patch grows by itself: the largest of what is smoothly joined may look elsewhere.
+    # Each patch is grown separately: the largest region that is joined smoothly may point
+    # elsewhere.
     grown: list[Faces] = []
     for patch in patches(mesh, faces):
         if not any(np.isin(patch[0], done) for done in grown):
@@ -54,9 +57,9 @@ def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
 
 
 def chosen(mesh: TriangleMesh, shape: ShapeReference, where: str) -> tuple[TriangleMesh, list[str]]:
-    """The faces that a shape chooses as a mesh of their own, and what was left out, if anything.
+    """Return the faces that a shape selects as a separate mesh, and notes on omitted ones.
 
-    Without `towards` it is the whole mesh; else the largest patch, unless all are wanted.
+    Without `towards` it is the whole mesh; else the largest patch, unless all are requested.
     """
     if shape.towards is None:
         return mesh, []

@@ -1,4 +1,6 @@
-"""Parts that touch: small gaps closed, overlaps settled, the sensing surface laid on the gel."""
+"""Contacts between parts: small gaps are closed, overlaps ranked, the sensing surface laid on the
+gel.
+"""
 
 from __future__ import annotations
 
@@ -17,29 +19,32 @@ from optisense.geometry.meeting import find_meeting
 from optisense.sensors.from_meshes.recipe import Recipe
 
 WIDE_GAP = 0.5
-"""mm: gaps up to this look like a mistake worth telling."""
+"""Largest gap that is reported, mm: it may be a mistake, larger ones are intended."""
 
 MUCH = 0.2
-"""A gap under this share of the smaller part's area is not worth telling."""
+"""Smallest area of a gap that is reported, as a share of the smaller part's area."""
 
 MOSTLY = 0.95
-"""A sensing surface lies on an elastomer when so much of its area does."""
+"""Share of a sensing surface's area that must lie on an elastomer for the surface to count as on
+it.
+"""
 
 PROBE = 0.05
-"""Distance in mm beside the skin at which it is asked which part lies there; gels are thicker and
-rounding is smaller."""
+"""Distance beside the skin at which the part there is looked up, mm; gels are thicker and rounding
+errors are smaller.
+"""
 PROBES = 64
-"""Number of faces of the skin, spread over it, that are asked."""
+"""Number of faces, spread over the skin, beside which the part is looked up."""
 
 
 @dataclass
 class Contacts:
-    """The parts after their contacts were closed.
+    """Parts after their contacts were closed.
 
     Attributes:
-        meshes: of the solids, by part.
-        priorities: of all solids, by part; rigid ones above soft ones.
-        notes: what was done, for the user.
+        meshes: meshes of the solids, by part.
+        priorities: priorities of all solids, by part; rigid ones are above soft ones.
+        notes: changes, for the user.
     """
 
     meshes: dict[str, TriangleMesh]
@@ -48,13 +53,13 @@ class Contacts:
 
 
 def settle_contacts(recipe: Recipe, meshes: dict[str, TriangleMesh]) -> Contacts:
-    """Make transparent solids that nearly touch do so, and rank those that overlap.
+    """Join transparent solids that nearly touch, and rank those that overlap.
 
     Of two solids the softer one is changed, or else the later one of the recipe. Pairs in
     `air_films` keep their gap.
 
     Args:
-        meshes: of all parts that are solids of their own, by name, mm, closed, welded.
+        meshes: meshes of all parts that are solids of their own, by name, mm, closed, welded.
     """
     order = [
         name
@@ -71,7 +76,7 @@ def settle_contacts(recipe: Recipe, meshes: dict[str, TriangleMesh]) -> Contacts
 
 
 def _priorities(recipe: Recipe, order: list[str]) -> dict[str, int]:
-    """One number a part, falling along the order, unless the recipe says otherwise."""
+    """Return one priority per part, falling along the order, unless the recipe gives it."""
     numbers = {name: len(order) - place for place, name in enumerate(order)}
     for name in order:
         given = recipe.parts[name].priority
@@ -90,7 +95,7 @@ def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
         joined = join(other, one, recipe.join)
         if joined.kind != "none":
             result.meshes[mover] = other = joined.mesh
-            # Curved faces were moved so far into the other part; chords go a little farther.
+            # Curved faces were moved this far into the other part; chords go a little farther.
             reach *= 3.0 if joined.kind == "curved" else 1.0
             what = "gap" if joined.gap >= 0.0 else "overlap"
             result.notes.append(
@@ -117,7 +122,7 @@ def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
 
 
 def _only_joined(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> bool:
-    """Whether a part reaches into another by no more than joining made it."""
+    """Return whether a part reaches into another by no more than the joining has moved it."""
     import manifold3d
 
     solids = [
@@ -133,16 +138,16 @@ def _only_joined(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> b
 def lay_on_elastomer(
     name: str, skin: TriangleMesh, elastomers: dict[str, TriangleMesh], distance: float
 ) -> tuple[TriangleMesh, list[str]]:
-    """A sensing surface on the very faces of the elastomer that it lies on.
+    """Return a sensing surface on the faces of the elastomer that it lies on.
 
     Args:
-        name: of the sensing surface.
-        skin: as given, mm.
-        elastomers: by name.
-        distance: mm; it must lie this near.
+        name: name of the sensing surface.
+        skin: its mesh, mm.
+        elastomers: meshes of the elastomers, by name.
+        distance: largest distance to the elastomer, mm.
 
     Returns:
-        The mesh (which looks either way) and what was done.
+        The mesh, whose normals may point either way, and notes on the changes.
     """
     notes: list[str] = []
     for gel_name, gel in elastomers.items():
@@ -172,9 +177,9 @@ def look_inward(
     solids: dict[str, TriangleMesh],
     eye: np.ndarray | None,
 ) -> tuple[TriangleMesh, list[str]]:
-    """Turn a sensing surface so that its normals look into the solid it lies on.
+    """Turn a sensing surface so that its normals point into the solid it lies on.
 
-    Where it lies on none, or between two, they look to the camera (`eye`, (3,) mm).
+    If it lies on none, or between two, they point to the camera (`eye`, (3,) mm).
     """
     chosen = np.linspace(0, len(skin.faces) - 1, min(PROBES, len(skin.faces))).astype(int)
     centres, normals = skin.triangles[chosen].mean(axis=1), skin.face_normals[chosen]
@@ -194,13 +199,14 @@ def look_inward(
 def refuse_contact_with_lamps(
     places: list[tuple[str, np.ndarray]], meshes: dict[str, TriangleMesh]
 ) -> None:
-    """No light and no camera may lie in a face of a part: on which side would it be?
+    """Check that no light and no camera lies in a face of a part, where its side would be
+    undefined.
 
     Args:
-        places: what it is, for messages, and (3,) mm.
+        places: names for messages, and positions (3,), mm.
 
     Raises:
-        DesignError: one does.
+        DesignError: a light or camera lies in a face.
     """
     from optisense.geometry.surface import closest_points
 
