@@ -1,5 +1,5 @@
-"""AOAP: how nearly the camera looks straight at the sensing surface (the OptiSense paper,
-"As-orthographic-as-possible objective function").
+"""AOAP: the mean cosine between the camera's rays and the normals of the sensing surface (the
+OptiSense paper, "As-orthographic-as-possible objective function").
 """
 
 from __future__ import annotations
@@ -18,15 +18,17 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 COVERAGE_WEIGHT = 0.01
-"""k1 of the paper. Coverage hardly counts at this weight: look at it beside the value."""
+"""Weight k1 of the paper. Coverage hardly affects the value at this weight, so that it is reported
+beside it."""
 
 
 LEAST_PIXELS = 100
-"""Pixels that must see the surface: a mean over fewer says little about a camera."""
+"""Smallest number of pixels that must see the surface, as a mean over fewer says little about a
+camera."""
 
 
 def bounds(*, coverage_weight: float) -> tuple[float, float]:
-    """The lowest and the highest score: cosine and coverage are each 0 to 1."""
+    """Return the lowest and the highest score; cosine and coverage are each 0 to 1."""
     return 0.0, 1.0 + coverage_weight
 
 
@@ -48,15 +50,16 @@ GelSight Mini."""
 def aoap(
     evaluation: Evaluation, *, coverage_weight: float = COVERAGE_WEIGHT
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How nearly the camera's rays stand upright on the sensing surface, and how much they cover.
+    """The mean cosine between the camera's rays and the normals of the sensing surface, and
+    coverage.
 
-    Mean over all pixels of the cosine between ray and normal, rays that do not arrive counting 0,
-    plus k1 times the part of the surface's triangles that are seen.
+    The value is the mean over all pixels of the cosine between ray and normal (0 for rays that do
+    not arrive), plus k1 times the share of the surface's triangles that are seen.
 
     Args:
         evaluation: the sensor.
-        coverage_weight: k1, from 0 to 1; at 1 seeing the whole surface counts as much as looking
-            straight at it.
+        coverage_weight: weight k1, from 0 to 1; with 1, full coverage counts as much as
+            perpendicular rays.
     """
     refuse_outside("coverage_weight", coverage_weight, 0.0, 1.0)
     rays = evaluation.judged_rays

@@ -1,10 +1,11 @@
-"""Bend radius: how sharply cages bend the parts of a sensor, which decides how they can be made.
+"""Bend radius: the smallest radius to which cages bend the parts of a sensor, which determines how
+they can be made.
 
 A sheet breaks or springs back when it is bent too sharply, and a film cannot be laid over a shape
-that curves two ways at once. Across an edge of a smooth mesh the normal turns by the angle between
-the two triangles, on the way from the middle of one to the middle of the other. The angle over that
-way is the normal curvature across the edge (Grinspun et al., "Discrete shells", 2003), and its
-inverse is the radius.
+that curves two ways at once. Across an edge of a smooth mesh, the normal turns by the angle between
+the two triangles over the distance between their middles. The angle over that distance is the
+normal curvature across the edge (Grinspun et al., "Discrete shells", 2003), and its inverse is the
+radius.
 """
 
 from __future__ import annotations
@@ -22,15 +23,15 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 MOST_RADIUS = 1e6
-"""mm, the radius of what is flat: a kilometre, far above what can be measured on a part."""
+"""Radius (mm) of a flat part: a kilometre, far above any radius that can be measured on a part."""
 
 SHARP = 30.0
-"""Degrees between two triangles of the mesh before it is bent. From this angle on their common edge
-is one of the part's own edges or corners, whose angle is no curvature."""
+"""Angle (degrees) between two triangles of the undeformed mesh from which on their common edge is
+one of the part's own edges, whose angle is no curvature."""
 
 SHARE = 0.01
-"""Share of a part's area that may be bent more sharply than the value says, since single thin
-triangles at the border of a mesh would decide otherwise."""
+"""Share of a part's area that may be bent more sharply than the value; otherwise single thin
+triangles at the border of a mesh would determine it."""
 
 
 @objective("bend_radius", title="Bend radius", range=(0.0, MOST_RADIUS), unit="mm", rays_only=True)
@@ -61,10 +62,11 @@ def bend_radius(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 def edge_curvatures(
     flat: TriangleMesh, bent: TriangleMesh
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Normal curvatures (e,) across the smooth edges of a bent mesh, 1/mm, and their areas, mm².
+    """Return the normal curvatures (e,), 1/mm, across the smooth edges of a bent mesh, and their
+    areas (e,), mm².
 
     Args:
-        flat: the mesh before it is bent, by which sharp edges are known.
+        flat: the undeformed mesh, which determines the sharp edges.
         bent: the same mesh, bent.
     """
     edges, pairs = _inner_edges(flat.faces)
@@ -81,11 +83,11 @@ def edge_curvatures(
 
 
 def radius_of(curvature: NDArray[np.float64], area: NDArray[np.float64]) -> float:
-    """The radius, mm, that all but `SHARE` of an area exceed.
+    """Return the radius (mm) that all but `SHARE` of an area exceed.
 
     Args:
-        curvature: (e,) 1/mm.
-        area: (e,) mm², of each.
+        curvature: (e,) curvatures, 1/mm.
+        area: (e,) area of each, mm².
     """
     if not len(curvature):
         return MOST_RADIUS
@@ -96,7 +98,7 @@ def radius_of(curvature: NDArray[np.float64], area: NDArray[np.float64]) -> floa
 
 
 def _inner_edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The edges (e, 2) between two triangles as vertices, and the two triangles (e, 2)."""
+    """Return the vertices (e, 2) of the edges between two triangles, and these triangles (e, 2)."""
     corners = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
     edges = corners.reshape(-1, 2).astype(np.int64)
     owner = np.repeat(np.arange(len(faces)), 3)
@@ -108,7 +110,7 @@ def _inner_edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[n
 
 
 def _angles(mesh: TriangleMesh, pairs: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(e,) radians between the normals of triangles."""
+    """Return the angles (e,), radians, between the normals of pairs of triangles."""
     one, other = mesh.face_normals[pairs[:, 0]], mesh.face_normals[pairs[:, 1]]
     sine = np.linalg.norm(np.cross(one, other), axis=1)
     cosine = np.einsum("ei,ei->e", one, other)

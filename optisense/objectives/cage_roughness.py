@@ -1,4 +1,4 @@
-"""Cage roughness: how unevenly the control points of cages are moved."""
+"""Cage roughness: the unevenness of the displacements of the control points of cages."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     rays_only=True,
 )
 def cage_roughness(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
-    """How unevenly the control points of cages are moved, in mm.
+    """The unevenness of the displacements of the control points of cages, in mm.
 
-    By how much the way of a control point differs from the mean way of its two neighbours, along
-    each axis of the lattice: the root mean square over all points with two neighbours. 0 where the
-    lattice is moved, stretched or sheared as a whole, since that bends nothing. The value is that
-    of the roughest cage; `largest` is the largest such difference.
+    It is the root mean square, over all points with two neighbours along an axis of the lattice, of
+    the difference between a point's displacement and the mean displacement of these neighbours. It
+    is 0 if the lattice is moved, stretched or sheared as a whole, which bends nothing. The value is
+    that of the roughest cage; `largest` is the largest such difference.
 
     Args:
         evaluation: the sensor.
@@ -47,11 +47,12 @@ def cage_roughness(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 
 
 def unevenness(moved: NDArray[np.float64], resolution: Resolution) -> NDArray[np.float64]:
-    """(k,) mm between the way of a control point and the mean way of its neighbours.
+    """Return the distance (k,), mm, between the displacement of each control point and the mean
+    displacement of its neighbours.
 
     Args:
-        moved: (nx * ny * nz, 3) mm, the way of each point.
-        resolution: points along x, y and z.
+        moved: (nx * ny * nz, 3) displacement of each point, mm.
+        resolution: number of points along x, y and z.
     """
     ways = moved.reshape(*resolution, 3)
     found = [

@@ -1,4 +1,4 @@
-"""Clearance: how near parts that do not touch come to each other."""
+"""Clearance: the smallest distance between parts that do not touch."""
 
 from __future__ import annotations
 
@@ -20,32 +20,34 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 APART = 0.05
-"""mm: parts that are nearer where nothing is bent lie on each other, and their distance is none
-that can be kept. Glue and tape of the built-in sensors are drawn without a gap."""
+"""Distance (mm) below which undeformed parts count as touching, so that they have no clearance.
+Glue and tape of the built-in sensors have no gap."""
 
 BEGINNINGS = 2
-"""Pairs of near corners from which the nearest points of two parts are looked for."""
+"""Number of pairs of near vertices from which the search for the nearest points of two parts
+starts."""
 
 SAMPLED = 1500
-"""Places of each part among which these pairs are found: all distances between them take 10 ms."""
+"""Number of places of each part among which these pairs are found; all distances between them take
+10 ms."""
 
 STEPS = 6
-"""Times that the nearest point goes from one part to the other and back: each step of alternating
-projections shortens the way, and on flat faces two or three are enough."""
+"""Number of steps of alternating projections between two parts: each step shortens the distance,
+and on flat faces two or three are enough."""
 
 MOST_FACES = 1000
-"""Faces among which the nearest point is looked for; about a ms."""
+"""Number of faces among which the nearest point is searched, which takes about a ms."""
 
 MOST_CLEARANCE = 1e4
-"""mm, larger than any sensor: what is told where no two parts are apart."""
+"""Value (mm) if no two parts are apart; larger than any sensor."""
 
 
 @objective("clearance", title="Clearance", range=(0.0, MOST_CLEARANCE), unit="mm", rays_only=True)
 def clearance(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """The smallest distance between two parts that do not touch, in mm.
 
-    Parts that lie on each other before cages bend anything, as a gel on its tray, are left out; 0
-    where others cut through each other. `of_parts` names the two that are nearest.
+    Parts that touch before cages bend them, such as a gel and its tray, are left out. The value is
+    0 if others intersect. `of_parts` names the two that are nearest.
 
     Args:
         evaluation: the sensor.
@@ -63,7 +65,7 @@ def clearance(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 
 
 def _apart(design: SensorDesign) -> list[tuple[str, str]]:
-    """The pairs of parts that do not touch where nothing is bent."""
+    """Return the pairs of parts that do not touch before they are bent."""
     names = [name for name, part in design.parts.items() if part.role is not Role.INDENTER]
     meshes = design.meshes
     return [
@@ -74,7 +76,7 @@ def _apart(design: SensorDesign) -> list[tuple[str, str]]:
 
 
 def distance(one: TriangleMesh, other: TriangleMesh) -> float:
-    """mm between the surfaces of two meshes; 0, or nearly, where they cut through each other."""
+    """Return the distance (mm) between the surfaces of two meshes; about 0 if they intersect."""
     here, there = _Places.of(one), _Places.of(other)
     few = [each.points[:: 1 + len(each.points) // SAMPLED] for each in (here, there)]
     gaps = cdist(*few)
@@ -91,7 +93,7 @@ def distance(one: TriangleMesh, other: TriangleMesh) -> float:
 
 
 class _Places(NamedTuple):
-    """Places (n, 3) mm on a mesh: corners of its faces, the middles of these and of their edges."""
+    """Places (n, 3), mm, on a mesh: vertices, and the middles of faces and edges."""
 
     mesh: TriangleMesh
     points: NDArray[np.float64]
@@ -106,8 +108,9 @@ class _Places(NamedTuple):
         return _Places(mesh, points, cKDTree(points))
 
     def nearest(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The point (3,) mm of the mesh that is nearest to one; of a fine mesh among the faces that
-        have the nearest places."""
+        """Return the point (3,), mm, of the mesh that is nearest to a point; on a fine mesh, only
+        the faces with the nearest places are searched.
+        """
         mesh = self.mesh
         if len(mesh.faces) > MOST_FACES:
             _, near = self.tree.query(point, MOST_FACES)

@@ -1,9 +1,10 @@
 """Ranges of normal angles over all points whose colours lie in a box, for many boxes.
 
-Each of n points asks for the extremes over all points within its own colour box. A table of pairs
-would be quadratic. Points are sorted into small blocks of similar colour instead, as in a k-d tree
-(Bentley, 1975): blocks outside a box are skipped, of blocks inside it only the points with extreme
-angles count, and only blocks on its border are looked at point by point. The result is exact.
+For each of n points, the extremes over all points within its own colour box are needed. A table of
+pairs would be quadratic. Points are therefore sorted into small blocks of similar colour, as in a
+k-d tree (Bentley, 1975): blocks outside a box are skipped, only the points with extreme angles of
+blocks inside it are used, and only blocks on its border are searched point by point. The result is
+exact.
 """
 
 from __future__ import annotations
@@ -16,14 +17,14 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 BLOCK = 128
-"""Points of a block; any number gives the same result."""
+"""Number of points of a block; any number gives the same result."""
 
 ONE_BLOCK = 600
-"""Number of points up to which they are one block: comparing all their pairs is then faster than
-sorting them out (2 ms instead of 3 ms for 450 points)."""
+"""Number of points up to which all are one block: comparing all pairs is then faster than sorting
+them (2 ms instead of 3 ms for 450 points)."""
 
 SECTORS = 12
-"""Extreme azimuths of a block are kept for each of so many sectors of the circle."""
+"""Number of sectors of the circle for each of which the extreme azimuths of a block are kept."""
 
 
 def ranges_in_boxes(
@@ -35,20 +36,20 @@ def ranges_in_boxes(
     has_azimuth: ArrayLike,
     block: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Ranges of both angles over the points in each point's colour box.
+    """Return the ranges of both angles over the points in each point's colour box.
 
     Args:
-        colours: (n, 3), of the points.
-        low, high: (n, 3) the boxes' corners; each box holds its own point.
+        colours: (n, 3) colours of the points.
+        low, high: (n, 3) corners of the boxes; each box holds its own point.
         theta: (n,) polar angles, degrees.
         phi: (n,) azimuths, degrees.
-        has_azimuth: (n,) points whose azimuth counts; others have a range of 0.
-        block: points of a block; by default chosen for speed.
+        has_azimuth: (n,) mask of the points whose azimuth counts; others have a range of 0.
+        block: number of points of a block; by default chosen for speed.
 
     Returns:
-        (n,) and (n,) degrees: largest minus smallest polar angle, and the arc of the circle that
-        holds all azimuths, from the point's own to both sides; exact up to 180, which stands
-        for all wider arcs.
+        The largest minus the smallest polar angle (n,), degrees, and the arc (n,), degrees, of the
+        circle that holds all azimuths, from the point's own to both sides; exact up to 180, which
+        stands for all wider arcs.
     """
     order = np.argsort(np.asarray(theta, dtype=np.float64), kind="stable")
     c, lower, upper = (
@@ -79,13 +80,13 @@ def ranges_in_boxes(
             values = ranks[channel, others]
             within &= values >= first[channel, rows, None]
             within &= values <= last[channel, rows, None]
-        # Points are in the order of their polar angles, and so the first and last one tell.
+        # Points are sorted by polar angle, so the first and the last one have the extremes.
         smallest = others[within.argmax(axis=1)]
         largest = others[len(others) - 1 - within[:, ::-1].argmax(axis=1)]
         theta_range[rows] = polar[largest] - polar[smallest]
-        # Whole turns drop out of 64 bits by themselves.
+        # Whole turns overflow 64 bits and cancel.
         away = (turn[others] - turn[rows, None]).view(np.int64)
-        away *= within & counts[others]  # 0 is the point itself
+        away *= within & counts[others]  # the point itself is at 0
         arc[rows] = away.max(axis=1).astype(np.float64) - away.min(axis=1)
     phi_range = np.where(counts, np.minimum(arc * (360.0 / 2.0**64), 180.0), 0.0)
     back = np.argsort(order)
@@ -95,8 +96,10 @@ def ranges_in_boxes(
 def _ranked(
     values: FloatArray, low: FloatArray, high: FloatArray
 ) -> tuple[NDArray[np.integer], NDArray[np.integer], NDArray[np.integer]]:
-    """(3, n) each: the rank of values (n, 3) in their channel, and the first and last rank from low
-    to high. Comparing small whole numbers gives the same, sooner.
+    """Return the ranks (3, n) of values (n, 3) in their channel, and the first and last rank (3, n)
+    from low to high.
+
+    Comparing small integers gives the same result faster.
     """
     size = np.uint16 if len(values) < 2**16 else np.uint32
     ranks, first, last = (np.empty(values.T.shape, dtype=size) for _ in range(3))
@@ -109,7 +112,9 @@ def _ranked(
 
 
 def _blocks(points: FloatArray, size: int) -> list[NDArray[np.int64]]:
-    """Rows of points near each other: halved along the widest axis until small enough."""
+    """Return the rows of blocks of similar points, halved along the widest axis until they are
+    small enough.
+    """
     waiting, done = [np.arange(len(points))], []
     while waiting:
         rows = waiting.pop()
@@ -126,10 +131,11 @@ def _blocks(points: FloatArray, size: int) -> list[NDArray[np.int64]]:
 def _extremes(
     rows: NDArray[np.int64], polar: FloatArray, azimuth: FloatArray, counts: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
-    """The rows that can set a range: extreme polar angles, and extreme azimuths of each sector.
+    """Return the rows that can determine a range: extreme polar angles, and extreme azimuths of
+    each sector.
 
-    Within a sector the extremes as seen from any azimuth outside the opposite sector are its first
-    and last; from one opposite to it the arc is at least 180 either way.
+    For any azimuth outside the opposite sector, the extremes of a sector are its first and last
+    azimuth; for an azimuth in the opposite sector, the arc is at least 180 degrees in either case.
     """
     ends = [rows[[polar[rows].argmin(), polar[rows].argmax()]]]
     known = rows[counts[rows]]

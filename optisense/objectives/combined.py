@@ -1,4 +1,4 @@
-"""Objectives by what a user writes: a name, a file, or arithmetic with several objectives."""
+"""Objectives from text: a name, a file, or arithmetic with several objectives."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ if TYPE_CHECKING:
 class CombinedObjective(Objective):
     """An objective that is computed from others, such as ``aoap + 0.5*coverage``.
 
-    Its settings are those of the objectives in it; one that several of them have is given to all.
+    Its settings are those of its objectives; a setting that several of them have is passed to all.
 
     Attributes:
-        terms: the objectives in it.
+        terms: the objectives that it is computed from.
     """
 
     terms: tuple[Objective, ...] = ()
 
     @property
     def settings(self) -> dict[str, Any]:
-        """The settings of all objectives in it, and their defaults."""
+        """The settings of all its objectives, and their defaults."""
         found: dict[str, Any] = {}
         for each in self.terms:
             found |= each.settings
@@ -47,14 +47,14 @@ class CombinedObjective(Objective):
 def combined(
     expression: Expression, known: Mapping[str, Objective] | None = None
 ) -> CombinedObjective:
-    """The objective that an expression stands for.
+    """Return the objective that an expression defines.
 
     Args:
-        expression: what is computed.
-        known: objectives by their names in the expression; others are found by the registry.
+        expression: the expression to compute.
+        known: objectives by their names in the expression; others are looked up in the registry.
 
     Raises:
-        ObjectiveError: it names an objective that there is none of.
+        ObjectiveError: the expression names an unknown objective.
     """
     terms = {name: (known or {}).get(name) or find(name) for name in expression.objectives}
 
@@ -82,7 +82,7 @@ def _measured(
     evaluation: Evaluation,
     settings: Mapping[str, Any],
 ) -> tuple[dict[ScoreTerm, float], dict[str, Any]]:
-    """The value of each quantity, and the parts of each objective.
+    """Return the value of each quantity, and the parts of each objective.
 
     Raises:
         ObjectiveError: an objective fails, or has no such number among its parts.
@@ -113,7 +113,9 @@ def _measured(
 
 
 def _reads(terms: Mapping[str, Objective]) -> Any:
-    """Which pixels of a press the objectives read, with one dict of settings for all of them."""
+    """Return a function that gives the pixels of a press that the objectives read, with common
+    settings.
+    """
     from optisense.objectives.registry import pixels_read
 
     def reads(press: Any, **settings: Any) -> Any:
@@ -129,7 +131,9 @@ def _reads(terms: Mapping[str, Objective]) -> Any:
 
 
 def _unit(expression: Expression, terms: Mapping[str, Objective]) -> str:
-    """The unit of an expression that is one objective's value or its negative; else none."""
+    """Return the unit of an expression that is one objective's value or its negative; otherwise
+    none.
+    """
     single = expression.single or (
         expression.quantities[0]
         if expression.text == f"-{expression.quantities[0]}" and len(expression.quantities) == 1
@@ -139,10 +143,10 @@ def _unit(expression: Expression, terms: Mapping[str, Objective]) -> str:
 
 
 def resolve(wanted: str | Objective | Iterable[str | Objective]) -> list[Objective]:
-    """Objectives by name, file or expression, keeping those that are objectives already.
+    """Return objectives by name, file or expression; objects that are objectives already are kept.
 
     Raises:
-        ObjectiveError: one is unknown, or named twice.
+        ObjectiveError: an objective is unknown, or named twice.
     """
     several = [wanted] if isinstance(wanted, str | Objective) else list(wanted)
     found = [each if isinstance(each, Objective) else objective_of(each) for each in several]
@@ -155,10 +159,10 @@ def resolve(wanted: str | Objective | Iterable[str | Objective]) -> list[Objecti
 
 
 def objective_of(text: str) -> Objective:
-    """The objective that a text stands for: a name, ``FILE.py:FUNCTION``, or an expression.
+    """Return the objective that a text stands for: a name, ``FILE.py:FUNCTION``, or an expression.
 
     Raises:
-        ObjectiveError: it is none of these.
+        ObjectiveError: the text is none of these.
     """
     if is_plain(text):
         return find(text)
@@ -170,7 +174,7 @@ def objective_of(text: str) -> Objective:
 
 
 def goal_of(wanted: str | Objective) -> Objective:
-    """The objective that a search maximises: the negative value where lower is better.
+    """Return the objective that a search maximises: the negative value if lower is better.
 
     Raises:
         ObjectiveError: the text is no objective.

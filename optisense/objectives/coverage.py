@@ -1,4 +1,4 @@
-"""Coverage: how much of the sensing surface the camera sees."""
+"""Coverage: the share of the sensing surface that the camera sees."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ USUAL = (0.46, 0.83)
     usual=USUAL,
 )
 def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How much of the sensing surface the camera sees.
+    """The share of the sensing surface that the camera sees.
 
     The value is the share of the surface's triangles on which a chief ray arrives, as in AOAP; the
-    part `by_area` weighs each triangle by its area.
+    part `by_area` weights each triangle by its area.
 
     Args:
         evaluation: the sensor.
@@ -50,7 +50,7 @@ def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, A
 
 
 def triangles_seen(evaluation: Evaluation) -> NDArray[np.bool_]:
-    """(f,) whether a chief ray arrives on each triangle of the sensing surface."""
+    """Return a mask (f,) of the triangles of the sensing surface on which a chief ray arrives."""
     rays, faces = evaluation.judged_rays, evaluation.sensing_faces
     seen: NDArray[np.bool_] = np.bincount(rays.face[rays.hit], minlength=faces)[:faces] > 0
     return seen

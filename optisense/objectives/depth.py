@@ -1,4 +1,6 @@
-"""Depth: how far the shape is off that a calibrated reader finds on presses new to it."""
+"""Depth: the error of the shape that a calibrated reader finds on presses that it was not fitted
+to.
+"""
 
 from __future__ import annotations
 
@@ -42,14 +44,15 @@ if TYPE_CHECKING:
 def depth(
     evaluation: Evaluation, *, camera_noise: float = CAMERA_NOISE
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How many mm the shape is off that a calibrated reader finds on presses new to it.
+    """The error, in mm, of the shape that a calibrated reader finds on presses that it was not
+    fitted to.
 
     The normals of the objective `reading` are integrated to depth below the untouched surface. The
     value is the median over places of the mean absolute difference over the pixels of a contact.
 
     Args:
         evaluation: the sensor.
-        camera_noise: standard deviation in levels of 255, on all pictures.
+        camera_noise: standard deviation of the noise of all pictures, levels of 255.
     """
     places: list[dict[str, Any]] = []
     maps = []
@@ -75,7 +78,7 @@ def depth(
 
 
 def _known(evaluation: Evaluation, read: ReadPress) -> tuple[NormalIntegrator, FloatArray]:
-    """What integrates normals on the grid of a press, and (h, w) mm of its true depth."""
+    """Return the integrator of normals on the grid of a press, and its true depth (h, w), mm."""
     rays = evaluation.shared(
         "rays of the images", lambda: evaluation.model.chief_rays(evaluation.resolution)
     )
@@ -92,7 +95,7 @@ def _known(evaluation: Evaluation, read: ReadPress) -> tuple[NormalIntegrator, F
 
 
 def _along_middle(values: FloatArray, inside: NDArray[np.bool_]) -> FloatArray:
-    """(w,) mm along the row through the middle of a contact."""
+    """Return the values (w,), mm, along the row through the middle of a contact."""
     row = int(np.argmax(inside.sum(axis=1)))
     middle: FloatArray = values[row]
     return middle

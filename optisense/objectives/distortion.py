@@ -1,4 +1,4 @@
-"""Distortion: how stretched a pixel's footprint on the sensing surface is.
+"""Distortion: the ratio of length to width of a pixel's footprint on the sensing surface.
 
 The chief rays of neighbouring pixels meet the surface at points P. The derivatives of P along a row
 and along a column span the footprint of a pixel, which is a parallelogram. The singular values of
@@ -29,7 +29,8 @@ MOST_ANISOTROPY = 1e3
 long footprint; single-precision points resolve ratios up to about this one."""
 
 LEAST_FOOTPRINTS = 100
-"""Number of footprints that must lie on the surface: a mean over fewer says little of a camera."""
+"""Number of footprints that must lie on the surface: a mean over fewer says little about a
+camera."""
 
 HIGH_SHARE = 95.0
 """Percentile of the anisotropy reported beside its mean: one footprint in twenty is longer."""
@@ -51,7 +52,7 @@ USUAL = (1.24, 1.01)
     usual=USUAL,
 )
 def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How many times as long as wide a pixel's footprint on the sensing surface is.
+    """The ratio of length to width of a pixel's footprint on the sensing surface.
 
     The value is the geometric mean over all footprints, 1 at best. The part `area_variation` is the
     standard deviation of their areas over the mean.
@@ -78,7 +79,7 @@ def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str,
 
 
 def seen_footprints(rays: ChiefRays) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Length and width of the footprints of chief rays, as of `footprints`.
+    """Return length and width of the footprints of chief rays, as in `footprints`.
 
     Raises:
         ObjectiveError: fewer than `LEAST_FOOTPRINTS` lie on the sensing surface.
@@ -97,14 +98,15 @@ def seen_footprints(rays: ChiefRays) -> tuple[NDArray[np.float32], NDArray[np.fl
 def footprints(
     points: NDArray[np.float32], hit: NDArray[np.bool_]
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Length and width (h-1, w-1), mm, of the footprint between four neighbouring chief rays.
+    """Return length and width (h-1, w-1), mm, of the footprint between four neighbouring chief
+    rays.
 
     They are the singular values of the mean edges along the row and along the column; NaN where one
-    of the four rays misses the surface or an edge leaps over a fold.
+    of the four rays misses the surface or an edge crosses a fold.
 
     Args:
-        points: (h, w, 3) mm, where the chief rays meet the surface.
-        hit: (h, w), whether they do.
+        points: (h, w, 3) end points of the chief rays, mm.
+        hit: (h, w) mask of the rays that meet the surface.
     """
     x, y, z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
     right = [c[:, 1:] - c[:, :-1] for c in (x, y, z)]
@@ -132,6 +134,6 @@ def footprints(
 
 
 def _product(u: list[NDArray[np.float32]], v: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """(h, w) the dot products of vectors that are given as x, y and z."""
+    """Return the dot products (h, w) of vectors given as x, y and z."""
     product: NDArray[np.float32] = u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
     return product

@@ -1,4 +1,4 @@
-"""Draft: how easily bent sheets come off the mould that they are formed on."""
+"""Draft: the smallest draft angle of bent sheets on the mould that they are formed on."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def draft(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 
     A sheet is pulled off its mould along the mean of its normals, by area. The draft of a place is
     the angle between the surface there and this direction: 90 where the mould is flat, 0 where its
-    wall is upright, and below 0 where it is undercut, so that nothing comes off. Castings usually
-    need 1 to 3 degrees. One hundredth of a sheet's area may be steeper, as of `bend_radius`. Closed
-    bodies are left out; a gel is formed by the skin on it.
+    wall is parallel to the direction, and negative in an undercut, where the sheet cannot be
+    removed. Castings usually need 1 to 3 degrees. One hundredth of a sheet's area may be steeper,
+    as in `bend_radius`. Closed bodies are left out; a gel is formed by the skin on it.
 
     Args:
         evaluation: the sensor.
@@ -41,11 +41,11 @@ def draft(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 
 
 def draft_of(mesh: TriangleMesh) -> float:
-    """Degrees, of a sheet: all but `SHARE` of its area has more."""
+    """Return the draft angle (degrees) that all but `SHARE` of a sheet's area exceed."""
     normals, areas = mesh.face_normals, mesh.face_areas
     pull: NDArray[np.float64] = (normals * areas[:, None]).sum(axis=0)
     length = float(np.linalg.norm(pull))
-    if length <= 0.0:  # it goes once around: whichever way it is pulled, half of it is undercut
+    if length <= 0.0:  # a closed ring: half of it is undercut for any direction of removal
         return -90.0
     angles = np.degrees(np.arcsin(np.clip(normals @ pull / length, -1.0, 1.0)))
     order = np.argsort(angles)

@@ -1,4 +1,4 @@
-"""Images and rays that the objectives of one sensor share, made once, on first use."""
+"""Images and rays that the objectives of one sensor share, computed once on first use."""
 
 from __future__ import annotations
 
@@ -35,19 +35,21 @@ if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel, RenderProgress, TactileImage
 
 ProgressCallback = Callable[[float, str], None]
-"""Called with the finished fraction (0 to 1) of the work and a few words on what is being done."""
+"""A function that is called with the finished fraction (0 to 1) of the work and the name of the
+current step."""
 
 Reads = Callable[[Press], NDArray[np.float64]]
-"""The pixels (h, w) of a press, not exposed, that objectives read: 1 one by one, less where a part
-of the camera samples will do."""
+"""A function that returns for an unexposed press the importance (h, w) of each pixel to objectives:
+1 for pixels that are read one by one, less where a share of the camera samples suffices, and 0 for
+others."""
 
 
 class Evaluation(MadeOnce):
-    """One sensor, ready to be judged by several objectives.
+    """One sensor, prepared for scoring by several objectives.
 
     Attributes:
-        model: the sensor's optical model; must not change while it is judged.
-        settings: which images and rays.
+        model: the sensor's optical model; it must not change during scoring.
+        settings: settings of images and rays.
         seconds: wall time of each shared step so far.
     """
 
@@ -58,14 +60,15 @@ class Evaluation(MadeOnce):
         progress: ProgressCallback | None = None,
         reads: Reads | None = None,
     ) -> None:
-        """Judge a model; nothing is rendered yet.
+        """Create the evaluation of a model; nothing is rendered yet.
 
         Args:
-            model: the sensor's.
-            settings: of images and rays.
-            progress: called while images are rendered.
-            reads: which pixels of a press the objectives read, if not all one by one. The others
-                decide about the exposure only, and are rendered roughly (`registry.pixels_read`).
+            model: the sensor's optical model.
+            settings: settings of images and rays.
+            progress: function that is called while images are rendered.
+            reads: function that gives the pixels of a press that the objectives read, if not all
+                one by one. Other pixels affect the exposure only, and are rendered with few samples
+                (`registry.pixels_read`).
         """
         super().__init__()
         self.model = model
@@ -96,11 +99,11 @@ class Evaluation(MadeOnce):
 
     @property
     def chief_rays(self) -> ChiefRays:
-        """One chief ray a pixel of `ray_resolution`, of the untouched sensor."""
+        """The chief rays of the untouched sensor, one per pixel of `ray_resolution`."""
         return self.shared("chief rays", lambda: self.model.chief_rays(self.ray_resolution))
 
     def check_possible(self) -> None:
-        """Make sure that there can be such a camera and such materials.
+        """Check that the camera and the materials are physically possible.
 
         Raises:
             ObjectiveError: the camera is inside a part, no lens has its field of view, or no
@@ -118,7 +121,9 @@ class Evaluation(MadeOnce):
 
     @property
     def view(self) -> View:
-        """How much the camera sees, by rays of its own (see `settings.VIEW_ACROSS`)."""
+        """The share of the surface that the camera sees, by separate rays (see
+        `settings.VIEW_ACROSS`).
+        """
         size = size_for(self.design.camera.resolution, VIEW_ACROSS)
         return self.shared(
             "view", lambda: view_of(self.model.chief_rays(size), self.model.sensing.face_areas)
@@ -126,10 +131,11 @@ class Evaluation(MadeOnce):
 
     @property
     def judged_rays(self) -> ChiefRays:
-        """The chief rays of a camera that sees enough to be scored by them.
+        """The chief rays, after a check that the camera sees enough for a score.
 
         Raises:
-            ObjectiveError: it sees less than `Settings.least_skin` or `Settings.least_picture`.
+            ObjectiveError: the camera sees less than `Settings.least_skin` or
+                `Settings.least_picture`.
         """
         self.view.refuse_less(self.settings)
         return self.chief_rays
@@ -141,9 +147,9 @@ class Evaluation(MadeOnce):
 
     @property
     def exposure(self) -> float:
-        """The factor from radiance to what the camera reads; 1 fills its wells.
+        """The exposure: the factor from radiance to the camera's response, where 1 is a full well.
 
-        Automatic: see `exposure_for`.
+        See `exposure_for` for the automatic exposure.
         """
         if self.settings.exposure == "auto":
             return self.shared("exposure", self._auto_exposure)
@@ -151,7 +157,7 @@ class Evaluation(MadeOnce):
 
     @property
     def untouched_exposure(self) -> float:
-        """The factor that suits the untouched sensor, whatever contacts look like."""
+        """The automatic exposure of the untouched sensor, regardless of contacts."""
         if self.settings.exposure == "auto":
             chain = self.model.picture_chain
             return self.shared(
@@ -161,12 +167,12 @@ class Evaluation(MadeOnce):
 
     @property
     def contacts(self) -> list[Contact]:
-        """The ball at each place."""
+        """The contact of the ball at each place."""
         return self.shared("contacts", self._contacts)
 
     @property
     def presses(self) -> list[Press]:
-        """One press a place, each checked.
+        """One checked press per place.
 
         Raises:
             ObjectiveError: a place is not seen, overexposed or black.
@@ -175,8 +181,8 @@ class Evaluation(MadeOnce):
 
     @property
     def calibration_presses(self) -> list[Press]:
-        """One press a place, under the exposure that suits the untouched sensor, as users set the
-        camera before they calibrate a sensor; they may be overexposed or black.
+        """One press per place, with the exposure of the untouched sensor, as in the calibration of
+        a real sensor; presses may be overexposed or black.
 
         Raises:
             ObjectiveError: a place is not seen.
@@ -187,10 +193,10 @@ class Evaluation(MadeOnce):
         return self.shared("calibration presses", lambda: self._exposed(exposure))
 
     def _contacts(self) -> list[Contact]:
-        """Presses at the places that the user named, or at nine that cover what is seen.
+        """Return contacts at the places that the user named, or at nine that cover the view.
 
         Raises:
-            ObjectiveError: nine places would crowd on the little that the camera sees.
+            ObjectiveError: the camera sees too little of the surface for nine places.
         """
         ball = Sphere(self.settings.radius)
         if self.settings.places is None:
@@ -199,10 +205,10 @@ class Evaluation(MadeOnce):
         return [Contact(ball, at=at, depth=self.settings.depth) for at in self.settings.places]
 
     def each_press(self) -> Iterator[tuple[Press, TactileImage]]:
-        """Each press, neither exposed (its response is 0) nor checked yet, with the image that it
-        is seen in; rendered one by one.
+        """Yield each press, not yet exposed (its response is 0) and not checked, with its image.
 
-        For those who need an image's layers; they are not kept here.
+        The images are rendered one by one and not kept; they are for callers that need their
+        layers.
 
         Raises:
             ObjectiveError: the camera does not see a place.
@@ -255,10 +261,10 @@ class Evaluation(MadeOnce):
     def _pixel_importance(
         self, press_of: Callable[[int, ChiefRays], Press], numbers: Iterable[int], rays: ChiefRays
     ) -> NDArray[np.float64]:
-        """(h, w): which pixels of an image's presses objectives read (see `Reads`).
+        """Return the importance (h, w) of the pixels of an image's presses (see `Reads`).
 
-        All, one by one, where an objective can't say, since it can't judge the press: it will tell
-        why.
+        It is 1 for all pixels if an objective cannot judge the press; the objective reports the
+        reason later.
         """
         assert self._reads is not None
         found = []
@@ -273,7 +279,9 @@ class Evaluation(MadeOnce):
 
     @property
     def _first_image(self) -> float:
-        """The share of the first image in the time of all rendering: light is traced for it."""
+        """The share of the first image, which includes tracing the light, in the time of all
+        rendering.
+        """
         from optisense.objectives.registry import BUILT_IN
         from optisense.objectives.usual_score import usual_score
 
@@ -281,7 +289,7 @@ class Evaluation(MadeOnce):
         return self.shared("first image", lambda: usual.share_of_first_image)
 
     def _unexposed(self) -> list[UnexposedPress]:
-        self.untouched  # noqa: B018  light is traced for it, which progress counts first
+        self.untouched  # noqa: B018  first, as it includes tracing the light
         return [
             UnexposedPress(press, image.contact_mask, radiance_in(image, image.contact_mask))
             for press, image in self.each_press()
@@ -317,7 +325,9 @@ class Evaluation(MadeOnce):
         ]
 
     def _untouched_response(self, exposure: float, noisy: bool = False) -> NDArray[np.float32]:
-        """(h, w, 3), made once for each exposure."""
+        """Return the response (h, w, 3) of the untouched sensor, computed once for each
+        exposure.
+        """
         if (exposure, noisy) not in self._untouched_responses:
             chain = self.model.picture_chain
             camera = chain if noisy else chain.without_noise()
@@ -329,11 +339,11 @@ class Evaluation(MadeOnce):
     def _response(
         self, touched: NDArray[np.bool_], radiance: NDArray[np.float32], factor: float
     ) -> NDArray[np.float32]:
-        """(h, w, 3): the camera sensor's response, 0 to 1; the untouched one outside contacts,
-        which have a radiance (n, 3) in the n pixels that they touch.
+        """Return the camera sensor's response (h, w, 3), 0 to 1.
 
-        Overexposure spreads as far as its blur reaches, so only what lies that near to a contact
-        is worked out anew.
+        Contacts have the radiance (n, 3) in the n pixels that they touch. The response of other
+        pixels is that of the untouched sensor, except within the reach of the blur of overexposed
+        contact pixels.
         """
         exposure, untouched = np.float32(factor), self._untouched_radiance
         camera, seed = self.model.picture_chain, self.settings.seed
@@ -359,17 +369,17 @@ class Evaluation(MadeOnce):
         pixel_importance: Callable[[ChiefRays], NDArray[np.float64]] | None = None,
         what: str = "",
     ) -> TactileImage:
-        """One image, which takes the progress from `done` by `part`.
+        """Render one image, which advances the progress from `done` by `part`.
 
-        `what` is told with the progress; the stage of the render where it is empty.
+        `what` is reported with the progress; if it is empty, the stage of the render is.
 
         Raises:
-            KeyboardInterrupt: Ctrl-C ended it early; a score of half the light would mislead.
+            KeyboardInterrupt: Ctrl-C was pressed; no score is computed from a part of the light.
         """
 
         def report(progress: RenderProgress) -> None:
             text = what or progress.stage.value
-            if progress.fraction == 1.0:  # what comes now is the objective's own work
+            if progress.fraction == 1.0:  # the objective's own work follows
                 text = "judging the images"
             self._progress(done + part * progress.fraction, text)
 

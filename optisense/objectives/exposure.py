@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from optisense.design.responses import PictureChain
 
 MOST_SATURATED = 0.02
-"""Automatic exposure lets so many of a contact's pixels be overexposed: a person who sets up a
-shiny sensor turns the exposure down until the highlights on what is pressed in are small."""
+"""Largest share of a contact's pixels that automatic exposure allows to be overexposed: on a shiny
+sensor, the exposure is lowered until the highlights on contacts are small."""
 
 
 def exposure_for(
@@ -19,15 +19,18 @@ def exposure_for(
     contacts: Iterable[NDArray[np.float32]],
     chain: PictureChain | None = None,
 ) -> float:
-    """The factor from radiance to what the camera reads that suits a sensor and its contacts.
+    """Return the automatic exposure for a sensor and its contacts.
 
-    The untouched sensor is exposed well (`auto_exposure`), unless more than `MOST_SATURATED` of
-    the pixels of a contact would be overexposed; then as little less as is needed.
+    It is the automatic exposure of the untouched sensor (`auto_exposure`). If this would overexpose
+    more than `MOST_SATURATED` of the pixels of a contact, it is lowered as little as needed.
 
     Args:
-        untouched: (h, w, 3) radiance.
-        contacts: (n, 3) of the pixels of each contact: radiance as `PictureChain.metered` sees it.
-        chain: of the camera; the usual one if None.
+        untouched: (h, w, 3) radiance of the untouched sensor.
+        contacts: (n, 3) radiance of the pixels of each contact, from `PictureChain.metered`.
+        chain: picture chain of the camera; the default `PictureChain` if None.
+
+    Returns:
+        The factor from radiance to the camera's response.
     """
     response = chain or PictureChain()
     exposure = response.auto_exposure(untouched)

@@ -9,7 +9,7 @@ quantity = objective ["." part]
 function = "min" | "max" | "abs" | "sqrt"
 ```
 
-An objective whose name has other characters than letters, digits and underscores stands in quotes.
+The name of an objective with other characters than letters, digits and underscores is quoted.
 """
 
 from __future__ import annotations
@@ -53,12 +53,12 @@ _FUNCTIONS: dict[str, Callable[..., float]] = {
 _SEVERAL = ("min", "max")
 
 SUM, PRODUCT, SIGN, VALUE = 1, 2, 3, 4
-"""Binding strengths of operations: a weaker operation inside a stronger one stands in brackets."""
+"""Precedence of operations: a weaker operation inside a stronger one is put in brackets."""
 
 
 @dataclass(frozen=True)
 class ScoreTerm:
-    """The value of an objective, or one of the numbers that it is made of.
+    """The value of an objective, or one of its parts.
 
     Attributes:
         objective: its name.
@@ -77,7 +77,9 @@ class ScoreTerm:
 
 @dataclass(frozen=True)
 class _Term:
-    """A node of the tree: what computes its value, its text, and how strongly that text binds."""
+    """A node of the tree: the function that computes its value, its text, and the precedence of
+    this text.
+    """
 
     value: Callable[[Mapping[ScoreTerm, float]], float]
     text: str
@@ -92,8 +94,8 @@ class Expression:
     """Arithmetic with the values of objectives.
 
     Attributes:
-        text: the expression with spaces where they are usual; the same for the same expression.
-        quantities: what it is computed from, each once, in the order of the text.
+        text: the expression with standard spacing; equal expressions have equal texts.
+        quantities: the quantities that it is computed from, each once, in the order of the text.
     """
 
     text: str
@@ -101,12 +103,12 @@ class Expression:
     _tree: _Term = field(repr=False, compare=False)
 
     def __reduce__(self) -> tuple[Callable[[str], Expression], tuple[str]]:
-        """An expression goes to other processes as its text."""
+        """Pickle the expression as its text."""
         return _parsed, (self.text,)
 
     @property
     def objectives(self) -> tuple[str, ...]:
-        """The names of the objectives in it, each once."""
+        """The names of its objectives, each once."""
         return tuple(dict.fromkeys(each.objective for each in self.quantities))
 
     @property
@@ -122,7 +124,7 @@ class Expression:
             known: the value of each quantity.
 
         Raises:
-            ObjectiveError: it divides by zero, or takes the root of a negative number.
+            ObjectiveError: the expression divides by zero, or takes the root of a negative number.
         """
         try:
             return float(self._tree.value(known))
@@ -134,7 +136,7 @@ class Expression:
         """Read an expression.
 
         Raises:
-            ObjectiveError: the text is none; marks the place.
+            ObjectiveError: the text is not an expression; the message marks the place.
         """
         if len(text) > MOST_CHARACTERS:
             raise ObjectiveError(
@@ -152,7 +154,7 @@ class _Token:
 
 
 def marked(text: str, place: int, problem: str) -> ObjectiveError:
-    """An error that shows a place of a text with a caret below it."""
+    """Return an error that shows a place of a text with a caret below it."""
     return ObjectiveError(
         f"{problem}:\n  {text}\n  {' ' * place}^",
         hint="Write it as in 'aoap + 0.5*coverage', with + - * / ( ) min max abs sqrt",
@@ -160,12 +162,14 @@ def marked(text: str, place: int, problem: str) -> ObjectiveError:
 
 
 def _parsed(text: str) -> Expression:
-    """Read an expression of any length: its text with all spaces is longer than what was given."""
+    """Read an expression of any length, as the text with standard spacing may be longer than the
+    given one.
+    """
     return _Parser(text).expression()
 
 
 class _Parser:
-    """Reads one expression by recursive descent."""
+    """A recursive-descent parser of one expression."""
 
     def __init__(self, text: str) -> None:
         self._text = text
@@ -216,7 +220,7 @@ class _Parser:
         return self._chain(("*", "/"), self._sign, PRODUCT)
 
     def _chain(self, signs: tuple[str, ...], inner: Callable[[], _Term], strength: int) -> _Term:
-        """Operands of one strength with operators between them, from the left to the right."""
+        """Parse operands of one precedence with operators between them, from left to right."""
         left = inner()
         while token := self._take(*signs):
             left = _operation(token.text, left, inner(), strength)
@@ -288,7 +292,7 @@ def _operation(sign: str, left: _Term, right: _Term, strength: int) -> _Term:
 
 
 def _quantity(token: _Token) -> ScoreTerm:
-    """The objective and its part that a name stands for."""
+    """Return the objective and the part that a name stands for."""
     if token.kind == "quoted":
         name, _, part = token.text[1:].rpartition(token.text[0])
         return ScoreTerm(name.strip().lower(), part.removeprefix("."))

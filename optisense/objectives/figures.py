@@ -1,4 +1,6 @@
-"""Figures of scores. Matplotlib is loaded when one is drawn; nothing is shown or saved here."""
+"""Figures of scores. Matplotlib is imported when a figure is drawn; figures are neither shown nor
+saved.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,7 @@ def _square_grid(
 
 
 def draw_failure(score: Score) -> Figure:
-    """The reason why there is no score."""
+    """Draw the reason why there is no score."""
     figure = _figure(6, 1.2)
     figure.text(
         0.5, 0.5, f"{score.name} failed: {score.failure}", ha="center", va="center", wrap=True
@@ -47,7 +49,7 @@ def draw_failure(score: Score) -> Figure:
 
 
 def draw_parts(score: Score) -> Figure:
-    """Draw a bar for each number among the parts, for objectives that draw nothing themselves."""
+    """Draw a bar for each number among the parts, for objectives without a figure of their own."""
     numbers = {"value": score.value} | {
         key: float(value)
         for key, value in score.parts.items()
@@ -64,7 +66,7 @@ def draw_parts(score: Score) -> Figure:
 
 
 def draw_rgb2normal(score: Score) -> Figure:
-    """Dominant colour against angle with the fitted lines, and R² by place and direction."""
+    """Draw dominant colour against angle with the fitted lines, and R² by place and direction."""
     places = score.parts["places"]
     values = np.array([place["score"] for place in places])
     typical = int(np.argsort(values)[len(values) // 2])
@@ -94,7 +96,7 @@ def draw_rgb2normal(score: Score) -> Figure:
 
 
 def draw_normdiff(score: Score) -> Figure:
-    """Confusion over the sphere of normals, seen from above, and its two parts."""
+    """Draw confusion over the sphere of normals, seen from above, and its two parts."""
     table = {key: np.asarray(value) for key, value in score.parts["confusion_map"].items()}
     figure = _figure(12, 4.2)
     titles = {
@@ -117,7 +119,7 @@ def draw_normdiff(score: Score) -> Figure:
 
 
 def draw_aoap(score: Score) -> Figure:
-    """How upright each pixel's ray stands on the surface."""
+    """Draw the cosine between each pixel's ray and the surface normal."""
     cosine = np.where(score.arrays["hit"], score.arrays["cosine"], np.nan)
     figure = _figure(9, 4.2)
     picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
@@ -133,7 +135,7 @@ def draw_aoap(score: Score) -> Figure:
 
 
 def draw_projection_warping(score: Score) -> Figure:
-    """The area on the surface behind each pixel, relative to the mean."""
+    """Draw the area of the surface that each pixel sees, relative to the mean."""
     areas = score.arrays["areas"]
     known = np.isfinite(areas)
     count = known.sum(axis=2)
@@ -152,7 +154,7 @@ def draw_projection_warping(score: Score) -> Figure:
 
 
 def draw_shadow(score: Score) -> Figure:
-    """The skin that loses red, green or blue light, in that colour, for each place."""
+    """Draw the skin that loses red, green or blue light, in that colour, for each place."""
     maps, places = score.arrays["maps"], score.parts["places"]
     figure, grid = _square_grid(len(maps), 2.4, 2.1)
     for number, (axes, lost) in enumerate(zip(grid.ravel(), maps, strict=False)):
@@ -168,7 +170,7 @@ def draw_shadow(score: Score) -> Figure:
 
 
 def draw_depth(score: Score) -> Figure:
-    """The depth along a row of each contact, as it is and as it is read."""
+    """Draw the true and the read depth along a row of each contact."""
     profiles, places = score.arrays["profiles"], score.parts["places"]
     figure, grid = _square_grid(len(profiles), 2.6, 1.9, sharey=True)
     for number, (axes, each) in enumerate(zip(grid.ravel(), profiles, strict=False)):
@@ -185,7 +187,7 @@ def draw_depth(score: Score) -> Figure:
 
 
 def draw_coverage(score: Score) -> Figure:
-    """The pixels that see the sensing surface, and the share of the surface that they see."""
+    """Draw the pixels that see the sensing surface, and the share of the surface that they see."""
     hit = score.arrays["hit"]
     figure = _figure(9, 4.2)
     picture, shares = figure.subplots(1, 2, width_ratios=[2, 1])
@@ -205,7 +207,7 @@ def draw_coverage(score: Score) -> Figure:
 
 
 def draw_sharpness(score: Score) -> Figure:
-    """The width of the finest line that is resolved at each pixel."""
+    """Draw the width of the finest line that is resolved at each pixel."""
     title = f"mean over the skin {score.value:.3g} mm"
     return _map_and_histogram(
         score, score.arrays["detail"], "width of the finest line (mm)", "pixels (%)", title
@@ -213,7 +215,7 @@ def draw_sharpness(score: Score) -> Figure:
 
 
 def draw_distortion(score: Score) -> Figure:
-    """How many times as long as wide the footprint of each pixel is."""
+    """Draw the ratio of length to width of the footprint of each pixel."""
     title = f"geometric mean {score.value:.3g}"
     label = "length over width of a footprint"
     values = score.arrays["anisotropy"]
@@ -230,8 +232,9 @@ def _map_and_histogram(
     low: float = 0.0,
     least: float = 0.0,
 ) -> Figure:
-    """A map (h, w) of values and their histogram, with a line at the score; `least` is the lowest
-    upper end of the scale, which is else the 99th percentile.
+    """Draw a map (h, w) of values and their histogram, with a line at the score.
+
+    The upper end of the scale is the 99th percentile, but at least `least`.
     """
     known = values[np.isfinite(values)]
     figure = _figure(9, 4.2)
@@ -248,7 +251,7 @@ def _map_and_histogram(
 
 
 def draw_reading(score: Score) -> Figure:
-    """How far what is read is off in each contact."""
+    """Draw the error of the reading in each contact."""
     maps, places = score.arrays["maps"], score.parts["places"]
     across = int(np.ceil(len(maps) ** 0.5))
     down = -(-len(maps) // across)

@@ -1,4 +1,4 @@
-"""Running a user's Python file for the objectives in it."""
+"""Loading of objectives from a user's Python file."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 def run_file(path: Path) -> dict[str, Any]:
     """Run a Python file as a module of its own and return the names it defines.
 
-    The text of the file is compiled each time. Python's import system would take compiled code
-    from ``__pycache__`` if the file has the same size and the same second of change as before,
-    and so miss a quick edit; it would also write that folder beside the user's file.
+    The text of the file is compiled at each call. Python's import system would use compiled code
+    from ``__pycache__`` if the size and the second of the last change were the same, and so miss a
+    quick edit; it would also write that folder beside the user's file.
 
     Raises:
-        ObjectiveError: it is missing or fails; names the line that failed.
+        ObjectiveError: the file is missing or fails; the message names the line that failed.
     """
     if not path.is_file():
         raise ObjectiveError(f"there is no file '{path}'", hint="Give FILE.py:FUNCTION")
@@ -49,7 +49,7 @@ def run_file(path: Path) -> dict[str, Any]:
 
 
 def place_of(error: BaseException, file: str | None = None) -> str | None:
-    """``file:line`` where an error came from: the last one in `file`, or the last of all."""
+    """Return the ``file:line`` of an error's origin: the last one in `file`, or the last of all."""
     frames = traceback.extract_tb(error.__traceback__)
     inside = [frame for frame in frames if file is None or frame.filename == file]
     return f"{inside[-1].filename}:{inside[-1].lineno}" if inside else file

@@ -12,7 +12,7 @@ from optisense.geometry import Contact, SensingSurface, Sphere, locate
 
 
 def frame_of(contact: Contact, surface: SensingSurface) -> dict[str, Any]:
-    """Where a press sits: place, inward normal, compass directions, the ball's centre."""
+    """Return the frame of a press: place, inward normal, compass directions, the ball's centre."""
     assert isinstance(contact.indenter, Sphere)
     spot = locate(contact, surface)
     east = surface.u_axis - (surface.u_axis @ spot.inward) * spot.inward
@@ -33,7 +33,9 @@ def nearest_press(
     mask: NDArray[np.bool_],
     frames: Sequence[dict[str, Any]],
 ) -> NDArray[np.int64]:
-    """(h, w): the press whose centre is nearest to what a pixel of the mask sees, else -1."""
+    """Return the number (h, w) of the press whose centre is nearest to the point that a pixel of
+    the mask sees; -1 elsewhere.
+    """
     centres = np.array([frame["centre"] for frame in frames])
     owner = np.full(mask.shape, -1, dtype=np.int64)
     seen = points[mask].astype(np.float64)

@@ -1,4 +1,4 @@
-"""Values that several objectives need, each made on first use."""
+"""Values that several objectives share, each computed on first use."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ _T = TypeVar("_T")
 
 
 class MadeOnce:
-    """What keeps the values that it has made.
+    """Base class of objects that keep the values that they have computed.
 
     Attributes:
-        seconds: wall time that each value took, by its name, without that of others inside it.
+        seconds: wall time (s) that each value took, by its name, without that of nested values.
     """
 
     def __init__(self) -> None:
-        """Nothing is made yet."""
+        """Create an object without values."""
         self.seconds: dict[str, float] = {}
         self._made: dict[str, Any] = {}
 
     def shared(self, name: str, make: Callable[[], _T]) -> _T:
-        """A value that is made on first use; an error is kept too, and raised again.
+        """Return a value that is computed on first use; an error is kept as well, and raised again.
 
         Args:
-            name: of it, with the settings that it depends on.
-            make: makes it.
+            name: name of the value, with the settings that it depends on.
+            make: function that computes the value.
         """
         if name not in self._made:
             began = time.perf_counter()

@@ -9,11 +9,13 @@ from optisense.objectives.expressions import Expression
 from optisense.objectives.registry import find, names
 
 _ARITHMETIC = re.compile(r"[-+*/().,'\"\s]")
-"""Characters of which an expression has at least one, and a name none."""
+"""Characters that occur in every expression with an operation, and in no name."""
 
 
 def is_plain(text: str) -> bool:
-    """Whether a text is the name of an objective, or of a Python file, and no expression."""
+    """Return whether a text is the name of an objective or of a Python file, and not an
+    expression.
+    """
     file = text.rpartition(":")[0] or text
     return (
         file.endswith(".py")
@@ -23,7 +25,8 @@ def is_plain(text: str) -> bool:
 
 
 def named_in(texts: Iterable[str]) -> list[str]:
-    """The names of the objectives in names and expressions, each once; files as they are.
+    """Return the names of the objectives in names and expressions, each once; files are kept
+    unchanged.
 
     Raises:
         ObjectiveError: an expression can't be read.
@@ -36,9 +39,9 @@ def named_in(texts: Iterable[str]) -> list[str]:
 
 
 def are_rays_only(texts: Iterable[str]) -> bool:
-    """Whether all objectives trace chief rays only, as far as their names show.
+    """Return whether all objectives trace chief rays only, as far as their names show.
 
-    An objective in a user's file counts as one that renders: no file is run to find out.
+    An objective in a user's file counts as one that renders, as no file is run.
 
     Raises:
         ObjectiveError: an expression can't be read, or an objective is unknown.

@@ -1,5 +1,5 @@
-"""NormDiff: how far apart normals may be that noise makes look alike (the OptiSense paper,
-"NormDiff objective function").
+"""NormDiff: the range of normals that noise makes indistinguishable (the OptiSense paper, "NormDiff
+objective function").
 """
 
 from __future__ import annotations
@@ -20,35 +20,36 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 NOISE = 0.30
-"""Noise of a colour, as a part of its value in each channel (the paper)."""
+"""Noise of a colour, as a share of its value in each channel (the paper)."""
 
 COLOURS = "response"
-"""The paper's noise is proportional to the sensor's response."""
+"""Kind of colours (see `Press.colours`) that the noise is relative to: the paper's noise is
+proportional to the sensor's response."""
 
 LEAST_NOISE = 1.0 / 255.0
-"""Noise of dark channels, of a full well: one grey level. Relative noise alone would tell black
-from nearly black; a real GelSight Mini has noise of 1 to 2 levels everywhere."""
+"""Noise of dark channels, as a share of a full well: one grey level. Relative noise alone would
+distinguish black from nearly black; a real GelSight Mini has noise of 1 to 2 levels everywhere."""
 
 THETA_WEIGHT = 1.0
 PHI_WEIGHT = 1.0
-"""The paper adds both ranges with weights that it does not give. Here both are degrees on the
-sphere of normals (see `azimuth_on_sphere`), and count alike."""
+"""Weight of the range of azimuths. The paper adds both ranges with weights that it does not state.
+Here both are degrees on the sphere of normals (see `azimuth_on_sphere`) and have equal weights."""
 
 LEAST_TILT = 1.0
-"""Degrees that a pixel's normal must have turned by for the pixel to count as indented."""
+"""Smallest change (degrees) of a pixel's normal with which the pixel counts as indented."""
 
 POLE = 2.0
-"""Degrees: normals less tilted than this have no azimuth worth the name."""
+"""Tilt (degrees) below which the azimuth of a normal is undefined."""
 
 CELL = 3.0
-"""Degrees between neighbouring normals at which the confusion is looked up."""
+"""Angle (degrees) between neighbouring normals of the grid on which the confusion is evaluated."""
 
 RING = 10_000
-"""Factor by which the number of a ring of normals counts in the number of a normal; no ring holds
-as many."""
+"""Multiplier of the number of a ring in the number of a normal, larger than the number of normals
+on any ring."""
 
 LEAST_PIXELS = 50
-"""Number of indented pixels below which a press has no score: fewer tell normals apart by
+"""Number of indented pixels below which a press has no score, as fewer distinguish normals by
 chance."""
 
 MOST_WEIGHT = 100.0
@@ -59,17 +60,17 @@ MOST_LEAST_PIXELS = 1_000_000
 
 
 CROWD = 0.75
-"""The part of the camera samples that a pixel gets which is read together with many others. With
-all of them confusion is less by less than a per cent, at half as much work again."""
+"""Share of the camera samples of a pixel that is read together with many others. With all samples,
+confusion is lower by less than a per cent, and the work is 1.5 times as much."""
 
 
 class Confusion(NamedTuple):
     """Confusion over the sphere of normals.
 
     Attributes:
-        theta, phi: (k,) degrees, the normals it was looked up at.
-        confusion: (k,) degrees.
-        theta_range, phi_range: (k,) degrees, its two parts, unweighted.
+        theta, phi: (k,) polar angle and azimuth of the normals at which it is evaluated, degrees.
+        confusion: (k,) confusion, degrees.
+        theta_range, phi_range: (k,) its two unweighted parts, degrees.
         cells: (k,) numbers of the normals, the same for all presses.
     """
 
@@ -82,16 +83,16 @@ class Confusion(NamedTuple):
 
 
 def in_crowd(press: Press, *, least_pixels: int, **settings: Any) -> FloatArray:
-    """(h, w): how exactly the pixels of a press must be known; see `normdiff`.
+    """Return the share (h, w) of camera samples that the pixels of a press need; see `normdiff`.
 
     Raises:
-        ObjectiveError: as `indented_pixels`.
+        ObjectiveError: there are too few indented pixels, as in `indented_pixels`.
     """
     return np.where(indented_pixels(press, least_pixels), CROWD, 0.0)
 
 
 def bounds(*, theta_weight: float, phi_weight: float, **others: object) -> tuple[float, float]:
-    """The lowest and the highest score: each range is 0 to 180 degrees."""
+    """Return the lowest and the highest score; each range is 0 to 180 degrees."""
     return -180.0 * (theta_weight + phi_weight), 0.0
 
 
@@ -119,17 +120,18 @@ def normdiff(
     colours: str = COLOURS,
     least_pixels: int = LEAST_PIXELS,
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How far apart normals may be that camera noise makes look alike: minus the mean, degrees.
+    """Minus the mean range of normals that camera noise makes indistinguishable, in degrees.
 
-    0 is best. For each normal found on a pressed ball, the range of normals of all pixels whose
-    colour lies within the noise, averaged over normals and places.
+    0 is best. For each normal found on a pressed ball, the range is that of the normals of all
+    pixels whose colour lies within the noise; it is averaged over normals and places.
 
     Args:
         evaluation: the sensor.
-        noise: half the width of the colour range, as a part of the value in each channel.
-        theta_weight, phi_weight: of the two ranges in the sum.
-        colours: what the noise is added to, "response" or "picture" (see `Press.colours`).
-        least_pixels: indented pixels that a press must have.
+        noise: half the width of the colour range, as a share of the value in each channel.
+        theta_weight, phi_weight: weights of the two ranges in the sum.
+        colours: kind of colours that the noise is added to, "response" or "picture" (see
+            `Press.colours`).
+        least_pixels: smallest number of indented pixels of a press.
     """
     refuse_outside("noise", noise, 0.0, 1.0)
     refuse_outside("theta_weight", theta_weight, 0.0, MOST_WEIGHT)
@@ -169,10 +171,10 @@ def normdiff(
 
 
 def indented_pixels(press: Press, least: int = LEAST_PIXELS) -> NDArray[np.bool_]:
-    """(h, w): step 1, the pixels of a press whose normals have turned.
+    """Return a mask (h, w) of the pixels of a press whose normals have changed (step 1).
 
     Raises:
-        ObjectiveError: there are less than `least`.
+        ObjectiveError: there are fewer than `least`.
     """
     turned = (press.normals * press.before).sum(axis=2) < np.cos(np.radians(LEAST_TILT))
     indented: NDArray[np.bool_] = press.mask & turned
@@ -188,7 +190,9 @@ def indented_pixels(press: Press, least: int = LEAST_PIXELS) -> NDArray[np.bool_
 def _indentation(
     press: Press, least_pixels: int
 ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-    """The indented pixels of a press, and polar angle and azimuth of their normals, degrees."""
+    """Return the indented pixels of a press, and polar angle and azimuth of their normals,
+    degrees.
+    """
 
     def indentation() -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
         indented = indented_pixels(press, least_pixels)
@@ -205,11 +209,11 @@ def confusion(
     theta_weight: float = THETA_WEIGHT,
     phi_weight: float = PHI_WEIGHT,
 ) -> Confusion:
-    """Steps 2 to 6 of the paper for the indented pixels of one press.
+    """Compute steps 2 to 6 of the paper for the indented pixels of one press.
 
     Args:
-        colours: (n, 3), 0 to 1.
-        theta, phi: (n,) degrees, polar angle and azimuth of the true normal.
+        colours: (n, 3) colours, 0 to 1.
+        theta, phi: (n,) polar angle and azimuth of the true normal, degrees.
         noise, theta_weight, phi_weight: see `normdiff`.
     """
     c = np.asarray(colours, dtype=np.float64)
@@ -234,10 +238,11 @@ def confusion(
 
 
 def azimuth_on_sphere(arc: ArrayLike, theta: ArrayLike) -> FloatArray:
-    """Degrees between two normals of polar angle `theta` whose azimuths differ by `arc`.
+    """Return the angle (degrees) between two normals of polar angle `theta` whose azimuths differ
+    by `arc`.
 
-    A range of azimuths means little where the normal hardly tilts. So it counts as the angle that
-    it makes between normals: sin(theta) * arc for small arcs, never more than 2 theta.
+    A range of azimuths has little effect on a normal of small tilt. It is therefore converted to
+    the angle between the normals: sin(theta) * arc for small arcs, and at most 2 theta.
     """
     half = np.radians(np.minimum(np.asarray(arc, dtype=np.float64), 180.0)) / 2
     sine = np.sin(np.radians(np.asarray(theta, dtype=np.float64))) * np.sin(half)
@@ -248,10 +253,10 @@ def azimuth_on_sphere(arc: ArrayLike, theta: ArrayLike) -> FloatArray:
 def normal_cells(
     theta: ArrayLike, phi: ArrayLike, size: float = CELL
 ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """The nearest of normals spread evenly over the sphere, on rings `size` degrees apart.
+    """Return the nearest of the normals of a grid on the sphere, with rings `size` degrees apart.
 
     Returns:
-        (n,) number, and polar angle and azimuth (degrees) of the normal.
+        The number (n,), polar angle (n,) and azimuth (n,), degrees, of the grid's normal.
     """
     polar, azimuth = np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64)
     ring = np.round(polar / size).astype(np.int64)
@@ -262,7 +267,7 @@ def normal_cells(
 
 
 def _mean_map(maps: list[Confusion]) -> dict[str, FloatArray]:
-    """The confusion at each normal, averaged over the presses that have it."""
+    """Return the confusion at each normal, averaged over the presses that have it."""
     cells = np.concatenate([each.cells for each in maps])
     _, first, member = np.unique(cells, return_index=True, return_inverse=True)
     number = np.bincount(member)

@@ -1,4 +1,4 @@
-"""Power: the light of all LEDs."""
+"""Power: the radiant flux of all LEDs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 USUAL = (66.0, 4.5)
-"""Milliwatts, of the strongest and the weakest lights of a built-in sensor: GelSight360, DIGIT."""
+"""Power (mW) of the strongest and the weakest lights of a built-in sensor: GelSight360, DIGIT."""
 
 
 @objective(
@@ -25,9 +25,9 @@ USUAL = (66.0, 4.5)
     usual=USUAL,
 )
 def power(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
-    """How many mW of light all LEDs of the sensor send out.
+    """The radiant flux, in mW, of all LEDs of the sensor.
 
-    It is their radiant flux; the electrical power is that over the LEDs' efficiency.
+    The electrical power is the radiant flux over the LEDs' efficiency.
 
     Args:
         evaluation: the sensor.

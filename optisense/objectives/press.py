@@ -1,4 +1,4 @@
-"""One press of a ball: what is true about each pixel that sees it, and what a robot reads there."""
+"""One press of a ball: the ground truth and the camera's response of each pixel that sees it."""
 
 from __future__ import annotations
 
@@ -18,35 +18,36 @@ FloatArray = NDArray[np.float64]
 Value = TypeVar("Value")
 
 MOST_CLIPPED = 0.25
-"""A press with a larger part of its pixels overexposed can't be judged."""
+"""Largest share of overexposed pixels of a press that can be scored."""
 
 CLIPPED = 254.5 / 255
 """Value from which on a channel is stored as 255 of 255 levels and counts as saturated."""
 
 DARK = 1.5 / 255
-"""A pixel whose brightest channel is no brighter is black."""
+"""Value of the brightest channel up to which a pixel is black."""
 
 
 @dataclass(frozen=True)
 class Press:
-    """A ball pressed in at one place. Images are (h, w, ...), row 0 on top.
+    """A ball pressed in at one place. Row 0 of images is the top.
 
     Attributes:
-        number: of the place, from 1.
-        place: (3,) mm, on the undeformed sensing surface.
+        number: number of the place, from 1.
+        place: (3,) place on the undeformed sensing surface, mm.
         inward: (3,) unit normal of the undeformed surface there, into the gel.
-        east, north: (3,) unit vectors in the tangent plane; image right and image up in the
-            middle of a flat sensor.
-        centre: (3,) mm, the ball's centre.
-        mask: (h, w), true where this ball is seen in its contact.
+        east, north: (3,) unit vectors in the tangent plane; image right and image up in the middle
+            of a flat sensor.
+        centre: (3,) the ball's centre, mm.
+        mask: (h, w) mask of the pixels that see the contact of this ball.
         response: (h, w, 3) the camera sensor's linear response, 0 to 1 (a full well).
-        normals: (h, w, 3) unit, of the surface seen.
-        points: (h, w, 3) mm, what is seen.
+        normals: (h, w, 3) unit normals of the visible surface.
+        points: (h, w, 3) visible points, mm.
         before: (h, w, 3) unit normals of the untouched surface.
-        camera: turns the response into what is stored.
-        window: which part of the picture the images are; all of it if None.
-        respond_untouched: makes `untouched`.
-        geometry: what objectives have derived of all but the response (see `derived`).
+        camera: picture chain that turns the response into the stored picture.
+        window: the part of the picture that the images show; all of it if None.
+        respond_untouched: function that computes `untouched`.
+        geometry: values that objectives have derived from everything but the response (see
+            `derived`).
     """
 
     number: int
@@ -68,11 +69,12 @@ class Press:
     geometry: dict[Hashable, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def derived(self, key: Hashable, derive: Callable[[], Value]) -> Value:
-        """What follows from all but the response: derived once for the press under any light.
+        """Return a value that depends on everything but the response, computed once for the press
+        under any light.
 
         Args:
-            key: names it, with the settings that it depends on.
-            derive: works it out.
+            key: identifies the value, with the settings that it depends on.
+            derive: function that computes the value.
         """
         if key not in self.geometry:
             self.geometry[key] = derive()
@@ -80,17 +82,17 @@ class Press:
         return found
 
     def direction(self, angle: float) -> FloatArray:
-        """(3,) unit: `angle` degrees from east towards north."""
+        """Return the unit vector (3,) at `angle` degrees from east towards north."""
         a = np.radians(angle)
         along: FloatArray = np.cos(a) * self.east + np.sin(a) * self.north
         return along
 
     @cached_property
     def untouched(self) -> NDArray[np.float32]:
-        """(h, w, 3): the response, without noise, where nothing touches the sensor.
+        """The response (h, w, 3), without noise, of the untouched sensor.
 
         Raises:
-            ObjectiveError: nobody said how it is made.
+            ObjectiveError: the press was created without `respond_untouched`.
         """
         if self.respond_untouched is None:
             raise ObjectiveError(f"nobody knows how {self.name} looks untouched")
@@ -98,7 +100,9 @@ class Press:
 
     @cached_property
     def picture_places(self) -> FloatArray:
-        """(h, w, 2): of each pixel in the picture, -1 to 1 across its width and its height."""
+        """Positions (h, w, 2) of the pixels in the picture, -1 to 1 across its width and its
+        height.
+        """
         window = self.window or PictureWindow.whole(*self.mask.shape)
         y = np.linspace(-1.0, 1.0, window.height)[window.rows]
         x = np.linspace(-1.0, 1.0, window.width)[window.columns]
@@ -111,15 +115,15 @@ class Press:
         return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
     def colours(self, where: NDArray[np.bool_], kind: str = "picture") -> FloatArray:
-        """(n, 3), 0 to 1: the colours of the pixels of a mask (h, w).
+        """Return the colours (n, 3), 0 to 1, of the pixels of a mask (h, w).
 
         Args:
             where: the mask.
-            kind: "picture": sRGB-encoded, as a robot reads it from the camera, before rounding to
-                8 bits; or "response": linear.
+            kind: "picture": sRGB-encoded, as a robot reads it from the camera, before rounding to 8
+                bits; or "response": linear.
 
         Raises:
-            ObjectiveError: another kind.
+            ObjectiveError: there is no such kind.
         """
         chosen = self.response[where].astype(np.float64)
         if kind == "picture":
@@ -130,21 +134,21 @@ class Press:
 
     @property
     def name(self) -> str:
-        """How messages call it."""
+        """The name of the press in messages."""
         x, y, z = self.place
         return f"place {self.number} at ({x:.2f}, {y:.2f}, {z:.2f}) mm"
 
     def check_seen(self) -> None:
-        """Make sure that the camera sees the press.
+        """Check that the camera sees the press.
 
         Raises:
-            ObjectiveError: it does not.
+            ObjectiveError: the camera does not see the press.
         """
         if not self.mask.any():
             raise ObjectiveError(f"the camera does not see {self.name}")
 
     def check(self) -> None:
-        """Make sure that the press can be judged.
+        """Check that the press can be scored.
 
         Raises:
             ObjectiveError: the camera does not see it, or it is overexposed or black.
@@ -177,8 +181,8 @@ def _no_such(kind: str) -> ObjectiveError:
 
 
 def azimuths(press: Press, normals: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
-    """(n,), (n,) degrees: polar angle from the undisturbed normal and azimuth from east, in
-    0..180 and -180..180.
+    """Return the polar angle (n,) from the undisturbed normal, 0 to 180 degrees, and the azimuth
+    (n,) from east, -180 to 180 degrees.
     """
     n = np.asarray(normals, dtype=np.float64)
     x, y, z = n @ press.east, n @ press.north, n @ press.inward

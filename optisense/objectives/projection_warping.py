@@ -1,5 +1,5 @@
-"""2to3PW: how evenly the pixels share the sensing surface (the OptiSense paper, "2D-to-3D
-projection warping objective function").
+"""2to3PW: the evenness of the areas of the sensing surface that pixels see (the OptiSense paper,
+"2D-to-3D projection warping objective function").
 """
 
 from __future__ import annotations
@@ -18,26 +18,33 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 JUMP = 4.0
-"""An edge this many times as long as those before and after it in its row or column leaps over a
-fold or a gap. On a smooth surface neighbouring edges differ by at most a factor of 2.4, which they
-reach where the surface is seen edge-on."""
+"""Ratio of the length of an edge to those before and after it in its row or column above which the
+edge crosses a fold or a gap. On a smooth surface neighbouring edges differ by at most a factor of
+2.4, which occurs where the surface is seen edge-on."""
 
 BAND = 24
-"""Rows of an image that are worked on at once."""
+"""Number of rows of an image that are processed at once, so that they fit into the processor's
+cache."""
 
 MOST_EVEN = 1e-6
-"""Deviations below this part of the mean are rounding of single-precision points."""
+"""Relative deviation below which differences are rounding of single-precision points."""
 
 LEAST_TRIANGLES = 100
-"""Triangles between pixels that must lie on the surface: the deviation of fewer is luck."""
+"""Smallest number of triangles between pixels on the surface, as the deviation of fewer is due to
+chance."""
 
 MOST_JUMP = 1000.0
-"""Edges are never so many times as long as their neighbours: nothing would be left out."""
+"""Largest value of the setting ``jump``; no edge is so many times as long as its neighbours, so
+none would be left out."""
 
 
 class TriangleAreas(NamedTuple):
-    """(h-1, w-1, 2) mm² of each pixel quad's two triangles, NaN where one is left out; and how
-    many were left out, because a corner sees no surface or because an edge leaps.
+    """The areas of the two triangles of each pixel quad.
+
+    Attributes:
+        areas: (h-1, w-1, 2) areas (mm²), NaN for triangles that are left out.
+        missed: number of triangles left out because a corner does not see the surface.
+        leaping: number of triangles left out because an edge crosses a fold or a gap.
     """
 
     areas: NDArray[np.float32]
@@ -62,14 +69,15 @@ USUAL = (1.2, 60.0)
 def projection_warping(
     evaluation: Evaluation, *, jump: float = JUMP
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How evenly the pixels share the sensing surface: mean area over standard deviation.
+    """The evenness of the areas of the sensing surface that pixels see: mean over standard
+    deviation.
 
-    Each quad of neighbouring pixels is two triangles on the surface.
+    Each quad of neighbouring pixels forms two triangles on the surface.
 
     Args:
         evaluation: the sensor.
-        jump: an edge so many times as long as its neighbours leaps over a fold or a gap, and its
-            triangles are left out.
+        jump: ratio of an edge's length to its neighbours' above which the edge crosses a fold or a
+            gap, and its triangles are left out.
     """
     refuse_outside("jump", jump, 1.0, MOST_JUMP, open_low=True)
     rays = evaluation.judged_rays
@@ -97,11 +105,11 @@ def projection_warping(
 def triangle_areas(
     points: NDArray[np.float32], hit: NDArray[np.bool_], jump: float = JUMP
 ) -> TriangleAreas:
-    """The areas of pixel triangles on the surface, by half the cross product of two edges.
+    """Return the areas of pixel triangles on the surface, half the cross product of two edges.
 
     Args:
-        points: (h, w, 3) mm, what each pixel sees.
-        hit: (h, w), whether it sees the surface.
+        points: (h, w, 3) points that the pixels see, mm.
+        hit: (h, w) mask of the pixels that see the surface.
         jump: see `JUMP`.
     """
     x, y, z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
@@ -125,7 +133,9 @@ def triangle_areas(
 
 
 def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """Half the length of the cross product, in bands of rows that stay in a processor's cache."""
+    """Return half the length of the cross product, computed in bands of rows that fit into the
+    cache.
+    """
     half = np.empty_like(a[0])
     for top in range(0, len(half), BAND):
         band = slice(top, top + BAND)
@@ -141,12 +151,13 @@ def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> N
 def leaping_edges(
     edges: list[NDArray[np.float32]], there: NDArray[np.bool_], axis: int, jump: float
 ) -> NDArray[np.bool_]:
-    """(h, w) whether edges are much longer than both their neighbours along an axis.
+    """Return a mask (h, w) of the edges that are much longer than both their neighbours along an
+    axis.
 
     Args:
         edges: x, y and z (h, w) of the edges, mm.
-        there: (h, w), whether both ends of the edge lie on the surface.
-        axis: of the pixels along which the edges run.
+        there: (h, w) mask of the edges with both ends on the surface.
+        axis: axis of the pixels along which the edges run.
         jump: see `JUMP`.
     """
     square = edges[0] ** 2 + edges[1] ** 2 + edges[2] ** 2

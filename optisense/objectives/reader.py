@@ -1,4 +1,4 @@
-"""Leave-one-out readings: each press is read after calibration with all the others."""
+"""Leave-one-out readings: each press is read by a reader that is calibrated with all the others."""
 
 from __future__ import annotations
 
@@ -29,36 +29,37 @@ if TYPE_CHECKING:
 CAMERA_NOISE = MEASURED_NOISE
 
 MOST_NOISE = 128.0
-"""Levels of 255: noise of half the range, in which no picture is left."""
+"""Upper bound on the camera noise (levels of 255), half of the range, above which a picture is
+unusable."""
 
 PIXELS_A_PRESS = 600
-"""Pixels of a contact that are read, about: every second one along rows and columns of GelSight
-Mini's at 640 across. With all of them the error differs by less than a per cent and takes four
-times as long."""
+"""Approximate number of pixels of a contact that are read: every second one along rows and columns
+on GelSight Mini at a width of 640. With all pixels the error differs by less than a per cent and
+takes four times as long."""
 
 LEAST_PIXELS = 50
-"""Pixels of a contact below which a press has no score, as of NormDiff."""
+"""Number of pixels of a contact below which a press has no score, as in NormDiff."""
 
 LEAST_PRESSES = 4
-"""Presses below which there is no score: three, from which a fourth is read, are the fewest that
-tell how colours change along two directions."""
+"""Smallest number of presses: a fourth is read from three others, the fewest that determine the
+change of colours along two directions."""
 
 _CAMERA = 11
-"""A number that is mixed into the seed of the camera's noise, so that it depends on no other noise.
-No two modules that draw from the same seed share one."""
+"""Number that is hashed with the seed of the camera's noise, so that it is independent of other
+random draws. It is unique among the modules that use the same seed."""
 
 
 @dataclass(frozen=True)
 class ReadPress:
-    """One press as it is and as it was read, on a grid of its pixels; arrays are (h, w, ...).
+    """The true and the read normals of one press, on a grid of its pixels.
 
     Attributes:
         press: the press.
         grid: rows and columns of its images that are read.
-        mask: the pixels of the contact, whose errors count.
-        seen: all pixels that were read; those outside the contact show level skin.
-        normals: unit, in the design's frame, as read; the untouched ones where nothing is.
-        true_normals: unit; the untouched ones outside the contact.
+        mask: (h, w) mask of the contact, over which errors are averaged.
+        seen: (h, w) mask of all pixels that were read; those outside the contact show flat skin.
+        normals: (h, w, 3) read unit normals in the design's frame; the untouched ones elsewhere.
+        true_normals: (h, w, 3) true unit normals; the untouched ones outside the contact.
     """
 
     press: Press
@@ -70,7 +71,7 @@ class ReadPress:
 
 
 def pixels_to_read(press: Press, **settings: object) -> NDArray[np.bool_]:
-    """(h, w): the pixels of a contact that are read.
+    """Return the mask (h, w) of the pixels of a contact that are read.
 
     Raises:
         ObjectiveError: the contact has too few pixels.
@@ -82,7 +83,7 @@ def pixels_to_read(press: Press, **settings: object) -> NDArray[np.bool_]:
 
 
 def grid_of(press: Press) -> tuple[slice, slice]:
-    """Rows and columns that are read: every k-th of the box around the contact.
+    """Return the rows and columns that are read: every k-th of the box around the contact.
 
     Raises:
         ObjectiveError: the contact has too few pixels.
@@ -99,14 +100,14 @@ def grid_of(press: Press) -> tuple[slice, slice]:
 
 
 def read_presses(evaluation: Evaluation, camera_noise: float = CAMERA_NOISE) -> list[ReadPress]:
-    """Each press of a sensor, read by a reader that only knows the other ones.
+    """Read each press of a sensor with a reader that is calibrated with the other presses.
 
     Args:
-        evaluation: the sensor. What is read is kept in it for other objectives.
-        camera_noise: standard deviation in levels of 255, on all pictures.
+        evaluation: the sensor; it keeps the readings for other objectives.
+        camera_noise: standard deviation of the noise of all pictures, levels of 255.
 
     Raises:
-        ObjectiveError: there are too few presses, or one can't be judged.
+        ObjectiveError: there are too few presses, or one cannot be scored.
     """
     refuse_outside("camera_noise", camera_noise, 0.0, MOST_NOISE)
     return evaluation.shared(
@@ -116,10 +117,11 @@ def read_presses(evaluation: Evaluation, camera_noise: float = CAMERA_NOISE) -> 
 
 
 def over_places(places: Sequence[Mapping[str, Any]]) -> tuple[float, dict[str, Any]]:
-    """The median of the places' errors, and what they have in common.
+    """Return the median of the places' errors, and a summary of the places.
 
     Args:
-        places: with an `error` each, and the one of `reading_nothing`, in one unit.
+        places: for each place its `error`, and in `reading_nothing` the error of a reader that
+            always reads a flat surface, in the same unit.
     """
     errors = [place["error"] for place in places]
     parts = {
@@ -161,9 +163,10 @@ class _KnownPress:
 
     Attributes:
         grid, mask, seen, true_normals: as in `ReadPress`.
-        order: (n,) of the pixels seen, so that the m of the contact come first.
-        frames: (n, 3, 3) of each of these: two unit tangents of the untouched surface, its normal.
-        tilts: (m, 2) degrees (see `optisense.reading.lookup.tilt_grid`).
+        order: (n,) order of the pixels seen in which the m pixels of the contact come first.
+        frames: (n, 3, 3) frame of each pixel: two unit tangents of the untouched surface, and its
+            normal.
+        tilts: (m, 2) true tilts, degrees (see `optisense.reading.lookup.tilt_grid`).
     """
 
     grid: tuple[slice, slice]
@@ -176,14 +179,14 @@ class _KnownPress:
 
     @classmethod
     def of(cls, press: Press) -> _KnownPress:
-        """The measurements in a press's images.
+        """Collect the data of a press from its images.
 
         Raises:
             ObjectiveError: the contact has too few pixels.
         """
         grid = grid_of(press)
         before = press.before[grid].astype(np.float64)
-        seen = np.linalg.norm(before, axis=2) > 0.5  # it is 0 where a ray misses the skin
+        seen = np.linalg.norm(before, axis=2) > 0.5  # normals are 0 where a ray misses the skin
         mask = np.logical_and(press.mask[grid], seen)
         true = np.where(mask[..., None], press.normals[grid].astype(np.float64), before)
         order = np.argsort(~mask[seen], kind="stable")
@@ -197,11 +200,11 @@ class _KnownPress:
 
     @property
     def steepest(self) -> float:
-        """Degrees."""
+        """The largest tilt, degrees."""
         return float(np.linalg.norm(self.tilts, axis=1).max())
 
     def pixels(self, press: Press, noise: float, seed: int) -> Pixels:
-        """The camera's stored values of the pixels seen, those of the contact first."""
+        """Return the camera's stored values of the pixels seen, those of the contact first."""
 
         def chosen(images: NDArray[np.floating]) -> FloatArray:
             return images[self.grid][self.seen][self.order].astype(np.float64)
@@ -215,7 +218,9 @@ class _KnownPress:
         return Pixels(stored, untouched, chosen(press.picture_places))
 
     def read(self, press: Press, local: FloatArray) -> ReadPress:
-        """The press with the normals (n, 3) that were read, in the frames of its pixels."""
+        """Return the reading of the press from its read normals (n, 3), given in the frames of its
+        pixels.
+        """
         normals = self.true_normals.copy()
         ordered = np.empty_like(local)
         ordered[self.order] = np.einsum("nij,ni->nj", self.frames, local)

@@ -1,4 +1,4 @@
-"""Reading: how far a calibrated reader's normals are off, on presses that it has not seen."""
+"""Reading: the error of a calibrated reader's normals on presses that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 USUAL = (23.0, 2.8)
-"""Degrees, of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
+"""Errors (degrees) of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
 
 
 @objective(
@@ -41,15 +41,17 @@ USUAL = (23.0, 2.8)
 def reading(
     evaluation: Evaluation, *, camera_noise: float = CAMERA_NOISE
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How many degrees normals are off that a calibrated reader finds on presses new to it.
+    """The error, in degrees, of the normals that a calibrated reader finds on presses that it was
+    not fitted to.
 
-    Each press is read by a reader that the other presses have calibrated, from pictures with the
-    camera's noise. The value is the median over places of the mean over the pixels of a contact: on
-    the border of the view the others tell little of a press, which a calibration would have there.
+    Each press is read by a reader calibrated with the other presses, from pictures with the
+    camera's noise. The value is the median over places of the mean over the pixels of a contact.
+    The median limits the effect of presses at the border of the view, where the other presses
+    contain little information, unlike a real calibration.
 
     Args:
         evaluation: the sensor.
-        camera_noise: standard deviation in levels of 255, on all pictures.
+        camera_noise: standard deviation of the noise of all pictures, levels of 255.
     """
     places: list[dict[str, Any]] = []
     maps = []

@@ -1,4 +1,4 @@
-"""The one registry of objectives: those of the package, of other packages, and a user's own."""
+"""The registry of objectives: those of this package, of other packages, and a user's own."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from optisense.objectives.press import Press
 
 ENTRY_POINTS = "optisense.objectives"
-"""Installed packages add objectives under this group: name = "module:function"."""
+"""Entry-point group under which installed packages add objectives: name = "module:function"."""
 
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
@@ -44,14 +44,16 @@ FURTHER = (
     "clearance",
     "cage_roughness",
 )
-"""Objectives of this package beside the paper's."""
+"""Objectives of this package in addition to the paper's."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
-"""Names under which the store of a study keeps the conditions of its trials, and other scores that
-are watched, beside the parts of each objective; no objective may have them."""
+"""Names under which the store of a study keeps the conditions of its trials and other watched
+scores, in addition to the parts of each objective; they are reserved and cannot name an
+objective."""
 
 _MODULES = ("rgb2normal", "normdiff", "aoap", "projection_warping", *FURTHER)
-"""Modules of this package that register objectives; those of further ones have their names."""
+"""Modules of this package that register objectives; a module in `FURTHER` has the name of its
+objective."""
 
 UNBOUNDED = (-math.inf, math.inf)
 
@@ -62,28 +64,29 @@ _F = TypeVar("_F", bound="Callable[..., Any]")
 
 @dataclass(frozen=True)
 class Objective:
-    """A way to score a sensor.
+    """A function that scores a sensor, with its metadata.
 
     Attributes:
-        name: on the command line and in files; lower case.
-        function: takes an `Evaluation` and its own settings as keyword arguments; returns a
-            number, or a number and its parts, or a `Score`.
-        title: how people write the name.
-        draw: makes the figure of a score, or None.
-        beside: names of parts to show beside the value wherever it stands.
-        reads: takes a `Press`, not exposed, and the settings as keyword arguments, and returns
-            which pixels (h, w) are read: True or 1 where they are read one by one, less where a
-            part of the camera samples will do; all of the contact's where it is None.
+        name: name on the command line and in files, in lower case.
+        function: function of an `Evaluation` and its own settings (keyword arguments) that returns
+            a number, or a number and its parts, or a `Score`.
+        title: display name.
+        draw: function that draws the figure of a score, or None.
+        beside: names of the parts that are shown beside the value.
+        reads: function of an unexposed `Press` and the settings (keyword arguments) that returns
+            the pixels (h, w) that are read: True or 1 for pixels that are read one by one, less
+            where a share of the camera samples suffices. If None, all pixels of the contact are
+            read.
         range: the lowest and the highest value that it can return, or a function of the settings
-            (keyword arguments) that returns both; a value outside is no score.
-        needs: the least evidence that it scores by, in words, beside what every score needs
-            (`Settings.least_skin` and `Settings.least_picture`).
-        unit: of the value, such as "mm"; empty for a plain number.
-        lower_is_better: a lower value is better, as of an error. A search maximises the negative
-            value of such an objective.
-        rays_only: it traces chief rays and needs no light.
-        usual: the values of the poorest and of the best built-in sensor, so that a value can be
-            judged; None where they are not known.
+            (keyword arguments) that returns both; a value outside counts as a failure.
+        needs: description of the smallest data that it scores, in addition to the needs of every
+            score (`Settings.least_skin` and `Settings.least_picture`).
+        unit: unit of the value, such as "mm"; empty for a plain number.
+        lower_is_better: whether a lower value is better, as for an error. A search maximises the
+            negative value of such an objective.
+        rays_only: whether it traces chief rays only and needs no light.
+        usual: the values of the poorest and of the best built-in sensor, for comparison; None if
+            they are not known.
     """
 
     name: str
@@ -100,7 +103,7 @@ class Objective:
     usual: tuple[float, float] | None = None
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
-        """Call the function itself, without any checks of what it returns."""
+        """Call the function itself, without any checks of its result."""
         return self.function(evaluation, **settings)
 
     @property
@@ -114,7 +117,8 @@ class Objective:
         }
 
     def bounds(self, settings: Mapping[str, Any] | None = None) -> tuple[float, float]:
-        """The lowest and the highest value with own settings; those that are not given are usual.
+        """Return the lowest and the highest value with the given settings and the defaults of the
+        others.
 
         Raises:
             ObjectiveError: the range is not two numbers in their order.
@@ -159,17 +163,18 @@ def objective(
     """Register a function as an objective.
 
     Args:
-        name: lower case; may not be taken.
-        title: how people write the name; the name itself if left out.
-        draw: makes a figure of the score; a plain one if left out.
-        beside: names of parts to show beside the value wherever it stands.
-        reads: which pixels of a press are read, if not all one by one (see `Objective`).
-        range: the lowest and the highest value, as of `Objective`; any number if left out.
-        needs: the least evidence that it scores by, in words.
-        unit: of the value.
-        lower_is_better: a lower value is better; a higher one if left out.
-        rays_only: it traces chief rays and needs no light.
-        usual: a poor and a good value, to judge others by.
+        name: unused name in lower case.
+        title: display name; ``name`` by default.
+        draw: function that draws the figure of a score; a plain figure by default.
+        beside: names of the parts that are shown beside the value.
+        reads: function that gives the pixels of a press that are read, if not all one by one (see
+            `Objective`).
+        range: the lowest and the highest value, as in `Objective`; any number by default.
+        needs: description of the smallest data that it scores.
+        unit: unit of the value.
+        lower_is_better: whether a lower value is better.
+        rays_only: whether it traces chief rays only and needs no light.
+        usual: a poor and a good value, for comparison.
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
@@ -199,11 +204,14 @@ def objective(
 def pixels_read(
     objectives: Iterable[Objective], settings: Mapping[str, Mapping[str, Any]]
 ) -> Reads | None:
-    """The pixels of a press that objectives read, together; None if that is all, one by one.
+    """Return the function that gives the pixels of a press that any of the objectives read.
 
     Args:
-        objectives: that will share an evaluation.
-        settings: own ones of each, by its name.
+        objectives: the objectives that will share an evaluation.
+        settings: the settings of each objective, by its name.
+
+    Returns:
+        The function; None if all pixels are read one by one.
     """
     found = []
     for each in objectives:
@@ -218,15 +226,16 @@ def pixels_read(
 
 
 def no_pixels(press: Press, **settings: Any) -> NDArray[np.bool_]:
-    """(h, w): none, for objectives that look at rays only."""
+    """Return an empty mask (h, w), for objectives that use rays only."""
     return np.zeros_like(press.mask)
 
 
 def find(name: str) -> Objective:
-    """An objective by its name, or by ``file.py:function``.
+    """Return an objective by its name, or by ``file.py:function``.
 
     Raises:
-        ObjectiveError: there is none (the near match is named), or it can't be loaded.
+        ObjectiveError: there is no such objective (the message names a near match), or it cannot be
+            loaded.
     """
     file, separator, function = name.rpartition(":")
     if separator and file.endswith(".py"):
@@ -245,7 +254,9 @@ def find(name: str) -> Objective:
 
 
 def names() -> list[str]:
-    """All objectives that can be named: the paper's, further ones of this package, then others."""
+    """Return the names of all objectives: the paper's, further ones of this package, then
+    others.
+    """
     _load_built_in()
     offered = [point.name for point in entry_points(group=ENTRY_POINTS)]
     own = (*BUILT_IN, *FURTHER)
@@ -254,10 +265,10 @@ def names() -> list[str]:
 
 @contextmanager
 def forgetting() -> Iterator[None]:
-    """What is registered meanwhile is forgotten afterwards, and what was registered before is back.
+    """Restore the registry on exit to its state on entry.
 
-    For processes that live long and run other people's files: a file that changed may then register
-    its name again, from another place.
+    This is for long-running processes that run users' files: a changed file can then register its
+    name again, from another place.
     """
     _load_built_in()
     before = dict(_registry)
@@ -273,7 +284,8 @@ def from_file(path: Path, function: str | None = None) -> Objective:
 
     Args:
         path: the file.
-        function: its name in the file; may be left out where the file registers one objective.
+        function: name of the function in the file; optional if the file registers a single
+            objective.
 
     Raises:
         ObjectiveError: the file is missing, fails, or has no such function.
@@ -316,7 +328,7 @@ def _from_entry_point(name: str, point: Any) -> Objective:
             where=f"{point.value}, of {point.dist.name if point.dist else 'an installed package'}",
             hint="Repair or remove the package that brings it",
         ) from error
-    if name in _registry:  # its module was decorated, and importing it registered it
+    if name in _registry:  # importing its decorated module has registered it
         return _registry[name]
     if not callable(loaded):
         raise ObjectiveError(f"the objective '{name}' is not a function", where=point.value)
@@ -348,7 +360,7 @@ def _register(new: Objective) -> Objective:
             hint="Write: def score(evaluation): ...",
         )
     old = _registry.get(new.name)
-    # The same function again is a cell or file that was run once more, and replaces itself.
+    # A function that is registered again by a cell or file that was run once more replaces itself.
     if (old is not None and _home(old.function) != _home(new.function)) or (
         old is None
         and new.name in (*BUILT_IN, *FURTHER)

@@ -1,8 +1,8 @@
 """The presses of a sensor under lights of any colours and powers, from one rendering.
 
-Light adds up: an image is the sum of what each light group gives, times its flux. So each press
-is rendered once, with a layer for each group, and its pixels under other lights are a weighted
-sum of layers: exact, and thousands of times sooner than a new image.
+Light is additive: an image is the sum of the layers of the light groups, each times its flux. Each
+press is therefore rendered once, with a layer for each group, and its pixels under other lights are
+a weighted sum of layers: exact, and thousands of times faster than a new image.
 """
 
 from __future__ import annotations
@@ -31,16 +31,19 @@ Layers = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class _Seen:
-    """One press with what is needed to light it again.
+    """One press with the data needed to relight it.
 
     Attributes:
-        press: at full size, not exposed.
-        small: cut to the box of its contact, not exposed either.
+        press: the unexposed press at full size.
+        small: the unexposed press, cropped to the box of its contact.
         box: rows and columns of that box.
-        around: of the box with all pixels whose overexposure can spread into it.
-        touched: (h', w') within `around`, pixels of the press's own image.
-        own: (n,), which of these are the press's (its image may show others beside it).
-        layers: (groups, 3, n) radiance for 1 mW a channel of the pixels of `touched`.
+        around: rows and columns of the box, extended by the pixels whose overexposure can spread
+            into it.
+        touched: (h', w') mask, within `around`, of the pixels that contacts touch in the press's
+            image.
+        own: (n,) mask of those of these pixels that belong to the press (its image may show other
+            presses).
+        layers: (groups, 3, n) radiance of these pixels for lights of 1 mW per channel.
     """
 
     press: Press
@@ -53,16 +56,16 @@ class _Seen:
 
 
 class Relighting:
-    """A sensor whose presses can be seen under any lights.
+    """A sensor whose presses can be relit with any lights.
 
     Attributes:
-        model: of the sensor.
-        settings: of its images.
+        model: the optical model of the sensor.
+        settings: settings of its images.
         groups: the light groups, in the order of their layers.
     """
 
     def __init__(self, evaluation: Evaluation) -> None:
-        """Render each press once. The evaluation is not needed any more afterwards.
+        """Render each press once. The evaluation is not needed afterwards.
 
         Raises:
             ObjectiveError: a place is not seen.
@@ -87,7 +90,7 @@ class Relighting:
         return Evaluation(self.model, self.settings).chief_rays
 
     def flux_of(self, design: SensorDesign) -> NDArray[np.float64]:
-        """(groups, 3) mW of R, G, B of each light, as a design has them.
+        """Return the power (groups, 3), mW, of each light of a design in R, G, B.
 
         Raises:
             ObjectiveError: the design's light groups are not those that were rendered.
@@ -100,25 +103,29 @@ class Relighting:
         return np.array([group.channel_flux() for group in design.lights.values()])
 
     def untouched(self, flux: ArrayLike) -> NDArray[np.float32]:
-        """(h, w, 3): the radiance of the untouched sensor under lights (groups, 3) mW."""
+        """Return the radiance (h, w, 3) of the untouched sensor under lights of a power (groups,
+        3), mW.
+        """
         return self._as_image(_mixed(self._untouched, flux))
 
     def image(self, flux: ArrayLike) -> TactileImage:
-        """The image of the untouched sensor under these lights."""
+        """Return the image of the untouched sensor under these lights."""
         given = np.asarray(flux, dtype=np.float64)
         return self._image.relight(dict(zip(self.groups, given, strict=True)))
 
     def exposure(self, flux: ArrayLike) -> float:
-        """The factor from radiance to what the camera reads, under these lights."""
+        """Return the exposure (factor from radiance to the camera's response) under these
+        lights.
+        """
         return self._exposure(self.untouched(flux), self._contacts(flux))
 
     def presses(self, flux: ArrayLike, *, whole: bool = False) -> list[Press]:
-        """The presses under lights (groups, 3) mW.
+        """Return the presses under lights of a power (groups, 3), mW.
 
         Args:
-            flux: mW of R, G, B of each light, by group.
-            whole: images of full size, with what lies around the contacts; otherwise they are
-                cut to the box of the contact, which holds all that a contact's pixels tell.
+            flux: power (mW) of each light in R, G, B, by group.
+            whole: whether images have full size; otherwise they are cropped to the box of the
+                contact, which contains all its pixels.
 
         Raises:
             ObjectiveError: a press is overexposed or black under these lights.
@@ -133,7 +140,7 @@ class Relighting:
     def presses_exposed(
         self, flux: ArrayLike, exposure: float, *, whole: bool = False
     ) -> list[Press]:
-        """The same under an exposure of one's own; they may be overexposed or black."""
+        """Return the presses under a given exposure; they may be overexposed or black."""
         return self._lit_presses(self.untouched(flux), self._contacts(flux), exposure, whole)
 
     def _lit_presses(
@@ -157,11 +164,12 @@ class Relighting:
         return found
 
     def lit(self, design: SensorDesign, *, whole: bool = True) -> Evaluation:
-        """An evaluation of a design that differs in the colours and powers of its lights only.
+        """Return an evaluation of a design that differs only in the colours and powers of its
+        lights.
 
         Args:
-            design: as of `flux_of`.
-            whole: as of `presses`.
+            design: the design, as in `flux_of`.
+            whole: whether images have full size, as in `presses`.
         """
         return _Relit(self, design, whole)
 
@@ -188,11 +196,13 @@ class Relighting:
         return _Seen(press, small, box, around, touched, own, layers)
 
     def _contacts(self, flux: ArrayLike) -> list[NDArray[np.float32]]:
-        """(n, 3) for each press: the radiance of what contacts touch in its image."""
+        """Return for each press the radiance (n, 3) of the pixels that contacts touch in its
+        image.
+        """
         return [_mixed(seen.layers, flux).T for seen in self._seen]
 
     def _as_image(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:
-        """(h, w, 3), a view of planes (3, h * w)."""
+        """Return planes (3, h * w) viewed as an image (h, w, 3)."""
         return np.moveaxis(planes.reshape(3, *self._shape), 0, -1)
 
     def _exposure(
@@ -213,7 +223,7 @@ class Relighting:
         exposure: float,
         whole: bool,
     ) -> NDArray[np.float32]:
-        """The camera's response: of the whole image, or of the box of the contact."""
+        """Return the camera's response of the whole image, or of the box of the contact."""
         radiance = background[seen.around].copy()
         radiance[seen.touched] = contact
         exposed = radiance * np.float32(exposure)
@@ -226,7 +236,7 @@ class Relighting:
     def _untouched_response(
         self, seen: _Seen, background: NDArray[np.float32], exposure: float, whole: bool
     ) -> NDArray[np.float32]:
-        """The same without the contact, and without noise."""
+        """Return the response of the untouched sensor, without noise."""
         camera = self._camera.without_noise()
         if whole:
             return camera.respond(background * np.float32(exposure))
@@ -235,7 +245,7 @@ class Relighting:
     def _response_of_box(
         self, seen: _Seen, exposed: NDArray[np.float32], camera: PictureChain
     ) -> NDArray[np.float32]:
-        """The response of the box of a contact, of what is exposed around it."""
+        """Return the response in the box of a contact from the exposed pixels around it."""
         seed = self.settings.seed
         inner = tuple(
             slice(box.start - around.start, box.stop - around.start)
@@ -253,7 +263,7 @@ class Relighting:
 
 
 class _Relit(Evaluation):
-    """An evaluation whose images come from layers."""
+    """An evaluation whose images are sums of layers."""
 
     def __init__(self, relighting: Relighting, design: SensorDesign, whole: bool) -> None:
         super().__init__(relighting.model, relighting.settings)
@@ -292,14 +302,14 @@ class _Relit(Evaluation):
 
 
 def _planes(layer: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(3, h * w), each channel by itself, of a layer (h, w, 3)."""
+    """Return the channels of a layer (h, w, 3) as planes (3, h * w)."""
     return np.ascontiguousarray(np.moveaxis(layer, -1, 0)).reshape(3, -1)
 
 
 def _mixed(layers: Layers, flux: ArrayLike) -> NDArray[np.float32]:
-    """(3, n): the sum of layers (groups, 3, n) times the flux (groups, 3) of each.
+    """Return the sum (3, n) of layers (groups, 3, n), each times its flux (groups, 3).
 
-    In single precision and in the order of the groups, as the image itself adds them up.
+    It is computed in single precision and in the order of the groups, like the image itself.
     """
     weights = np.asarray(flux, dtype=np.float32)
     total = np.zeros(layers.shape[1:], dtype=np.float32)

@@ -1,5 +1,5 @@
-"""RGB2Normal: how linearly the colour follows the surface normal, on balls pressed in at nine
-places (the OptiSense paper, "RGB2Normal mapping objective function").
+"""RGB2Normal: the linearity of colour as a function of the surface normal, on balls pressed in at
+nine places (the OptiSense paper, "RGB2Normal mapping objective function").
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ DIRECTIONS = 8
 directions."""
 
 COLOURS = "picture"
-"""The layer of colours that a robot reads."""
+"""Kind of colours (see `Press.colours`) that the score reads: those of the stored picture."""
 
 LEAST_PIXELS = 8
 """Smallest number of pixels on a line; a straight fit through fewer says little."""
@@ -33,7 +33,7 @@ MOST_LEAST_PIXELS = 10_000
 """Largest number of pixels that a line or press may be asked to have; none has as many."""
 
 MOST_DIRECTIONS = 360
-"""One a degree: lines that are nearer to each other have the same pixels."""
+"""Largest number of lines, one per degree: closer lines have the same pixels."""
 
 
 @dataclass(frozen=True)
@@ -41,10 +41,10 @@ class Fit:
     """A straight line through (angle, dominant colour) points.
 
     Attributes:
-        angles: (m,) degrees, signed.
-        colours: (m,) the dominant colour.
-        slope, intercept: of colour over angle; the slope is 0 or positive.
-        linearity: R^2.
+        angles: (m,) signed angles, degrees.
+        colours: (m,) dominant colour.
+        slope, intercept: coefficients of colour over angle; the slope is at least 0.
+        linearity: coefficient of determination R^2.
     """
 
     angles: FloatArray
@@ -57,10 +57,11 @@ class Fit:
 def on_lines(
     press: Press, *, directions: int, half_lines: bool, least_pixels: int, colours: str
 ) -> NDArray[np.bool_]:
-    """(h, w): the pixels of all lines of a press, which are all that is read; see `rgb2normal`.
+    """Return a mask (h, w) of the pixels on the lines of a press, the only ones that are read; see
+    `rgb2normal`.
 
     Raises:
-        ObjectiveError: as `lines_of`.
+        ObjectiveError: a setting is invalid or a line has too few pixels, as in `lines_of`.
     """
     return np.logical_or.reduce(
         list(lines_of(press, directions, half_lines, least_pixels).values())
@@ -90,17 +91,17 @@ def rgb2normal(
     colours: str = COLOURS,
     least_pixels: int = LEAST_PIXELS,
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How linearly the colour follows the surface normal on pressed balls: the mean R².
+    """The linearity of colour as a function of the surface normal on pressed balls: the mean R².
 
-    1 is a perfect line, 0 none. Mean over compass directions of the R² of dominant colour against
-    signed angle along a line through the ball's centre, and over places.
+    1 is a perfect line, 0 none. The value is the mean, over compass directions and places, of the
+    R² of dominant colour against signed angle along a line through the ball's centre.
 
     Args:
         evaluation: the sensor.
-        directions: how many compass directions. Two opposite ones share a diameter.
-        half_lines: fit each direction's radius, from the centre outward, by itself.
-        colours: what is read, "picture" or "response" (see `Press.colours`).
-        least_pixels: that a line must have.
+        directions: number of compass directions; two opposite ones share a diameter.
+        half_lines: whether each direction's radius, from the centre outward, is fitted separately.
+        colours: kind of colours, "picture" or "response" (see `Press.colours`).
+        least_pixels: smallest number of pixels of a line.
     """
     _refuse_directions(directions, half_lines)
     refuse_outside("least_pixels", least_pixels, 3, MOST_LEAST_PIXELS)
@@ -141,7 +142,8 @@ def lines_of(
     half_lines: bool = False,
     least_pixels: int = LEAST_PIXELS,
 ) -> dict[float, NDArray[np.bool_]]:
-    """The lines of a press, by angle in degrees; see `rgb2normal` for the arguments.
+    """Return the lines of a press as masks (h, w), by angle in degrees; see `rgb2normal` for the
+    arguments.
 
     Raises:
         ObjectiveError: the directions have no opposite ones, or a line has too few pixels.
@@ -165,7 +167,7 @@ def lines_of(
 def _tilts_on_lines(
     press: Press, directions: int, half_lines: bool, least_pixels: int
 ) -> dict[float, tuple[NDArray[np.bool_], FloatArray]]:
-    """The lines of a press, by angle, and the signed angles of the normals on each."""
+    """Return the lines of a press, by angle, and the signed angles of the normals on each."""
 
     def tilts() -> dict[float, tuple[NDArray[np.bool_], FloatArray]]:
         return {
@@ -188,16 +190,17 @@ def _refuse_directions(directions: int, half_lines: bool) -> None:
 
 
 def line(press: Press, angle: float, half: bool = False) -> NDArray[np.bool_]:
-    """(h, w): the pixels of a contact that lie on a line through the ball's centre.
+    """Return a mask (h, w) of the pixels of a contact on a line through the ball's centre.
 
-    The line is where the plane through the centre, spanned by the direction and the undisturbed
-    normal, cuts the surface. A pixel belongs to it if the true point that it sees is within half a
-    pixel's footprint of that plane, so the line is one pixel wide in any camera, on any surface.
+    The line is the intersection of the surface with the plane through the centre that is spanned by
+    the direction and the undisturbed normal. A pixel belongs to it if the true point that it sees
+    is within half a pixel's footprint of that plane, so the line is one pixel wide in any camera,
+    on any surface.
 
     Args:
         press: the press.
-        angle: degrees from east towards north.
-        half: only the radius in that direction, not the diameter.
+        angle: direction, degrees from east towards north.
+        half: whether the line is only the radius in that direction instead of the diameter.
     """
     box = press.box
     along = press.direction(angle)
@@ -215,10 +218,11 @@ def line(press: Press, angle: float, half: bool = False) -> NDArray[np.bool_]:
 
 
 def signed_angles(press: Press, angle: float, normals: ArrayLike) -> FloatArray:
-    """(m,) degrees of tilt towards the direction at `angle`, from the undisturbed normal.
+    """Return the tilt (m,), degrees, of normals from the undisturbed normal towards the direction
+    at `angle`.
 
-    Signed, so that a line through the ball has normals from one side to the other: along a whole
-    diameter even a perfect sensor's colour does not follow the unsigned angle.
+    The tilt is signed, so that a line through the ball has tilts of both signs: along a whole
+    diameter, even a perfect sensor's colour is no function of the unsigned angle.
     """
     n = np.asarray(normals, dtype=np.float64)
     tilt: FloatArray = np.degrees(np.arctan2(n @ press.direction(angle), n @ press.inward))
@@ -228,7 +232,7 @@ def signed_angles(press: Press, angle: float, normals: ArrayLike) -> FloatArray:
 def fit(angles: ArrayLike, colours: ArrayLike) -> Fit:
     """Fit the first principal component of colours (m, 3) to angles (m,) in degrees."""
     x, y = np.asarray(angles, dtype=np.float64), dominant_colour(colours)
-    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:  # nothing follows anything
+    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:  # constant values have no linear relation
         return Fit(x, y, 0.0, float(y.mean()), 0.0)
     across, up = x - x.mean(), y - y.mean()
     shared, spread = float(across @ up), float(across @ across)
@@ -241,23 +245,27 @@ def fit(angles: ArrayLike, colours: ArrayLike) -> Fit:
 
 
 def dominant_colour(colours: ArrayLike) -> FloatArray:
-    """(m,): colours (m, 3) along their first principal component (PCA), about their mean."""
+    """Return the projection (m,) of colours (m, 3) on their first principal component (PCA), about
+    their mean.
+    """
     c = np.asarray(colours, dtype=np.float64)
     centred = c - c.mean(axis=0)
     return centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
 
 
 def _line_of(angle: float, fits: dict[float, Fit]) -> float:
-    """The line on which a direction lies: its own radius, or the diameter it is one end of."""
+    """Return the line of a direction: its own radius, or its diameter."""
     return float(angle) if float(angle) in fits else float(angle) - 180.0
 
 
 def _step(values: FloatArray, axis: int) -> FloatArray:
-    """How much values change from pixel to pixel along an axis: the mean of both neighbours."""
+    """Return the change of values from pixel to pixel along an axis, the mean of the differences to
+    both neighbours.
+    """
     edge = np.full_like(values.take([0], axis), np.nan)
     change = np.concatenate([edge, np.abs(np.diff(values, axis=axis)), edge], axis)
     length = values.shape[axis]
     before, after = change.take(range(length), axis), change.take(range(1, length + 1), axis)
-    one_side = np.fmax(before, after)  # where the other neighbour is missing
+    one_side = np.fmax(before, after)  # the other neighbour is missing
     both = 0.5 * (before + after)
     return np.where(np.isnan(both), one_side, both)

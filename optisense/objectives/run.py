@@ -52,19 +52,19 @@ def evaluate(
     """Score a sensor.
 
     Several objectives share images and rays. An objective that fails gives a score with its
-    `failure` set; the others are not touched by it.
+    `failure` set and does not affect the others.
 
     Args:
-        sensor: a model, a design, or what an earlier call shared.
-        objectives: a name or several; a user's own as "file.py:function".
-        progress: called while images are rendered.
+        sensor: a model, a design, or an `Evaluation`, whose images and rays are reused.
+        objectives: one name or several; a user's own objective as "file.py:function".
+        progress: function that is called while images are rendered.
         settings: fields of `Settings`, and keyword arguments of the objectives.
 
     Returns:
-        The score, or scores by name if several objectives were asked for.
+        The score, or scores by name if several objectives were given.
 
     Raises:
-        ObjectiveError: an objective or a setting is unknown or makes no sense.
+        ObjectiveError: an objective is unknown, or a setting is unknown or invalid.
         SetupError: the renderer can't run on this machine.
         OptiSenseError: the design can't be built.
     """
@@ -89,10 +89,10 @@ def evaluate(
 def split_settings(
     settings: Mapping[str, Any], objectives: Iterable[Objective]
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
-    """Settings of images and rays, and those of each objective, by objective.
+    """Divide settings into those of images and rays, and those of each objective, by objective.
 
     Raises:
-        ObjectiveError: nobody knows a setting; names the near match.
+        ObjectiveError: a setting is unknown; the message names a near match.
     """
     known = {field.name for field in fields(Settings)}
     wanted = list(objectives)
@@ -113,7 +113,7 @@ def split_settings(
 
 
 def _check_kind(name: str, value: Any, default: Any) -> None:
-    """Settings of objectives keep the kind of their default: number, truth value or text."""
+    """Check that a setting has the kind of its default: number, truth value or text."""
     if isinstance(default, bool):
         kind, fits = "true or false", isinstance(value, bool)
     elif isinstance(default, int):

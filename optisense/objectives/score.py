@@ -1,4 +1,4 @@
-"""A score: how good a sensor is by one objective, what it is made of, and how to look at it."""
+"""Scores: the value of one objective for a sensor, its parts and its figure."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ROUNDING = 1e-9
-"""Values that differ by a smaller part of themselves count as the same. Scores of the same rays
-differ by about 1e-15 of themselves, the rounding of double precision; those of other random numbers
-by more than 1e-6."""
+"""Relative difference below which values count as equal. Scores of the same rays differ by about
+1e-15, the rounding of double precision; scores with other random numbers differ by more than
+1e-6."""
 
 Drawing = Callable[["Score"], "Figure"]
-"""Makes the figure of a score."""
+"""A function that draws the figure of a score."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class Score:
     Attributes:
         objective: name in the registry.
         value: the score; NaN if it failed.
-        failure: why there is no value, as a sentence without its full stop, or None.
-        parts: what the value is made of, ready for JSON (see each objective).
-        seconds: wall time, work shared with other objectives included where this one came first.
-        title: how people write the objective's name.
-        arrays: what the figure is drawn from; not part of `to_dict`.
-        draw: makes the figure.
-        shown: names of parts to show beside the value wherever it stands.
-        unit: of the value; empty for a plain number.
-        lower_is_better: a lower value is better, as of an error.
+        failure: reason for a missing value, as a sentence without its full stop, or None.
+        parts: values that the score is computed from, ready for JSON (see each objective).
+        seconds: wall time (s), including work shared with later objectives.
+        title: display name of the objective.
+        arrays: data of the figure; not part of `to_dict`.
+        draw: function that draws the figure.
+        shown: names of the parts that are shown beside the value.
+        unit: unit of the value; empty for a plain number.
+        lower_is_better: whether a lower value is better, as for an error.
     """
 
     objective: str
@@ -57,12 +57,14 @@ class Score:
 
     @property
     def name(self) -> str:
-        """The title, or the registry's name where there is none."""
+        """The title, or the registry's name if there is none."""
         return self.title or self.objective
 
     @property
     def file_name(self) -> str:
-        """The objective's name with the characters that file names can't have as dashes."""
+        """The objective's name, with characters that are invalid in file names replaced by
+        dashes.
+        """
         return re.sub(r"[^\w.+-]+", "-", self.objective).strip("-.") or "score"
 
     @property
@@ -75,7 +77,7 @@ class Score:
         )
 
     def figure(self) -> Figure:
-        """A drawing of the parts; a plain one for objectives that bring none of their own."""
+        """Draw the parts; objectives without a figure of their own have a plain one."""
         from optisense.objectives.figures import draw_failure, draw_parts
 
         if self.failure is not None:
@@ -83,7 +85,9 @@ class Score:
         return (self.draw or draw_parts)(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but figure data, ready for JSON (no NaN: a missing number is None)."""
+        """Return everything except figure data, ready for JSON (missing numbers are None instead of
+        NaN).
+        """
         return {
             "objective": self.objective,
             "title": self.name,
@@ -96,7 +100,7 @@ class Score:
         }
 
     def _repr_html_(self) -> str:
-        """A table for notebooks: the value and all single numbers among the parts."""
+        """Return a table for notebooks: the value and all single numbers among the parts."""
         shown = self.failure if self.failure is not None else f"<b>{self.value:.4g}</b>"
         rows = [(self.name, shown if self.failure is None else to_html(str(shown)))]
         for key, value in self.parts.items():
@@ -107,16 +111,16 @@ class Score:
 
 
 def deviation_of(values: Sequence[float]) -> float:
-    """The standard deviation of a sample.
+    """Return the standard deviation of a sample.
 
-    It is exactly 0 where all values are the same but for rounding, as those of an objective are
-    that draws no random numbers.
+    It is exactly 0 if all values are equal up to rounding, as for an objective without random
+    numbers.
 
     Args:
         values: finite numbers.
 
     Returns:
-        The deviation, by n - 1; NaN for fewer than two values.
+        The deviation, with divisor n - 1; NaN for fewer than two values.
     """
     if len(values) < 2:
         return math.nan
@@ -126,10 +130,10 @@ def deviation_of(values: Sequence[float]) -> float:
 
 
 def json_ready(value: Any) -> Any:
-    """Plain dicts, lists, strings and finite numbers; numpy's are converted, NaN becomes None.
+    """Convert a value to plain dicts, lists, strings and finite numbers; NaN becomes None.
 
     Raises:
-        ObjectiveError: something that JSON can't hold.
+        ObjectiveError: the value contains an object that JSON cannot represent.
     """
     if isinstance(value, np.generic):
         value = value.item()
@@ -152,5 +156,5 @@ def json_ready(value: Any) -> Any:
 
 
 def shown_number(value: float | str) -> str:
-    """A number with four digits that count; anything else as it is."""
+    """Format a number with four significant digits; other values are unchanged."""
     return f"{value:.4g}" if isinstance(value, float) else str(value)

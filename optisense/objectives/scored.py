@@ -1,4 +1,4 @@
-"""Scores of one sensor with one or several seeds, and how far they spread."""
+"""Scores of one sensor with one or several seeds, and their spread."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from optisense.objectives.score import Score, deviation_of, json_ready
 
 @dataclass(frozen=True)
 class Run:
-    """The scores of one seed, and what they share; scores may still be added."""
+    """The scores of one seed and their shared evaluation; scores may still be added."""
 
     evaluation: Evaluation
     scores: dict[str, Score]
@@ -27,14 +27,14 @@ class Scored:
 
     Attributes:
         design: the sensor.
-        runs: one a seed.
+        runs: the runs, one per seed.
     """
 
     design: SensorDesign
     runs: list[Run] = field(default_factory=list)
 
     def add(self, evaluation: Evaluation) -> dict[str, Score]:
-        """Begin a run; scores put into the returned dict are part of it."""
+        """Begin a run; scores added to the returned dict are part of it."""
         self.runs.append(Run(evaluation, {}))
         return self.runs[-1].scores
 
@@ -44,22 +44,24 @@ class Scored:
         return self.runs[0].scores if self.runs else {}
 
     def values(self, name: str) -> list[float]:
-        """The values of one objective, seeds that failed left out."""
+        """Return the values of one objective, without seeds that failed."""
         found = [run.scores[name] for run in self.runs if name in run.scores]
         return [score.value for score in found if score.failure is None]
 
     def mean(self, name: str) -> float:
-        """Mean over seeds, NaN if all failed."""
+        """Return the mean over seeds, NaN if all failed."""
         values = self.values(name)
         return float(np.mean(values)) if values else float("nan")
 
     def spread(self, name: str) -> float | None:
-        """Standard deviation over seeds (of a sample); None for fewer than two."""
+        """Return the sample standard deviation over seeds; None for fewer than two."""
         values = self.values(name)
         return deviation_of(values) if len(values) > 1 else None
 
     def beside(self, name: str) -> str:
-        """The parts to show beside a score, of the first seed, which is named if there are more."""
+        """Return the parts to show beside a score, of the first seed, which is named if there are
+        several.
+        """
         shown = self.scores[name].beside
         if not shown or len(self.runs) == 1:
             return shown
@@ -70,7 +72,7 @@ class Scored:
         return any(s.failure is not None for run in self.runs for s in run.scores.values())
 
     def to_dict(self) -> dict[str, Any]:
-        """All of it, ready for JSON; the scores are those of the first seed."""
+        """Return all values, ready for JSON; the scores are those of the first seed."""
         if not self.runs:
             return {"design": self.design.name, "scores": {}}
         first = self.runs[0].evaluation

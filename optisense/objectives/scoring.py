@@ -41,7 +41,7 @@ def run_objective(
         )
 
     try:
-        if isinstance(evaluation, Evaluation):  # others are made from one with the same camera
+        if isinstance(evaluation, Evaluation):  # others share its camera
             evaluation.check_possible()
         result = objective(evaluation, **(settings or {}))
         value, parts, arrays, draw = _read(result)
@@ -74,7 +74,7 @@ def run_objective(
 
 
 def _read(result: Any) -> tuple[float, Mapping[str, Any], Mapping[str, Any], Any]:
-    """Value, parts, figure data and drawing of what an objective returned."""
+    """Return value, parts, figure data and drawing from the result of an objective."""
     if isinstance(result, Score):
         if result.failure is not None:
             raise ObjectiveError(result.failure)

@@ -12,30 +12,31 @@ from optisense.mechanics.skins import CONFORMING, SKINS
 from optisense.quality import LEVELS, MOST_PHOTONS, photons_of
 
 BALL_RADIUS = 1.5
-"""mm, of the ball that presses (the OptiSense paper, "RGB2Normal")."""
+"""Radius (mm) of the ball that presses (the OptiSense paper, "RGB2Normal")."""
 
 PRESS_DEPTH = 0.3
-"""mm. The paper gives none. A ball of 1.5 mm is then touched up to 37 degrees; published presses
-of balls on real GelSight Minis reach 25 to 40."""
+"""Depth (mm) of presses; the paper does not state it. A ball of 1.5 mm is then touched up to 37
+degrees; published presses of balls on real GelSight Minis reach 25 to 40."""
 
 PLACES = 9
-"""Contacts that cover the visible sensing surface evenly (the paper)."""
+"""Number of contacts, which cover the visible sensing surface evenly (the paper)."""
 
 ACROSS = 640
-"""Pixels across images and rays, for every sensor. At 320, as many cameras are read, a ball on the
-side of a fingertip is too few pixels to judge; images of 640 cost little more."""
+"""Width (pixels) of images and rays for every sensor. At 320, the usual width for many cameras, a
+ball on the side of a fingertip has too few pixels for a score; images of 640 cost little more."""
 
 
 VIEW_ACROSS = 160
-"""Chief rays across the image by which both shares are measured, whatever the resolution of the
-scores: on the built-in sensors they differ by less than 0.02 from those of 640."""
+"""Number of chief rays across the image from which the shares of skin and picture are computed, for
+any resolution of the scores: on the built-in sensors they differ by less than 0.02 from those of
+640."""
 
 MOST_PIXELS = 16_384
-"""Pixels along a side of an image: what the renderer holds in memory, and more than any camera has
-that fits into a sensor."""
+"""Largest number of pixels along a side of an image: the limit of the renderer's memory, and more
+than any camera that fits into a sensor has."""
 
 MOST_RADIUS = 1000.0
-"""mm, of the ball that presses: larger than any sensor, to which it is flat."""
+"""Largest radius (mm) of the ball that presses: larger than any sensor, for which it is flat."""
 
 
 @dataclass(frozen=True)
@@ -43,20 +44,21 @@ class Settings:
     """Images and rays that objectives share. Lengths in mm.
 
     Attributes:
-        resolution: (width, height) of the images; 640 wide, in the camera's shape, if None.
-        ray_resolution: (width, height) of the chief rays; likewise.
-        photons: to trace for the light: a number or a level of `optisense.quality`; fine if None.
-        seed: of the photons and camera samples.
-        radius: of the ball that presses.
-        depth: to which it presses.
+        resolution: (width, height) of the images, pixels; if None, 640 wide with the camera's
+            aspect ratio.
+        ray_resolution: (width, height) of the chief rays; the same default.
+        photons: number of photons for the light, or a level of `optisense.quality`; fine if None.
+        seed: seed of the photons and camera samples.
+        radius: radius of the ball that presses, mm.
+        depth: depth of the presses, mm.
         places: (u, v) on the sensing surface; nine that cover it evenly if None.
-        together: press at all places in one image, where contacts do not overlap.
-        exposure: factor on the radiance; "auto" exposes the untouched sensor well and keeps that,
-            or less where contacts would be overexposed (`exposure.exposure_for`).
-        least_skin: share of the sensing surface's area that the camera must see, 0 to 1, or there
-            is no score.
-        least_picture: share of the pixels that must see the sensing surface, 0 to 1.
-        skin: "conforming", as the OptiSense paper defines its objectives, or "elastic"; see
+        together: whether all places are pressed in one image, if contacts do not overlap.
+        exposure: factor on the radiance; "auto" is the automatic exposure of the untouched sensor,
+            lowered if contacts would be overexposed (`exposure.exposure_for`).
+        least_skin: smallest share, 0 to 1, of the sensing surface's area that the camera must see
+            for a score.
+        least_picture: smallest share, 0 to 1, of the pixels that must see the sensing surface.
+        skin: "conforming", as in the definitions of the OptiSense paper, or "elastic"; see
             docs/mechanics.md.
     """
 
@@ -113,7 +115,7 @@ class Settings:
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a finite real number, and not a truth value."""
+    """Return whether a value is a finite real number, and not a truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -123,13 +125,13 @@ def refuse_outside(
     """Check a setting of an objective before anything is rendered for it.
 
     Args:
-        name: of the setting.
-        value: that was given.
-        low, high: what it may be from and to.
-        open_low: `low` itself is too small.
+        name: name of the setting.
+        value: the given value.
+        low, high: smallest and largest allowed value.
+        open_low: whether `low` itself is too small.
 
     Raises:
-        ObjectiveError: the value is outside.
+        ObjectiveError: the value is outside these bounds.
     """
     if low <= value <= high and not (open_low and value == low):
         return
@@ -173,7 +175,9 @@ def _pairs(places: Any) -> tuple[tuple[float, float], ...]:
 
 
 def size_for(camera: tuple[int, int], across: int = ACROSS) -> tuple[int, int]:
-    """(width, height) of images and rays, `across` wide, for a camera of that many pixels."""
+    """Return the (width, height) of images and rays, `across` wide, with a camera's aspect
+    ratio.
+    """
     return across, max(1, round(across * camera[1] / camera[0]))
 
 

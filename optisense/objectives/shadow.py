@@ -1,4 +1,4 @@
-"""Shadow: how much skin around a pressed ball loses a colour."""
+"""Shadow: the share of the skin around a pressed ball that loses a colour."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from optisense.optics import TactileImage
 
 LOST = 0.25
-"""The share of a colour's light from which on it counts as taken: a quarter, which a reader sees,
+"""Share of a colour's light from which on its loss counts: a quarter, which a reader can detect,
 and several times the noise of an image's light."""
 
 
@@ -35,10 +35,11 @@ and several times the noise of an image's light."""
     lower_is_better=True,
 )
 def shadow(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """From how large a share of the skin a pressed ball takes a colour.
+    """The share of the skin around a pressed ball that loses a colour.
 
-    Of the pixels that see the skin beside the ball and are lit in a colour, the share that loses a
-    quarter of it or more, of any colour; the mean over places. It renders small images of its own.
+    It is the share of the pixels that lose a quarter or more of any colour, among those that see
+    the skin beside the ball and are lit in that colour; the mean over places. Small images are
+    rendered for it.
 
     Args:
         evaluation: the sensor.
@@ -73,7 +74,7 @@ def shadow(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any
 
 
 def _image(evaluation: Evaluation, contacts: Sequence[Contact]) -> TactileImage:
-    """A small image under the lights of the design that is judged."""
+    """Return a small image under the lights of the evaluated design."""
     settings = evaluation.settings
     image = evaluation.model.render(
         contacts,

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 LEAST_CONTRAST = 0.1
-"""The share of the contrast of fine lines that must be left for them to be told apart: the usual 10
-per cent of a lens's modulation transfer function."""
+"""Smallest contrast, relative to that of coarse lines, at which fine lines are resolved: the usual
+10 per cent of a lens's modulation transfer function."""
 
 LINE_OF_BLUR = math.pi / math.sqrt(2.0 * math.log(1.0 / LEAST_CONTRAST))
 """Width of the finest line, in standard deviations of a Gaussian blur: lines of width w keep
@@ -25,7 +25,7 @@ exp(-(pi s / w)^2 / 2) of their contrast (the Gaussian's Fourier transform at th
 
 
 USUAL = (0.27, 0.059)
-"""Millimetres, of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
+"""Line widths (mm) of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
 
 
 @objective(
@@ -43,9 +43,9 @@ USUAL = (0.27, 0.059)
 def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """The width in mm of the finest lines on the skin that the camera resolves.
 
-    A line is at least as wide as the longer side of the footprint of a pixel of the camera, and
-    wide enough for the lens's blur to leave a tenth of the contrast; squares of both add up. The
-    value is the mean over the skin that is seen.
+    The squared width is the sum of two squares: the longer side of the footprint of the camera's
+    pixel, and the line width at which the lens's blur leaves a tenth of the contrast. The value is
+    the mean over the skin that is seen.
 
     Args:
         evaluation: the sensor.

@@ -1,9 +1,10 @@
-"""Scores by chief rays as smooth functions of these, with their derivatives.
+"""Smoothed scores of chief rays, with their derivatives.
 
-The scores themselves jump when a ray begins or ceases to arrive. Here each ray has a weight, the
-area of the picture that it stands for, which changes smoothly when the boundary beside it moves
-(`OpticalModel.differentiable_rays`), and the sums are weighted. AOAP's coverage, which counts the
-triangles seen, becomes the integral of their number for each mm² over what is seen.
+The scores themselves jump when a ray begins or ceases to arrive. In the smoothed scores each ray
+has a weight, the area of the picture that it stands for, which changes smoothly when the boundary
+beside it moves (`OpticalModel.differentiable_rays`), and the sums are weighted. AOAP's coverage,
+which counts the triangles seen, becomes the integral of their number for each mm² over what is
+seen.
 """
 
 from __future__ import annotations
@@ -25,11 +26,13 @@ class Rays(Protocol):
     """Chief rays of a picture.
 
     Attributes:
-        codes: (h, w) 0 where a ray does not arrive; neighbours of one number arrive the same way.
-        cosine: (k,) of those that arrive, row after row: between ray and normal.
-        weight: (k,) pixels that each stands for.
-        points: (k, 3) mm, where they arrive.
-        density: (k,) 1/mm², the part of the surface's triangles that lies in one mm² there.
+        codes: (h, w) path codes: 0 where a ray does not arrive; neighbours of equal code take the
+            same path.
+        cosine: (k,) cosine of the angle between ray and normal for the k rays that arrive, row
+            after row.
+        weight: (k,) area of the picture that each ray stands for, pixels.
+        points: (k, 3) end points, mm.
+        density: (k,) share of the surface's triangles per area (1/mm²) at each end point.
     """
 
     @property
@@ -45,7 +48,9 @@ class Rays(Protocol):
 
 
 class Slopes(NamedTuple):
-    """A smoothed score, and its derivatives by what rays do; None where it does not depend."""
+    """A smoothed score, and its derivatives with respect to the attributes of `Rays`; None for
+    those that it does not depend on.
+    """
 
     value: float
     cosine: FloatArray | None
@@ -54,8 +59,8 @@ class Slopes(NamedTuple):
 
 
 def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slopes:
-    """The mean over all pixels of weight times cosine between ray and normal, and k1 times the part
-    of the surface's triangles that are seen.
+    """Return the mean over all pixels of weight times cosine between ray and normal, plus k1 times
+    the share of the surface's triangles that are seen.
     """
     count = rays.codes.size
     seen = smooth_coverage(rays)
@@ -66,21 +71,21 @@ def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slop
 
 
 def smooth_coverage(rays: Rays) -> Slopes:
-    """The part of the surface's triangles that are seen, as the integral of their number for each
-    mm² over what is seen.
+    """Return the share of the surface's triangles that are seen, as the integral of their density
+    over the visible area.
     """
     triangles = _PixelTriangles(rays)
     density = triangles.mean_of_corners(rays.density)
     value = float((density * triangles.weight * triangles.area).sum())
-    # What lies within the view is seen before and after, however the points on it move: only where
-    # points at its border move does more come into view. Around all others these sums vanish.
+    # The motion of points inside the view does not change what is seen; only the motion of points
+    # at its border does. Around inner points these sums vanish.
     by_points = rays.density[:, None] * triangles.by_points(triangles.weight)
     return Slopes(value, None, triangles.by_weight(density * triangles.area), by_points)
 
 
 def smooth_projection_warping(rays: Rays) -> Slopes:
-    """Weighted mean over weighted standard deviation of the areas between neighbouring pixels'
-    points.
+    """Return the weighted mean over the weighted standard deviation of the areas between
+    neighbouring pixels' points.
     """
     triangles = _PixelTriangles(rays)
     area, weight = triangles.area, triangles.weight
@@ -100,7 +105,9 @@ def smooth_projection_warping(rays: Rays) -> Slopes:
 
 
 def smooth_distortion(rays: Rays) -> Slopes:
-    """The weighted geometric mean of the anisotropies of footprints between four neighbours."""
+    """Return the weighted geometric mean of the anisotropies of footprints between four
+    neighbours.
+    """
     corners = _quads(rays.codes)
     if not len(corners):
         return Slopes(1.0, None, np.zeros_like(rays.weight), None)
@@ -111,12 +118,12 @@ def smooth_distortion(rays: Rays) -> Slopes:
     middle, half = 0.5 * (a + c), 0.5 * (a - c)
     apart = np.hypot(half, b)
     # The logarithm of the ratio of the roots of both eigenvalues of [[a, b], [b, c]]. Round
-    # footprints have no slope, and grazing ones the largest ratio that the score knows.
+    # footprints have no derivative, and grazing ones the largest ratio of the score.
     least = (1.0 - 2.0 / (1.0 + MOST_ANISOTROPY**2)) * middle
     inner = np.minimum(apart, least)
     ratio = 0.5 * np.log((middle + inner) / np.maximum(middle - inner, 1e-300))
     count = np.bincount(corners.ravel(), minlength=len(rays.weight))
-    # Footprints that a ray has, as a part of the one that a pixel stands for.
+    # A pixel stands for one footprint; this is the share of it for each of the ray's footprints.
     share = 1.0 / np.maximum(count, 1)
     weight = 1.0 + ((rays.weight - 1.0) * share)[corners].sum(axis=1)
     total = max(float(weight.sum()), 1e-12)
@@ -149,16 +156,16 @@ SMOOTH: dict[str, Callable[..., Slopes]] = {
     "coverage": smooth_coverage,
     "distortion": smooth_distortion,
 }
-"""Smoothed objectives by name. Settings of the objective that count here are keyword arguments."""
+"""Smoothed objectives by name. Settings of the objective that affect them are keyword arguments."""
 
 
 class _PixelTriangles:
-    """Two triangles for each quad of pixels, where all three corners arrive the same way.
+    """Two triangles for each quad of pixels; only triangles whose three corners take the same path.
 
     Attributes:
-        area: (t,) mm².
-        weight: (t,) 1, and more or less by the weights of its corners: where rays weigh so many
-            pixels more, their triangles weigh as much more as the two triangles that a pixel has.
+        area: (t,) area, mm².
+        weight: (t,) 1 plus the sum over the three corners of 2 (w - 1) / m, with w the weight of
+            the corner's ray and m the number of triangles that it belongs to.
     """
 
     def __init__(self, rays: Rays) -> None:
@@ -171,27 +178,33 @@ class _PixelTriangles:
         self._unit = cross / np.maximum(length, 1e-30)[:, None]
         self.area = 0.5 * length
         count = np.bincount(corners.ravel(), minlength=len(rays.weight))
-        # Triangles that a ray has, as a part of the two that a pixel stands for.
+        # A pixel stands for two triangles; this is the share of them for each of the ray's
+        # triangles.
         self._share = 2.0 / np.maximum(count, 1)
         self.weight = 1.0 + ((rays.weight - 1.0) * self._share)[corners].sum(axis=1)
 
     def mean_of_corners(self, values: FloatArray) -> FloatArray:
-        """(t,) from values of rays (k,)."""
+        """Return the means (t,) over triangles' corners of values of rays (k,)."""
         mean: FloatArray = values[self._corners].mean(axis=1)
         return mean
 
     def by_points(self, by_area: FloatArray) -> FloatArray:
-        """(k, 3) derivatives of a number by rays' points, given those by areas (t,)."""
+        """Return the derivatives (k, 3) of a number with respect to rays' points, given those with
+        respect to areas (t,).
+        """
         points = np.zeros_like(self._rays.points)
         a, b, c = self._places
         for own, first, second in ((0, b, c), (1, c, a), (2, a, b)):
-            # An area grows with a corner's way from the opposite side, by half that side's length.
+            # The area grows with a corner's distance from the opposite side, by half that side's
+            # length.
             slope = by_area[:, None] * 0.5 * np.cross(self._unit, second - first)
             np.add.at(points, self._corners[:, own], slope)
         return points
 
     def by_weight(self, by_weight: FloatArray) -> FloatArray:
-        """(k,) derivatives of a number by rays' weights, given those by triangles' (t,)."""
+        """Return the derivatives (k,) of a number with respect to rays' weights, given those with
+        respect to triangles' weights (t,).
+        """
         weights = np.zeros_like(self._rays.weight)
         for own in range(3):
             np.add.at(weights, self._corners[:, own], by_weight)
@@ -199,7 +212,9 @@ class _PixelTriangles:
 
 
 def _quads(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
-    """(q, 4) numbers of arriving rays: four neighbours that arrive the same way, row by row."""
+    """Return the numbers (q, 4) of arriving rays in quads of neighbours with the same path, row by
+    row.
+    """
     number = np.cumsum(codes.ravel() > 0).reshape(codes.shape) - 1
     before, after = slice(None, -1), slice(1, None)
     corners = [(before, before), (before, after), (after, before), (after, after)]
@@ -209,7 +224,7 @@ def _quads(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
 
 
 def _same_way(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
-    """(t, 3) numbers of arriving rays."""
+    """Return the numbers (t, 3) of arriving rays in triangles of neighbours with the same path."""
     hit = codes > 0
     number = np.full(codes.shape, -1, dtype=np.int64)
     number[hit] = np.arange(int(hit.sum()))

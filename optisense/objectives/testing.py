@@ -1,6 +1,6 @@
-"""Contract tests of objectives, for those of this package and for your own.
+"""Contract tests of objectives, for those of this package and for users' own.
 
-In a test file of yours, to be run by pytest::
+To use them, add to a test file for pytest::
 
     from optisense.objectives.testing import ObjectiveContract
 
@@ -29,12 +29,12 @@ PIXELS = (160, 120)
 """Resolution of the images that the contract tests score, which keeps a test of an objective to a
 few seconds."""
 PHOTONS = 300_000
-"""Number of photons of these images, for the same reason."""
+"""Number of photons of these images, small enough for a test of a few seconds."""
 
 
 @cache
 def gelsight_mini() -> OpticalModel:
-    """A GelSight Mini, which all contract tests share."""
+    """Return a GelSight Mini, which all contract tests share."""
     from optisense.optics import OpticalModel
     from optisense.sensors import load
 
@@ -43,14 +43,14 @@ def gelsight_mini() -> OpticalModel:
 
 @lru_cache(maxsize=4)
 def evaluation(seed: int = 0) -> Evaluation:
-    """Small images of it."""
+    """Return an evaluation with small images of the GelSight Mini."""
     settings = Settings(resolution=PIXELS, ray_resolution=PIXELS, photons=PHOTONS, seed=seed)
     return Evaluation(gelsight_mini(), settings)
 
 
 @cache
 def unlit_evaluation() -> Evaluation:
-    """The same sensor with its lights off."""
+    """Return an evaluation of the GelSight Mini with its lights off."""
     from optisense.design import set_value
     from optisense.optics import OpticalModel
     from optisense.sensors import load
@@ -69,12 +69,13 @@ ODD_CAMERAS = (
     ("camera.position.z", 100.0),
     ("camera.position.z", -2.0),
 )
-"""A spot of the skin, the skin as a spot, seen from far away, from behind, from inside the gel."""
+"""Camera values with unusual views: a spot of the skin, the skin as a spot, the skin from far away,
+from behind, and from inside the gel."""
 
 
 @lru_cache(maxsize=len(ODD_CAMERAS))
 def odd_evaluation(path: str, value: float) -> Evaluation:
-    """A GelSight Mini with one number of its camera changed."""
+    """Return an evaluation of a GelSight Mini with one value of its camera changed."""
     from optisense.design import set_value
     from optisense.optics import OpticalModel
     from optisense.sensors import load
@@ -89,7 +90,7 @@ class ObjectiveContract:
 
     Attributes:
         objective: name, or ``file.py:function``.
-        settings: of its own, to test it with.
+        settings: settings of the objective for the tests.
     """
 
     objective: str

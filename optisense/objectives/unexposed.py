@@ -1,4 +1,4 @@
-"""Presses before they are exposed, and what of their images is looked at."""
+"""Presses before they are exposed, and the parts of their images that are read."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ if TYPE_CHECKING:
     from optisense.optics import TactileImage
 
 GAP = 0.5
-"""mm that must be free between contacts which share an image."""
+"""Smallest distance (mm) between contacts that share an image."""
 
 
 class UnexposedPress(NamedTuple):
-    """A press with the n pixels of (h, w) that contacts touch in its image, and the radiance (n, 3)
-    there."""
+    """A press with the mask (h, w) of the n pixels that contacts touch in its image, and their
+    radiance (n, 3).
+    """
 
     press: Press
     touched: NDArray[np.bool_]
@@ -27,7 +28,7 @@ class UnexposedPress(NamedTuple):
 
 
 def radiance_in(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """(n, 3): `image.radiance` of the n pixels of a mask alone."""
+    """Return `image.radiance` (n, 3) of the n pixels of a mask, computed for these only."""
     total = np.zeros((np.count_nonzero(where), 3), dtype=np.float32)
     for layer in image.layers.values():
         total += layer[where]
@@ -35,7 +36,9 @@ def radiance_in(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.flo
 
 
 def box_around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
-    """Rows and columns of a mask's true pixels and of those within `reach` of them."""
+    """Return the rows and columns of a box around a mask's true pixels, extended by `reach`
+    pixels.
+    """
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return (
         slice(max(0, rows[0] - reach), rows[-1] + 1 + reach),
@@ -44,8 +47,12 @@ def box_around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
 
 
 def are_apart(places: Sequence[NDArray[np.float64]], radius: float, depth: float) -> bool:
-    """Whether balls of a radius, pressed in so deep (mm) at places (3,) mm, leave `GAP` between
-    their contacts.
+    """Return whether the contacts of balls at several places are at least `GAP` apart.
+
+    Args:
+        places: (3,) places of the balls, mm.
+        radius: radius of the balls, mm.
+        depth: depth of the presses, mm.
     """
     width = 2.0 * np.sqrt(depth * (2.0 * radius - depth)) + GAP
     points = np.array(places)

@@ -1,4 +1,4 @@
-"""Uniformity: how evenly each colour lights the untouched skin."""
+"""Uniformity: the evenness of the light of each colour on the untouched skin."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 DIM, BRIGHT = 5.0, 95.0
-"""Percentiles of the pixels that see the skin: what is dim and what is bright. The extremes would
-be single pixels beside a light or in a corner."""
+"""Percentiles of the light in the pixels that see the skin that define its dim and bright parts.
+The extremes would be single pixels beside a light or in a corner."""
 
 UNLIT = 0.01
-"""The share of the brightest colour's level below which a colour counts as not lit at all."""
+"""Share of the brightest colour's level below which a colour counts as unlit."""
 
 COLOURS = ("red", "green", "blue")
 
@@ -31,10 +31,10 @@ COLOURS = ("red", "green", "blue")
     needs="light on the skin",
 )
 def uniformity(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
-    """How evenly each colour lights the untouched skin: dim over bright, of the least even colour.
+    """The evenness of the light on the untouched skin: dim over bright, for the least even colour.
 
-    The ratio of the 5th to the 95th percentile of the linear light in the pixels that see the skin,
-    for each of red, green and blue that is lit at all; 1 is even.
+    The value is the ratio of the 5th to the 95th percentile of the linear light in the pixels that
+    see the skin, the smallest over those of red, green and blue that are lit; 1 is even.
 
     Args:
         evaluation: the sensor.

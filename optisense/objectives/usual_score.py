@@ -12,11 +12,12 @@ from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.usual_times import LOADING, UsualTimes
 
 USUAL_PLACES = 9
-"""Number of presses of a score whose settings name no places, as the OptiSense paper has it."""
+"""Number of presses of a score whose settings name no places, that of the OptiSense paper."""
 
 IMAGE, IMAGE_PIXELS = 0.1, 0.14
-"""Processor seconds of a press, or of the untouched sensor: in any case, and for each 640 x 480
-pixels. Less than a whole picture's, because only contacts are lit."""
+"""Processor time (s) of an image of a press or of the untouched sensor: a constant part, and a part
+for each 640 x 480 pixels. It is less than that of a whole picture, because only contacts are
+lit."""
 
 LARGE_IMAGE = 640 * 480
 """Number of pixels of an image for which `IMAGE_PIXELS` is stated."""
@@ -33,35 +34,35 @@ JUDGING = {
     "shadow": 2.0,
     "power": 0.0,
 }
-"""Processor seconds of the built-in objectives beside rendering."""
+"""Processor time (s) of the built-in objectives in addition to rendering."""
 
 OWN_JUDGING = 0.2
-"""Processor seconds that a user's objective is expected to take beside rendering."""
+"""Expected processor time (s) of a user's objective in addition to rendering."""
 
 REBUILDING = 0.02
-"""Seconds to make the scene of a design that differs from the last one: GelSight Svelte, another
-mirror."""
+"""Time (s) to build the scene of a design that differs from the last one, measured on GelSight
+Svelte with another mirror."""
 
 FIRST_JUDGING = 0.4
-"""Processor seconds that the first score takes longer, for libraries that it loads."""
+"""Additional processor time (s) of the first score, for libraries that it loads."""
 
 
 STARTED = 0.03
-"""The share of the images at which photons are traced, so that most is compiled."""
+"""Share of the images at which photons are being traced, so that most kernels are compiled."""
 
 
 @dataclass(frozen=True)
 class UsualScore:
-    """Seconds that scores of a sensor usually take.
+    """Usual times of the scores of a sensor, in seconds.
 
     Attributes:
-        starting: the first one takes longer than the next, without loading the renderer.
-        loading: the renderer takes to be loaded.
-        building: the scene takes.
-        light: tracing and smoothing take, with each seed or changed shape.
-        images: the presses and the untouched sensor take.
-        judging: the objectives take beside that.
-        libraries: the objectives take longer in the first score.
+        starting: additional time of the first score, without loading the renderer.
+        loading: time to load the renderer.
+        building: time to build the scene.
+        light: time of tracing and smoothing, for each seed or changed shape.
+        images: time of the images of the presses and of the untouched sensor.
+        judging: additional time of the objectives.
+        libraries: additional time of the objectives in the first score.
     """
 
     starting: float
@@ -74,46 +75,48 @@ class UsualScore:
 
     @property
     def first(self) -> float:
-        """The first score, where the renderer is loaded."""
+        """Time (s) of the first score, with the renderer loaded."""
         return self.starting + self.whole + self.libraries
 
     @property
     def whole(self) -> float:
-        """A score with light of its own."""
+        """Time (s) of a score for which light is traced."""
         return self.light + self.images + self.judging
 
     @property
     def relit(self) -> float:
-        """A score with light that is there."""
+        """Time (s) of a score with existing light."""
         return self.images + self.judging
 
     def done(self, rendered: float, *, first: bool) -> float:
-        """Usual seconds of what is done of a score, but for judging.
+        """Return the usual time (s) of the finished part of a score, without the objectives' own.
 
         Args:
-            rendered: the share of the images that is rendered.
-            first: whether it is the first score, which compiles before it traces photons.
+            rendered: the rendered share of the images.
+            first: whether it is the first score, which compiles kernels before it traces photons.
         """
         starting = self.starting * min(1.0, rendered / STARTED) if first else 0.0
         return starting + rendered * (self.light + self.images)
 
     @property
     def share_of_first_image(self) -> float:
-        """The share of the first image, with the light that is traced for it, in all rendering."""
+        """Return the share of the first image, including tracing its light, in the time of all
+        rendering.
+        """
         first = self.light + self.images / 10.0
         return first / max(first + 0.9 * self.images, 1e-9)
 
 
 @dataclass(frozen=True)
 class UsualTrials:
-    """Seconds that the scores of a search usually take.
+    """Usual times of the scores of a search, in seconds.
 
     Attributes:
-        score: the parts of one score.
-        first: the first one takes in all.
-        trial: another design takes.
-        fresh: the first score with a fresh seed takes.
-        fresh_again: another design's score with the same fresh seed takes.
+        score: the times of the parts of one score.
+        first: total time of the first score.
+        trial: time of the score of another design.
+        fresh: time of the first score with a fresh seed.
+        fresh_again: time of another design's score with the same fresh seed.
     """
 
     score: UsualScore
@@ -124,7 +127,7 @@ class UsualTrials:
 
     @staticmethod
     def of(usual: UsualScore, trial: float, fresh_again: float) -> UsualTrials:
-        """The usual score of trials that take so many seconds. Without light no score depends on a
+        """Return the usual times of trials of a given time (s). Without light no score depends on a
         seed.
         """
         first = usual.loading + usual.first
@@ -133,7 +136,7 @@ class UsualTrials:
         return UsualTrials(usual, first, trial, usual.whole, fresh_again)
 
     def slower(self, seconds: float) -> UsualTrials:
-        """The same where every score takes so much longer."""
+        """Return the same times with ``seconds`` added to every score."""
         return replace(
             self,
             first=self.first + seconds,
@@ -143,13 +146,17 @@ class UsualTrials:
         )
 
     def done(self, rendered: float) -> float:
-        """The share of the first score that is done when this share of its images is rendered."""
+        """Return the finished share of the first score when the share ``rendered`` of its images is
+        rendered.
+        """
         done = self.score.loading + self.score.done(rendered, first=True)
         return min(1.0, done / max(self.first, 1e-9))
 
 
 def usual_score(design: SensorDesign, names: Iterable[str], settings: Settings) -> UsualScore:
-    """The usual duration of a sensor's scores by the named objectives, on this machine now."""
+    """Return the usual times of a sensor's scores by the named objectives, at this machine's
+    current load.
+    """
     wanted = named_in(names)
     times = UsualTimes.here(design.sensing_area, len(design.lights))
     judging = sum(JUDGING.get(name, OWN_JUDGING) for name in wanted) * times.pace

@@ -23,15 +23,15 @@ class View:
     Attributes:
         picture: share of the pixels that see the sensing surface, 0 to 1.
         skin: share of the sensing surface's area that the pixels see, 0 to 1. It is the area
-            between the points of neighbouring pixels, so it depends neither on the size of the
-            mesh's triangles nor, but for the borders, on the number of pixels.
+            between the points of neighbouring pixels, so it does not depend on the size of the
+            mesh's triangles, and on the number of pixels only at the borders.
     """
 
     picture: float
     skin: float
 
     def refuse_less(self, settings: Settings) -> None:
-        """Make sure that the camera sees enough for a score to mean something.
+        """Check that the camera sees enough for a meaningful score.
 
         Raises:
             ObjectiveError: a share is below its limit in the settings.
@@ -64,12 +64,12 @@ class View:
 
 
 def view_of(rays: ChiefRays, face_areas: NDArray[np.float64]) -> View:
-    """The view of the chief rays.
+    """Return the view of chief rays.
 
     Args:
-        rays: of the untouched sensor.
-        face_areas: (m,) mm², of the sensing surface's triangles.
+        rays: chief rays of the untouched sensor.
+        face_areas: (m,) areas of the sensing surface's triangles, mm².
     """
     seen = float(np.nansum(triangle_areas(rays.points, rays.hit).areas, dtype=np.float64))
-    # A place that two mirrors show counts twice.
+    # A place that is visible by two mirrors counts twice.
     return View(float(rays.hit.mean()), min(1.0, seen / float(face_areas.sum())))

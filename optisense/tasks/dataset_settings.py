@@ -1,4 +1,4 @@
-"""What the samples of a dataset are made of."""
+"""Settings of the samples of a dataset."""
 
 from __future__ import annotations
 
