@@ -1,6 +1,6 @@
-"""A design beside photographs of the real sensor: how far the two differ, and fits of the design.
+"""Comparison of a design with photographs of the real sensor, and fits of the design to them.
 
-Names load on first use, so that importing the package loads neither SciPy nor the renderer.
+Names load on first use, so that the import of the package loads neither SciPy nor the renderer.
 """
 
 from __future__ import annotations

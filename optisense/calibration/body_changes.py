@@ -1,6 +1,7 @@
 """Changes of a sensor's body that a calibration tries: lights, edges, gel and coating.
 
-Each takes a design and a number, and returns a changed design; the given one stays as it is.
+Each function takes a design and a number, and returns a changed design; the given one is not
+changed.
 """
 
 from __future__ import annotations
@@ -19,17 +20,19 @@ from optisense.geometry import TriangleMesh
 FloatArray = NDArray[np.float64]
 
 FLAT = 0.2
-"""mm that the skin of a flat gel may leave its plane; GelSight Mini's real one sags as much."""
+"""Largest deviation of a flat gel's skin from its plane, mm; the real one of GelSight Mini sags as
+much.
+"""
 
 EDGE_ANGLE = 30.0
-"""Degrees that faces of an edge may lean from one of the four sides of the picture."""
+"""Largest angle between the faces of an edge and one of the four sides of the picture, degrees."""
 
 WIDEST_ANGLE = 89.0
-"""Degrees from its axis to which a spot is widened at most."""
+"""Largest angle from its axis to which a spot is widened, degrees."""
 
 
 def with_lights_moved(design: SensorDesign, group: str, along: float) -> SensorDesign:
-    """The lights of a group, so many mm along the camera's axis."""
+    """Return a design with the lights of a group moved by `along` mm along the camera's axis."""
     offset = along * design.camera.axes()[2]
 
     def moved(light: Light) -> Light:
@@ -40,9 +43,10 @@ def with_lights_moved(design: SensorDesign, group: str, along: float) -> SensorD
 
 
 def with_lights_tilted(design: SensorDesign, group: str, angle: float) -> SensorDesign:
-    """The lights of a group, turned by so many degrees towards where the camera looks.
+    """Return a design with the lights of a group turned by `angle` degrees towards the viewing
+    direction.
 
-    Lights along the camera's axis stay as they are.
+    Lights along the camera's axis are not changed.
     """
     ahead = design.camera.axes()[2]
 
@@ -68,14 +72,14 @@ def _with_lights(design: SensorDesign, group: str, change) -> SensorDesign:  # t
 
 
 def _turned(vector: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
-    """A vector turned about a unit axis (Rodrigues)."""
+    """Return a vector turned about a unit axis (Rodrigues)."""
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     along = axis * float(axis @ vector) * (1.0 - cosine)
     return np.asarray(vector * cosine + np.cross(axis, vector) * sine + along)
 
 
 def widens(design: SensorDesign) -> list[str]:
-    """The groups whose emission can be made wider: flat windows and spots."""
+    """Return the groups whose emission can be widened: flat windows and spots."""
     return [
         name
         for name, group in design.lights.items()
@@ -84,7 +88,7 @@ def widens(design: SensorDesign) -> list[str]:
 
 
 def with_emission_width(design: SensorDesign, factor: float) -> SensorDesign:
-    """Windows of lights so many times as large, and spots so many times as wide."""
+    """Return a design with the windows of lights larger, and spots wider, by a factor."""
     found = design.copy()
     for name in widens(design):
         group = found.lights[name]
@@ -104,12 +108,14 @@ def _widened(emitter: LightModel, factor: float) -> LightModel:
 
 
 def edge_parts(design: SensorDesign) -> list[str]:
-    """The rigid transparent parts whose edges may be rough: those with no finished faces."""
+    """Return the rigid transparent parts whose edges may be rough: those without finished faces."""
     return [name for name in design.parts_of(Role.SUPPORT) if not design.parts[name].faces]
 
 
 def with_edge_roughness(design: SensorDesign, parts: list[str], roughness: float) -> SensorDesign:
-    """Parts whose faces towards the four sides of the picture have a roughness."""
+    """Return a design with a roughness on the faces of parts towards the four sides of the
+    picture.
+    """
     found = design.copy()
     right, up, _ = design.camera.axes()
     sides = {"right": right, "left": -right, "top": up, "bottom": -up}
@@ -128,7 +134,7 @@ def with_edge_roughness(design: SensorDesign, parts: list[str], roughness: float
 
 
 def flat_gel_thickness(design: SensorDesign) -> float | None:
-    """mm of the gel of a sensor with one flat gel; None of others."""
+    """Return the thickness of the gel of a sensor with one flat gel, mm; None for others."""
     skins, gels = design.parts_of(Role.SENSING_SURFACE), design.parts_of(Role.ELASTOMER)
     if len(skins) != 1 or len(gels) != 1:
         return None
@@ -148,13 +154,13 @@ def _is_bent(design: SensorDesign) -> bool:
 
 
 def _outward(skin: TriangleMesh) -> FloatArray:
-    """The direction out of the sensor of a flat skin, whose faces look into it."""
+    """Return the outward direction of a flat skin, whose normals point into the sensor."""
     mean = -(skin.face_normals * skin.face_areas[:, None]).sum(axis=0)
     return np.asarray(mean / np.linalg.norm(mean))
 
 
 def with_gel_thickness(design: SensorDesign, thickness: float) -> SensorDesign:
-    """A flat gel of another thickness, mm; its base stays where it is."""
+    """Return a design with a flat gel of another thickness, mm; its base stays in place."""
     skin = design.parts_of(Role.SENSING_SURFACE)[0]
     gel = design.parts_of(Role.ELASTOMER)[0]
     out = _outward(design.meshes[skin])
@@ -176,7 +182,7 @@ def with_gel_thickness(design: SensorDesign, thickness: float) -> SensorDesign:
 
 
 def with_reflectance(design: SensorDesign, factor: float) -> SensorDesign:
-    """A coating that is so many times as bright in all colours."""
+    """Return a design with a coating that is brighter by a factor in all colours."""
     found = design.copy()
     values = tuple(min(factor * value, 1.0) for value in design.coating.reflectance)  # type: ignore[attr-defined]
     found.coating = design.coating.model_copy(update={"reflectance": values})

@@ -1,4 +1,4 @@
-"""Fit a design to photographs of a real sensor."""
+"""Fit of a design to photographs of a real sensor."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from optisense.errors import CalibrationError
 FloatArray = NDArray[np.float64]
 
 LEAST_PRESSES = 2
-"""Presses that a fit needs at least; one ball alone could be explained by its place."""
+"""Smallest number of presses of a fit; a single ball could be explained by its position."""
 
 FEW_PRESSES = 6
-"""Presses that are recommended, a third of which are held out."""
+"""Recommended number of presses, a third of which are held out."""
 
 FEW_FITTED = 4
-"""Presses that are fitted below which a fit is told to rest on few."""
+"""Number of fitted presses below which a note says that the fit rests on few."""
 
 
 def calibrate(
@@ -46,17 +46,17 @@ def calibrate(
     """Fit a design to photographs of a real sensor.
 
     Args:
-        design: to start from.
-        photographs: of the sensor.
-        settings: what may change, and how; the usual ones if None.
-        variant: of the renderer.
-        kept: renderings of an earlier run that ended before it was done, which need not be made
-            again, and where those of this one are kept.
-        progress: called before each rendering and each step of the fit.
+        design: design to start from.
+        photographs: photographs of the sensor.
+        settings: settings of the fit; the defaults if None.
+        variant: variant of the renderer.
+        kept: store of renderings: those of an interrupted run are reused, and those of this one are
+            kept.
+        progress: function that is called before each rendering and each step of the fit.
 
     Raises:
         CalibrationError: there are too few photographs, or they do not fit the design.
-        OptiSenseError: the design can't be rendered, or a rendering not be kept.
+        OptiSenseError: the design can't be rendered, or a rendering can't be stored.
     """
     from optisense.optics import OpticalModel
 
@@ -106,10 +106,10 @@ def calibrate(
 def _refuse_too_few(
     photographs: Photographs, chosen: Sequence[FitQuantity], held_out: Sequence[int]
 ) -> list[str]:
-    """What is to be said of the number of photographs.
+    """Return notes on the number of photographs.
 
     Raises:
-        CalibrationError: there are too few, or nothing is to be fitted.
+        CalibrationError: there are too few photographs, or no number is to be fitted.
     """
     count = len(photographs.presses) - len(held_out)
     if not chosen:
@@ -132,9 +132,9 @@ def _refuse_too_few(
 def _with_exposure(
     design: SensorDesign, chosen: Sequence[FitQuantity], steps: FloatArray, exposure: float
 ) -> tuple[SensorDesign, float]:
-    """The fitted design whose lights have as much power together as before, and its exposure.
+    """Return the fitted design with the same total power of its lights as before, and its exposure.
 
-    Photographs do not tell powers and exposure apart.
+    Photographs do not distinguish powers and exposure.
     """
     fitted = designed(design, chosen, steps)
     before = sum(group.flux * len(group.lights) for group in design.lights.values())
@@ -152,7 +152,9 @@ def _marked(
     numbers: Sequence[FittedNumber],
     photographs: Photographs,
 ) -> SensorDesign:
-    """The design whose fitted numbers say so, with the fingerprints of the photographs."""
+    """Return the design with provenance of its fitted numbers, with the fingerprints of the
+    photographs.
+    """
     prints = ", ".join(
         each[:12]
         for each in (photographs.fingerprint, *(p.fingerprint for p in photographs.presses))

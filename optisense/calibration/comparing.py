@@ -1,4 +1,4 @@
-"""Compare a design with photographs of the real sensor."""
+"""Comparison of a design with photographs of the real sensor."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A model beside photographs of the real sensor.
+    """Comparison of a model with photographs of the real sensor.
 
     Attributes:
-        photographs: at the size at which they are compared, those without a contact left out.
-        seen: where each shows its contact.
-        pictures: of the model.
-        realism: the figures.
-        notes: what is doubtful about the photographs, one sentence each.
+        photographs: photographs at the size of the comparison, without those that show no contact.
+        seen: contact in each photograph.
+        pictures: pictures of the model.
+        realism: figures of the comparison.
+        notes: doubtful findings about the photographs, one sentence each.
     """
 
     photographs: Photographs
@@ -40,14 +40,15 @@ class Comparison:
 def usable(
     photographs: Photographs, *, refine: bool = True
 ) -> tuple[Photographs, list[SeenContact], list[str]]:
-    """The photographs at working size that show a contact, where they do, and what is doubtful.
+    """Return the photographs at working size that show a contact, their contacts, and doubtful
+    findings.
 
     Args:
-        photographs: as they were read.
-        refine: whether labelled contacts are looked for near their labels too.
+        photographs: photographs as they were read.
+        refine: whether labelled contacts are searched near their labels too.
 
     Raises:
-        CalibrationError: none shows a contact.
+        CalibrationError: no photograph shows a contact.
     """
     small = photographs.scaled()
     notes = [*small.warnings(), *doubts(small)]
@@ -70,16 +71,16 @@ def compare(
     refine: bool = True,
     progress: Callable[[int], None] = lambda done: None,
 ) -> Comparison:
-    """Press what photographs show into a model, and measure how far its pictures are from them.
+    """Press the contacts of photographs into a model, and measure the differences of the pictures.
 
     Args:
-        model: of the sensor.
-        photographs: of the real one.
-        photons: to trace.
-        seed: of the light.
-        refine: whether labelled contacts are looked for near their labels too; hand labels are off
-            by pixels.
-        progress: called with the number of pictures that are rendered.
+        model: model of the sensor.
+        photographs: photographs of the real sensor.
+        photons: number of photons.
+        seed: seed of the light.
+        refine: whether labelled contacts are searched near their labels too; hand labels are off by
+            pixels.
+        progress: function that is called with the number of rendered pictures.
 
     Raises:
         CalibrationError: the photographs can't be compared with this design.

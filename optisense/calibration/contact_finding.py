@@ -1,11 +1,11 @@
 """Detection of a ball's contact in the difference between a photograph and the background.
 
-The response of a tactile sensor to a tilt of its skin is nearly odd: what one flank of a ball loses
-in brightness, the opposite flank gains. So the contact's middle is the place about which the
-difference is most nearly antisymmetric. Inside the contact the skin's tilt, and with it the
+The response of a tactile sensor to a tilt of its skin is nearly odd: the brightness that one flank
+of a ball loses is gained by the opposite flank. So the contact's middle is the point about which
+the difference is most nearly antisymmetric. Inside the contact the skin's tilt, and with it the
 response, grows in proportion to the distance from the middle; outside it falls off at once. So the
 strength of the response peaks at the contact's edge, and blur moves the peak inward and the
-steepest fall outward by about the same; the radius is taken half-way between the two.
+steepest fall outward by about the same distance; the radius is taken half-way between the two.
 """
 
 from __future__ import annotations
@@ -27,50 +27,54 @@ from scipy.optimize import minimize
 FloatArray = NDArray[np.float64]
 
 BLUR = 0.005
-"""Standard deviation of the blur of the difference, a share of the picture's width: 1.6 pixels of
-320, which takes away most of the noise of single pixels and hardly widens a contact."""
+"""Standard deviation of the blur of the difference, as a share of the picture's width: 1.6 pixels
+of 320, which removes most of the noise of single pixels and hardly widens a contact.
+"""
 
 STRONG = 0.35
 """Share of the strongest response from which on pixels belong to the first guess of a contact."""
 
 STRONGEST = 99.7
-"""Percentile of the pixels' responses that stands for the strongest, as single pixels are noisy."""
+"""Percentile of the pixels' responses that is taken as the strongest, as single pixels are
+noisy.
+"""
 
 ABOVE_NOISE = 6.0
-"""A contact is only believed where the strongest response exceeds the median by this factor."""
+"""Smallest ratio of the strongest response to the median for a contact to be accepted."""
 
 REACH = 1.2
-"""The antisymmetry is judged within so many radii of the first guess."""
+"""Radius within which the antisymmetry is evaluated, in radii of the first guess."""
 
 SIDE = 24
-"""Number of points from the middle to the border of the grid on which antisymmetry is judged."""
+"""Number of points from the middle to the border of the grid on which antisymmetry is evaluated."""
 
 FARTHEST = 3.0
-"""Radii of the first guess up to which the edge of the contact is looked for."""
+"""Largest radius at which the edge of the contact is searched, in radii of the first guess."""
 
 LABEL_RANGE = 0.75, 1.3
-"""Radii of a label between which the edge of its contact is looked for. Labels by hand are off by a
-tenth; a stronger response farther away is something else, or the label is wrong."""
+"""Range in which the edge of a labelled contact is searched, in radii of the label. Labels by hand
+are off by a tenth; a stronger response farther away has another cause, or the label is wrong.
+"""
 
 BESIDE = 2.2
-"""Radii of a contact within which the skin is drawn along with it."""
+"""Radius within which the skin is drawn along with a contact, in radii of the contact."""
 
 AS_STRONG = 0.3
-"""Share of the strongest response of a picture that a second contact has at least."""
+"""Smallest response of a second contact, as a share of the strongest response of a picture."""
 
 LEAST_RADIUS = 2.0
-"""Pixels; smaller spots are dust."""
+"""Smallest radius of a contact, in pixels; smaller spots are dust."""
 
 
 @dataclass(frozen=True)
 class FoundContact:
-    """A contact found in a photograph.
+    """Contact found in a photograph.
 
     Attributes:
         centre: column and row of its middle, pixels from the left and top edge of the picture.
-        radius: pixels.
-        asymmetry: energy of the difference's even part about the middle over that of its odd part;
-            0.05 to 0.2 in photographs of balls, about 1 where there is no contact.
+        radius: radius, pixels.
+        asymmetry: ratio of the energy of the difference's even part about the middle to that of its
+            odd part; 0.05 to 0.2 in photographs of balls, about 1 where there is no contact.
     """
 
     centre: tuple[float, float]
@@ -84,16 +88,16 @@ def find_contact(
     near: tuple[float, float] | None = None,
     radius: float | None = None,
 ) -> FoundContact | None:
-    """The contact in a photograph of a pressed ball.
+    """Return the contact in a photograph of a pressed ball.
 
     Args:
-        picture: (h, w, 3), of the press.
-        background: (h, w, 3), of the untouched sensor.
+        picture: photograph of the press, (h, w, 3).
+        background: photograph of the untouched sensor, (h, w, 3).
         near: column and row of a first guess, such as a label; the strongest response if None.
-        radius: pixels, of a first guess.
+        radius: radius of a first guess, pixels.
 
     Returns:
-        The contact; None where no response stands out from the noise.
+        The contact, or None if no response stands out from the noise.
     """
     return _contact_in(difference(picture, background), near, radius)
 
@@ -101,7 +105,8 @@ def find_contact(
 def find_another(
     picture: NDArray[np.uint8], background: NDArray[np.uint8], known: FoundContact
 ) -> FoundContact | None:
-    """A second contact in a photograph, beside a known one; None where there is none as strong.
+    """Return a second contact in a photograph, beside a known one, or None if there is none as
+    strong.
 
     Two contacts in each of several photographs mean that the background shows one of them.
     """
@@ -135,7 +140,9 @@ def _contact_in(
 
 
 def difference(picture: NDArray[np.uint8], background: NDArray[np.uint8]) -> FloatArray:
-    """(h, w, 3) levels: a photograph less the background, blurred, less the median of all."""
+    """Return a photograph minus the background, blurred, minus the median of all, (h, w, 3)
+    levels.
+    """
     found = picture.astype(np.float64) - background
     width = BLUR * picture.shape[1]
     blurred = gaussian_filter(found, (width, width, 0.0))
@@ -143,7 +150,7 @@ def difference(picture: NDArray[np.uint8], background: NDArray[np.uint8]) -> Flo
 
 
 def _first_guess(strength: FloatArray, least: float) -> tuple[tuple[float, float], float]:
-    """Column and row (of pixel middles) and radius of the spot with the most energy."""
+    """Return column and row (of pixel centres) and radius of the spot with the most energy."""
     spots, count = label(binary_closing(strength > least, iterations=3))
     if count == 0:
         return (0.0, 0.0), 0.0
@@ -159,7 +166,7 @@ def _first_guess(strength: FloatArray, least: float) -> tuple[tuple[float, float
 def _most_odd(
     response: FloatArray, start: tuple[float, float], radius: float
 ) -> tuple[tuple[float, float], float]:
-    """The place about which the response is most nearly odd, and its asymmetry there."""
+    """Return the point about which the response is most nearly odd, and its asymmetry there."""
     steps = np.linspace(-REACH, REACH, 2 * SIDE + 1)
     x, y = np.meshgrid(steps, steps)
     half = (np.hypot(x, y) < REACH) & ((y > 0.0) | ((y == 0.0) & (x > 0.0)))
@@ -190,7 +197,9 @@ def _most_odd(
 
 
 def _edge(strength: FloatArray, column: float, row: float, reach: tuple[float, float]) -> float:
-    """The radius, pixels, between the response's peak and its steepest fall, within two radii."""
+    """Return the radius, in pixels, between the response's peak and its steepest fall, within two
+    radii.
+    """
     rows, columns = np.mgrid[: strength.shape[0], : strength.shape[1]]
     distance = np.hypot(columns - column, rows - row)
     rings = np.round(distance).astype(np.int64).ravel()
@@ -206,7 +215,7 @@ def _edge(strength: FloatArray, column: float, row: float, reach: tuple[float, f
 
 
 def _between(values: FloatArray, top: int) -> float:
-    """Where the parabola through a maximum and its neighbours peaks."""
+    """Return the position of the peak of the parabola through a maximum and its neighbours."""
     if not 0 < top < len(values) - 1:
         return float(top)
     left, middle, right = values[top - 1 : top + 2]

@@ -1,4 +1,4 @@
-"""The families of numbers that a calibration may fit, each with its plausible ranges."""
+"""Families of numbers that a calibration may fit, each with its plausible ranges."""
 
 from __future__ import annotations
 
@@ -19,43 +19,54 @@ from optisense.design.responses.gamma_curve import GammaCurve
 
 POWER_RANGE = 0.7
 """Plausible range of the logarithm of a light group's power: LEDs of one type differ by a factor of
-two, and what drives them is not published."""
+two, and their drive currents are not published.
+"""
 
 MIX_RANGE = 0.5
 """Plausible range of an entry of the colour matrix off its diagonal; those of published camera
-tunings reach 1."""
+tunings reach 1.
+"""
 
 GAMMA_START, GAMMA_RANGE = 1.8, 0.4
-"""Exponent of the tone curve to start from, and the plausible range of its logarithm: cameras of
-sensors lie between linear (1) and sRGB (about 2.2)."""
+"""Initial exponent of the tone curve, and the plausible range of its logarithm: cameras of sensors
+lie between linear (1) and sRGB (about 2.2).
+"""
 
 DARK_RANGE = 0.05
-"""Plausible range of the level of a channel in the dark, a share of full: black levels
-of published camera tunings are 0.06 and less."""
+"""Plausible range of the level of a channel in the dark, as a share of full: black levels of
+published camera tunings are 0.06 and less.
+"""
 
 FALLOFF_START, FALLOFF_RANGE = 0.2, 0.3
-"""Share of the light that the lens loses in the picture's corners: start and plausible range."""
+"""Share of the light that the lens loses in the picture's corners: initial value and plausible
+range.
+"""
 
 SHADING_POWER, SHADING_RANGE = 2.0, 0.4
-"""Power of the distance with which the loss grows, to start from, and the plausible range of its
-logarithm: lenses alone lose with the square or faster, and light guides add to it."""
+"""Power of the distance with which the loss grows, initial value, and the plausible range of its
+logarithm: lenses alone lose with the square or faster, and light guides add to it.
+"""
 
 FIELD_RANGE = 0.08
 """Plausible range of the logarithm of the field of view: views of one type of sensor differ by a
-tenth."""
+tenth.
+"""
 
 PLACE_RANGE = 0.8
-"""mm, plausible range of the camera's place across its axis; it is glued in by hand."""
+"""Plausible range of the camera's position across its axis, mm; it is glued in by hand."""
 
 LIGHT_PLACE_RANGE = 0.7
-"""mm, plausible range of a light group's place along the camera's axis: half an LED's package."""
+"""Plausible range of a light group's position along the camera's axis, mm: half an LED's
+package.
+"""
 
 LIGHT_TILT_RANGE = 8.0
-"""Degrees, plausible range of the tilt of a light group, which is soldered flat or not."""
+"""Plausible range of the tilt of a light group, degrees; it may not be soldered flat."""
 
 WIDTH_RANGE = 0.3
 """Plausible range of the logarithm of the width of the emission: windows of one package differ by a
-third."""
+third.
+"""
 
 THICKNESS_RANGE = 0.05
 """Plausible range of the logarithm of a gel's thickness; GelSight states 5 % for its Mini."""
@@ -64,18 +75,22 @@ POISSON_RANGE = 0.01
 """Plausible range of a gel's Poisson ratio; silicones lie between 0.48 and 0.4999."""
 
 SPECULAR_RANGE = 0.1
-"""Plausible range of a coating's specularity, of which makers tell words only."""
+"""Plausible range of a coating's specularity, which makers describe only in words."""
 
 REFLECTANCE_RANGE = 0.3
 """Plausible range of the logarithm of a coating's reflectance: paints of one grey differ by a
-third."""
+third.
+"""
 
 ROUGH_START, ROUGH_RANGE = 0.1, 0.2
-"""GGX alpha of edges that are polished by flame or cut by laser, to start from, and the plausible
-range; ground edges have about 0.4."""
+"""GGX alpha of edges that are polished by flame or cut by laser, initial value and plausible range;
+ground edges have about 0.4.
+"""
 
 INDEX_RANGE = 0.015
-"""Plausible range of a refractive index; the literature's of one silicone differ by up to 0.04."""
+"""Plausible range of a refractive index; values in the literature of one silicone differ by up to
+0.04.
+"""
 
 _LETTERS = "RGB"
 
@@ -85,9 +100,9 @@ class Family:
     """Numbers that are fitted together or not at all.
 
     Attributes:
-        words: what they are.
-        of: the numbers of a design.
-        usual: whether they are fitted unless they are kept; others only if they are asked for.
+        words: description of the numbers.
+        of: function that returns the numbers of a design.
+        usual: whether they are fitted by default; others only on request.
     """
 
     words: str
@@ -318,6 +333,6 @@ USUAL = tuple(name for name, family in FAMILIES.items() if family.usual)
 
 
 def chosen_families(keep: Sequence[str], also: Sequence[str]) -> tuple[str, ...]:
-    """The usual families but those that are kept, and those that are asked for besides."""
+    """Return the default families without those in `keep`, and with those in `also`."""
     wanted = {*USUAL, *also} - {*keep}
     return tuple(name for name in FAMILIES if name in wanted)

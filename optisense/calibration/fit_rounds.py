@@ -1,4 +1,4 @@
-"""The rounds of rendering and fitting by which a design comes near to photographs."""
+"""Rounds of rendering and fitting by which a design is fitted to photographs."""
 
 from __future__ import annotations
 
@@ -26,22 +26,24 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FIT_WIDTH = 160
-"""Pixels across the pictures of the fit: a quarter of the pixels of those that are compared in the
-end, and enough for the smooth responses of balls."""
+"""Width of the pictures of the fit, in pixels: a quarter of the pixels of those that are compared
+in the end, and enough for the smooth responses of balls.
+"""
 
 DIFFERENCE = 0.35
-"""Plausible ranges by which numbers that need a rendering are moved for their difference quotients;
-large, as renderings have noise."""
+"""Step of the difference quotients of numbers that need a rendering, in plausible ranges; it is
+large because renderings have noise.
+"""
 
 OUTLYING = 1.7
-"""Error of a press, over the median, from which on it is named as an outlier."""
+"""Ratio of a press's error to the median from which on it is named as an outlier."""
 
 Progress = Callable[[str, int, int], None]
-"""Called with what is done, how many pieces of the whole are done, and of how many."""
+"""Function that is called with the current step, the number of finished pieces, and that of all."""
 
 
 class FitRounds:
-    """The rounds of a fit."""
+    """Rounds of a fit."""
 
     def __init__(
         self,
@@ -69,15 +71,15 @@ class FitRounds:
         self._count = 2 * settings.rounds + len(self._rendering) + 3
 
     def told(self, what: str) -> None:
-        """Tell the progress, one piece on."""
+        """Report the progress by one piece."""
         self._progress(what, self._done, self._count)
         self._done += 1
 
     def run(self) -> Solution:
-        """All rounds; the contacts of the photographs that are fitted move along.
+        """Run all rounds; the contacts of the fitted photographs move along.
 
-        Difference quotients by numbers that need a rendering are taken in the first round only;
-        later rounds start from new renderings, and what they correct is small.
+        Difference quotients for numbers that need a rendering are taken in the first round only;
+        later rounds start from new renderings, and their corrections are small.
         """
         steps = np.zeros(len(self._chosen))
         small = self._small.subset(self._used)
@@ -101,9 +103,9 @@ class FitRounds:
         return solution
 
     def places(self, fitted: SensorDesign, exposure: float) -> list[SeenContact]:
-        """Where each photograph shows its contact by the fitted model, at the full size.
+        """Return the contact in each photograph by the fitted model, at the full size.
 
-        Those that were held out are placed here, with nothing else fitted.
+        Those that were held out are located here, with nothing else fitted.
         """
         if self.held_out:
             self.told("placing what was held out")
@@ -123,7 +125,7 @@ class FitRounds:
         return [_scaled(place, 1.0 / self._factor) for place in self._seen]
 
     def doubts(self, solution: Solution) -> list[str]:
-        """Presses that the fit explains far worse than the others."""
+        """Return notes on presses that the fit explains far worse than the others."""
         names = [self._small.presses[index].name for index in self._used]
         usual = float(np.median(solution.outlying))
         return [
@@ -140,7 +142,9 @@ class FitRounds:
         steps: FloatArray,
         contacts: LayeredPictures | None = None,
     ) -> LayeredPictures:
-        """Layers at the values of what needs a rendering; all else is as the design has it."""
+        """Return layers at the current values of numbers that need a rendering; all others are
+        those of the design.
+        """
         moved = [self._chosen[number] for number in self._rendering]
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
         return layered_pictures(

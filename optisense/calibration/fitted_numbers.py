@@ -12,22 +12,23 @@ from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
 
 UNDETERMINED = 0.7
-"""Uncertainty over the plausible range from which on photographs are said not to determine a
-number."""
+"""Ratio of uncertainty to plausible range from which on photographs are said not to determine a
+number.
+"""
 
 TOLD_APART = 0.85
-"""Correlation of two numbers from which on photographs can't tell them apart."""
+"""Correlation of two numbers from which on photographs are said not to distinguish them."""
 
 
 @dataclass(frozen=True)
 class FittedNumber:
-    """A number of the design that was fitted.
+    """Number of the design that was fitted.
 
     Attributes:
-        path, words, unit: as of the quantity.
-        before, after: its values.
+        path, words, unit: see `FitQuantity`.
+        before, after: values before and after the fit.
         uncertainty: standard deviation of the value.
-        determined: whether the photographs say more of it than its plausible range did.
+        determined: whether the photographs constrain it more than its plausible range does.
     """
 
     path: str
@@ -42,7 +43,7 @@ class FittedNumber:
 def fitted_numbers(
     chosen: Sequence[FitQuantity], solution: Solution, fitted: SensorDesign
 ) -> tuple[FittedNumber, ...]:
-    """What was fitted, with the fluxes that the fitted design has."""
+    """Return the fitted numbers, with the fluxes of the fitted design."""
     deviations = np.sqrt(np.maximum(np.diag(solution.covariance), 0.0))
     found = []
     for each, step, deviation in zip(chosen, solution.steps, deviations, strict=True):
@@ -64,7 +65,9 @@ def fitted_numbers(
 def not_told_apart(
     chosen: Sequence[FitQuantity], solution: Solution
 ) -> tuple[tuple[str, str, float], ...]:
-    """Pairs of numbers, in words, that photographs can't tell apart, and their correlation."""
+    """Return pairs of numbers, in words, that photographs can't distinguish, and their
+    correlation.
+    """
     deviations = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     correlation = solution.covariance / np.outer(deviations, deviations)
     found = []

@@ -1,9 +1,9 @@
-"""The fit of a layered model to photographs by damped Gauss-Newton steps.
+"""Fit of a layered model to photographs by damped Gauss-Newton steps.
 
-The residuals are those of the background, over its own usual error, and of each press's response
-near its contact, over that of all responses; both are taken anew before each round. So the
-background, which differs more, does not outweigh the contacts. Priors of the plausible ranges are
-added. Huber's weights keep dust and scratches from counting.
+The residuals are those of the background, divided by its usual error, and of each press's response
+near its contact, divided by the usual error of all responses; both are estimated anew before each
+round. So the background, which differs more, does not outweigh the contacts. Priors of the
+plausible ranges are added. Huber's weights limit the influence of dust and scratches.
 """
 
 from __future__ import annotations
@@ -25,58 +25,67 @@ from optisense.calibration.seen_contacts import SeenContact
 FloatArray = NDArray[np.float64]
 
 NEAR = 2.2
-"""Radii of a contact within which its response counts; beyond, there is noise."""
+"""Radius within which the response of a press counts, in radii of its contact; beyond, there is
+noise.
+"""
 
 LEAST_ERROR = 2.0
-"""Levels, at least, of the error that residuals are divided by: the noise of a photograph."""
+"""Smallest error by which residuals are divided, in levels: the noise of a photograph."""
 
 INDEPENDENT = 36.0
-"""Pixels of a photograph for which there is one independent error: what a model gets wrong, it gets
-wrong over some six pixels each way."""
+"""Number of pixels of a photograph for which there is one independent error: errors of the model
+extend over some six pixels in each direction.
+"""
 
 HUBER = 2.0
-"""Errors, in their root mean square, beyond which residuals count in proportion instead of by their
-square (Huber 1964)."""
+"""Residual, in units of the root mean square, beyond which it counts linearly instead of
+quadratically (Huber 1964).
+"""
 
 TO_DEVIATION = 1.4826
-"""Standard deviation of a normal distribution over the median of its absolute values."""
+"""Ratio of the standard deviation of a normal distribution to the median of its absolute values."""
 
 STEP = 0.02
-"""Plausible ranges by which a number is moved for its difference quotient."""
+"""Step of a number's difference quotient, in plausible ranges."""
 
 CONTACT_SPREAD = (2.0, 2.0, 0.1)
-"""Plausible ranges of a contact's column and row, pixels at a width of 320, and of the logarithm of
-its radius: what hand labels are off by."""
+"""Plausible ranges of a contact's column and row, in pixels at a width of 320, and of the logarithm
+of its radius: the errors of hand labels.
+"""
 
 TILE = 16
-"""Pixels of the side of tiles whose errors are taken to be independent of each other's when
-uncertainties are worked out."""
+"""Side of tiles whose errors are assumed to be independent in the estimate of uncertainties, in
+pixels.
+"""
 
 MOST_STEPS = 20
-"""Damped steps of one descent, at most; several times what a fit needs."""
+"""Largest number of damped steps of one descent; several times as many as a fit needs."""
 
 SMALL_GAIN = 0.02
-"""Fall of the sum of squares below which a descent ends. Numbers that are off by their uncertainty
-add 1."""
+"""Decrease of the sum of squares below which a descent ends. A number that is off by its
+uncertainty adds 1.
+"""
 
 LARGEST_STEP = 1.0
-"""Plausible ranges that a number moves in one step, at most: the model is nearly linear there."""
+"""Largest change of a number in one step, in plausible ranges; the model is nearly linear there."""
 
 TRUST = 2.5
-"""Plausible ranges up to which layers are extrapolated by their difference quotients."""
+"""Largest change over which layers are extrapolated by their difference quotients, in plausible
+ranges.
+"""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The solution of one round of the fit.
+    """Solution of one round of the fit.
 
     Attributes:
-        steps: (n,) of the quantities, in plausible ranges from their starts.
-        contacts: (presses, 3) column and row, pixels, and logarithm of the radius, from where they
-            were.
-        covariance: (n, n) of the steps: that of the posterior, with one independent error for 36
-            pixels, and that of errors which agree within tiles.
-        errors: root mean square error of the background and of the responses, levels.
+        steps: steps (n,) of the quantities, in plausible ranges from their starts.
+        contacts: changes (presses, 3) of column and row, pixels, and of the logarithm of the
+            radius.
+        covariance: covariance (n, n) of the steps: that of the posterior, with one independent
+            error for 36 pixels, plus that of errors which are correlated within tiles.
+        errors: root mean square errors of the background and of the responses, levels.
         outlying: root mean square error of each press's response, levels.
     """
 
@@ -103,14 +112,14 @@ class LayeredFit:
         """Prepare a round.
 
         Args:
-            photographs: to come close to.
-            seen: where they show their contacts.
-            layers: of the model at `start`.
-            chosen: the quantities.
+            photographs: photographs to fit.
+            seen: contacts in the photographs.
+            layers: layers of the model at `start`.
+            chosen: quantities to fit.
             exposure: factor on the radiance.
-            start: (n,) steps of the quantities at which the layers were rendered.
-            slopes: of quantities that need a rendering, by index: how the layers of the background
-                and of each press change for one plausible range.
+            start: steps (n,) of the quantities at which the layers were rendered.
+            slopes: slopes of quantities that need a rendering, by index: changes of the layers of
+                the background and of each press per plausible range.
         """
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
         self._start, self._slopes = start, slopes
@@ -132,13 +141,13 @@ class LayeredFit:
         return len(self._chosen)
 
     def pictures(self, steps: FloatArray, contacts: FloatArray) -> list[FloatArray]:
-        """Levels of the background and of each press."""
+        """Return the levels of the background and of each press."""
         return [self._shown(-1, steps, None)] + [
             self._shown(index, steps, contacts[index]) for index in range(len(self._masks))
         ]
 
     def _shown(self, index: int, steps: FloatArray, contact: FloatArray | None) -> FloatArray:
-        """Levels of a press, or of the background (index -1)."""
+        """Return the levels of a press, or of the background (index -1)."""
         layers = self._layers.background if index < 0 else self._layers.presses[index]
         moved = layers
         for number, slopes in self._slopes.items():
@@ -160,13 +169,14 @@ class LayeredFit:
         contacts: FloatArray,
         progress: Callable[[], None] = lambda: None,
     ) -> Solution:
-        """Damped Gauss-Newton steps until the sum of squares falls no more."""
+        """Run damped Gauss-Newton steps until the sum of squares stops falling."""
         steps, contacts, pictures, _ = self._descend(steps, contacts, progress)
-        # The errors are smaller now, and with them what residuals are divided by.
+        # The errors are smaller now, and so are the scales of the residuals.
         steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
         matrix, _, tiles = self._normal(pictures, steps, contacts, scales)
         inverse = np.linalg.inv(matrix)
-        # What noise and priors leave open, and what errors that agree within tiles add.
+        # The first term comes from noise and priors, the second from errors correlated within
+        # tiles.
         spread = np.asarray(inverse + inverse @ tiles @ inverse, dtype=np.float64)
         return Solution(
             steps,
@@ -179,7 +189,9 @@ class LayeredFit:
     def _descend(
         self, steps: FloatArray, contacts: FloatArray, progress: Callable[[], None]
     ) -> tuple[FloatArray, FloatArray, list[FloatArray], tuple[float, float]]:
-        """Steps, contacts, their pictures and the scales of the residuals at the least cost."""
+        """Return steps, contacts, their pictures and the scales of the residuals at the least
+        cost.
+        """
         pictures = self.pictures(steps, contacts)
         scales = self._scales(pictures)
         cost = self._cost(pictures, steps, contacts, scales)
@@ -225,7 +237,9 @@ class LayeredFit:
         )
 
     def _scales(self, pictures: list[FloatArray]) -> tuple[float, float]:
-        """The usual error of the background and of responses, which dust does not change."""
+        """Return robust estimates of the error of the background and of responses, unaffected by
+        dust.
+        """
         ground = pictures[0] - self._real
         pressed = [
             (shown - pictures[0] - real)[mask].ravel()
@@ -239,7 +253,9 @@ class LayeredFit:
     def _residuals(
         self, pictures: list[FloatArray], index: int, scales: tuple[float, float]
     ) -> FloatArray:
-        """(k, 3) of the background (index -1), or of a press's pixels near its contact."""
+        """Return the residuals (k, 3) of the background (index -1), or of a press's pixels near its
+        contact.
+        """
         if index < 0:
             return ((pictures[0] - self._real) / scales[0]).reshape(-1, 3)
         error = pictures[index + 1] - pictures[0] - self._responses[index]
@@ -266,7 +282,9 @@ class LayeredFit:
         contacts: FloatArray,
         scales: tuple[float, float],
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Matrix and gradient of the normal equations, and the spread of the tiles' gradients."""
+        """Return matrix and gradient of the normal equations, and the covariance of the tiles'
+        gradients.
+        """
         n, count = self.count, len(self._masks)
         size = n + 3 * count
         matrix, tiles = np.zeros((size, size)), np.zeros((size, size))

@@ -1,8 +1,8 @@
 """Renderings of a calibration that are kept in its folder until it has ended.
 
-A calibration that is interrupted or killed finds them again when the same command is run: each is
-filed under a hash of all that it follows from, so that one of another design, of other photographs
-or of another release is never taken for it.
+A calibration that was interrupted or killed finds them again when the same command is run: each is
+stored under a hash of all its inputs, so that one of another design, of other photographs or of
+another release is never used for it.
 """
 
 from __future__ import annotations
@@ -26,22 +26,22 @@ from optisense.version import __version__
 from optisense.writing import written_whole
 
 FOLDER = "renderings"
-"""Subfolder of a calibration that the renderings are kept in while it runs."""
+"""Subfolder of a calibration in which the renderings are kept while it runs."""
 
 MOST_BYTES = 1 << 30
-"""Bytes of one rendering's layers, at most; those of 320 x 240 pixels have a few million."""
+"""Largest size of one rendering's layers, bytes; those of 320 x 240 pixels have a few million."""
 
 FloatArray = NDArray[np.float32]
 
 
 class KeptRenderings:
-    """Layers of pictures in a folder, or nowhere."""
+    """Store of layers of pictures in a folder, or a dummy that stores nothing."""
 
     def __init__(self, folder: str | Path | None = None) -> None:
-        """Use a folder.
+        """Set the folder.
 
         Args:
-            folder: of the calibration, whose lock is held; None keeps nothing.
+            folder: folder of the calibration, whose lock is held; None keeps nothing.
         """
         self._folder = None if folder is None else Path(folder) / FOLDER
 
@@ -52,16 +52,16 @@ class KeptRenderings:
         settings: Sequence[object],
         render: Callable[[], dict[str, FloatArray]],
     ) -> dict[str, FloatArray]:
-        """Layers by light group: those that are kept, or else new ones, which are kept then.
+        """Return layers by light group: stored ones, or else new ones, which are stored.
 
         Args:
-            design: that is rendered.
-            contacts: that press into it.
-            settings: all else that the picture follows from.
-            render: makes the layers.
+            design: design to render.
+            contacts: contacts to press into it.
+            settings: all other inputs of the picture.
+            render: function that makes the layers.
 
         Raises:
-            OutputError: they can't be written.
+            OutputError: the layers can't be written.
         """
         if self._folder is None:
             return render()
@@ -79,7 +79,7 @@ class KeptRenderings:
         return layers
 
     def remove(self) -> None:
-        """Remove all that is kept, and its folder."""
+        """Remove all stored renderings, and their folder."""
         if self._folder is None:
             return
         with contextlib.suppress(OSError):
@@ -89,4 +89,4 @@ class KeptRenderings:
 
 
 KEPT_NOWHERE = KeptRenderings()
-"""The store of calibrations without a folder, which repeat every rendering."""
+"""Store of calibrations without a folder, which repeat every rendering."""

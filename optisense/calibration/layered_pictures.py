@@ -1,10 +1,10 @@
-"""Pictures of photographed presses as layers, and how the layers change with what is fitted.
+"""Pictures of photographed presses as layers, and their derivatives by the fitted numbers.
 
 Light adds up: a layer for each light group is rendered once, and mixed for any powers. For small
-changes of what needs a new rendering, the layers change in proportion: by difference quotients for
-numbers of the design, and in closed form for the place and radius of a contact. If a contact of one
-ball is a little wider, its response is the same, stretched and stronger in proportion: the slope of
-a ball's surface grows with the distance from its middle.
+changes of numbers that need a new rendering, the layers change linearly: by difference quotients
+for numbers of the design, and in closed form for the position and radius of a contact. If a contact
+of one ball is slightly wider, its response is the same, stretched and stronger in proportion: the
+slope of a ball's surface grows with the distance from its middle.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ class LayeredPictures:
 
     Attributes:
         groups: names of the light groups.
-        background: (groups, h, w, 3) radiance.
-        presses: the same of each press.
-        chain: of the model's camera, without noise.
-        contacts: what was pressed in.
+        background: radiance (groups, h, w, 3).
+        presses: radiance of each press, (groups, h, w, 3).
+        chain: picture chain of the model's camera, without noise.
+        contacts: contacts that were pressed in.
     """
 
     groups: tuple[str, ...]
@@ -62,18 +62,18 @@ def layered_pictures(
     """Render the background and the presses of photographs as layers.
 
     Args:
-        model: of the sensor.
-        photographs: whose size and presses are taken.
-        seen: where each of them shows its contact.
-        photons: of the light that all pictures share.
-        seed: of the light.
-        contacts: what presses, where that is known already.
-        kept: renderings that need not be made again.
-        progress: called with the number of pictures that are done.
+        model: model of the sensor.
+        photographs: photographs whose size and presses are used.
+        seen: contact in each photograph.
+        photons: number of photons of the light that all pictures share.
+        seed: seed of the light.
+        contacts: contacts to press in, if they are known already.
+        kept: store of renderings.
+        progress: function that is called with the number of finished pictures.
 
     Raises:
         CalibrationError: a contact is not on the skin.
-        OptiSenseError: the model can't be rendered, or a rendering not be kept.
+        OptiSenseError: the model can't be rendered, or a rendering can't be stored.
     """
     if contacts is None:
         rays = model.chief_rays(photographs.size)
@@ -111,8 +111,9 @@ def _rendered(
 
 
 def contact_slopes(layers: LayeredPictures, index: int, seen: SeenContact) -> FloatArray:
-    """(3, groups, h, w, 3): how a press changes by its column and row, pixels, and the logarithm of
-    its radius."""
+    """Return the derivatives of a press by its column and row, in pixels, and by the logarithm of
+    its radius, (3, groups, h, w, 3).
+    """
     response = layers.presses[index] - layers.background
     down, across = np.gradient(response, axis=(1, 2))
     rows, columns = np.mgrid[: response.shape[1], : response.shape[2]] + 0.5

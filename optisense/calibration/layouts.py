@@ -1,4 +1,4 @@
-"""The layouts of folders with photographs of a sensor, and how each is read.
+"""Layouts of folders with photographs of a sensor, and their readers.
 
 - Our own: `background.png`, and `presses.csv` with a row for each press.
 - That of the gs_sdk calibration tools: `background.png`, `catalog.csv` with a folder for each
@@ -38,20 +38,22 @@ CATALOG, EXPERIMENT, LABEL = "catalog.csv", "gelsight.png", "label.npz"
 DATA_PACK = "dataPack.npz"
 
 MOST_PRESSES = 1000
-"""Photographs that are read at most; six determine a sensor, so more are a slip."""
+"""Largest number of photographs that are read; six determine a sensor, so more are an error."""
 
 MIDDLE = 0.5
-"""Added to indices of pixels, as other tools label contacts, for places from the picture's edge."""
+"""Offset from indices of pixels, by which other tools label contacts, to positions from the
+picture's edge.
+"""
 
 Reader = Callable[[Path, float | None], Photographs]
 
 
 def read_photographs(folder: str | Path, diameter: float | None = None) -> Photographs:
-    """The photographs of a sensor in a folder, whichever layout it has.
+    """Read the photographs of a sensor in a folder of any layout.
 
     Args:
-        folder: of the photographs; also a `dataPack.npz` itself.
-        diameter: mm, of the ball, where the folder does not say it.
+        folder: folder of the photographs, or a `dataPack.npz` itself.
+        diameter: diameter of the ball, mm, if the folder does not state it.
 
     Raises:
         CalibrationError: no layout fits, a file is missing or damaged, or the pictures have
@@ -214,7 +216,7 @@ def _text(row: Mapping[str, Any], column: str, where: str) -> str:
 
 
 def _number(row: Mapping[str, Any], column: str, where: str) -> float | None:
-    """The number in a column; None where the column is missing or empty."""
+    """Return the number in a column, or None if the column is missing or empty."""
     value = row.get(column)
     if not isinstance(value, str) or not value.strip():
         return None
@@ -238,7 +240,7 @@ def _centre(row: Mapping[str, Any], where: str) -> tuple[float, float] | None:
 
 
 def _ball(row: Mapping[str, Any], where: str, usual: float | None) -> float:
-    """The diameter, mm, of the ball of a row."""
+    """Return the diameter of the ball of a row, mm."""
     given = _number(row, "diameter", where)
     text = (row.get("indenter") or "").strip()
     if given is not None:

@@ -1,4 +1,4 @@
-"""The pictures that a model gives where photographs of a real sensor are there."""
+"""Pictures of a model for the background and presses of photographs."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 WIDEST_RANGE = 4.0
-"""Exposures are looked for within this factor of the first guess, whose error is far smaller."""
+"""Largest factor from the first guess at which exposures are searched; the guess is far closer."""
 
 
 @dataclass(frozen=True)
 class ModelPictures:
-    """Pictures that a model gives for the photographed background and presses.
+    """Pictures of a model for the photographed background and presses.
 
     Attributes:
-        exposure: the factor on its radiance that brings it closest to the photographed background.
-        background: (h, w, 3) levels, 0 to 255.
-        presses: the same of each press.
-        contacts: what was pressed in.
+        exposure: factor on its radiance that brings it closest to the photographed background.
+        background: levels (h, w, 3), 0 to 255.
+        presses: levels of each press, (h, w, 3).
+        contacts: contacts that were pressed in.
     """
 
     exposure: float
@@ -59,14 +59,14 @@ def model_pictures(
     """Render the background and the presses of photographs.
 
     Args:
-        model: of the sensor.
-        photographs: of the real one.
-        seen: where each of them shows its contact.
-        photons: of the light that all pictures share.
-        seed: of the light.
-        exposure: factor on the radiance; what brings the background closest if None.
-        kept: renderings that need not be made again.
-        progress: called with the number of pictures that are done.
+        model: model of the sensor.
+        photographs: photographs of the real sensor.
+        seen: contact in each photograph.
+        photons: number of photons of the light that all pictures share.
+        seed: seed of the light.
+        exposure: factor on the radiance; the one that brings the background closest if None.
+        kept: store of renderings.
+        progress: function that is called with the number of finished pictures.
 
     Raises:
         CalibrationError: the photographs have another shape than the model's pictures, or a
@@ -83,14 +83,14 @@ def model_pictures(
 
 
 def levels_of(radiance: NDArray[np.floating], chain: PictureChain, exposure: float) -> FloatArray:
-    """(h, w, 3) what a camera stores of radiance, 0 to 255, not rounded."""
+    """Return the levels that a camera stores for radiance, (h, w, 3), 0 to 255, not rounded."""
     return 255.0 * np.asarray(chain.curve(chain.respond(exposure * radiance)), dtype=np.float64)
 
 
 def matched_exposure(
     radiance: NDArray[np.floating], chain: PictureChain, photograph: NDArray[np.uint8]
 ) -> float:
-    """The factor on radiance whose picture is closest to a photograph, by least squares.
+    """Return the factor on radiance whose picture is closest to a photograph, by least squares.
 
     Raises:
         CalibrationError: the radiance is 0 everywhere.

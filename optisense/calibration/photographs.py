@@ -1,7 +1,7 @@
 """Photographs of a real sensor: its background, and balls that are pressed into it.
 
-A folder of photographs has one of three layouts, each of which `layouts` reads. What all of them
-lead to is `Photographs`: pictures of one size, and what is known of each press.
+A folder of photographs has one of three layouts, each of which `layouts` reads. The result is
+always `Photographs`: pictures of one size, and the data of each press.
 """
 
 from __future__ import annotations
@@ -18,20 +18,22 @@ from optisense.errors import CalibrationError
 ByteArray = NDArray[np.uint8]
 
 WORKING_WIDTH = 320
-"""Pixels across the pictures that are compared: contacts of millimetres are some 50 pixels wide
-then, and a picture renders in about half a second."""
+"""Width of the pictures that are compared, in pixels: contacts of millimetres are then some 50
+pixels wide, and a picture renders in about half a second.
+"""
 
 LEAST_SIDE = 32
-"""Pixels of the shorter side of a photograph, at least: contacts can't be made out in smaller
-ones."""
+"""Smallest shorter side of a photograph, in pixels: contacts can't be made out in smaller ones."""
 
 FULL_LEVEL, FULL_SHARE = 255, 0.005
-"""Level of a channel that is full, and the share of such pixels of a picture above which it counts
-as overexposed."""
+"""Level of a saturated channel, and the share of saturated pixels above which a picture counts as
+overexposed.
+"""
 
 DARK_LEVEL = 16.0
 """Level that a twentieth of the pixels of the brightest channel should exceed; a picture whose
-pixels stay below is underexposed, as eight bits hold few levels of it."""
+pixels stay below is underexposed, as eight bits hold few levels of it.
+"""
 
 BRIGHTEST = 95.0
 """Percentile of the brightest channel that is compared with `DARK_LEVEL`."""
@@ -39,16 +41,16 @@ BRIGHTEST = 95.0
 
 @dataclass(frozen=True)
 class PhotographedPress:
-    """A photograph of a ball that is pressed into a sensor.
+    """Photograph of a ball that is pressed into a sensor.
 
     Attributes:
-        name: of its file, to show.
-        picture: (h, w, 3) uint8.
-        diameter: mm, of the ball.
+        name: name of its file, to show.
+        picture: picture (h, w, 3), uint8.
+        diameter: diameter of the ball, mm.
         centre: column and row of the contact's middle, pixels from the picture's left and top edge;
-            None where it is not known.
-        radius: pixels, of the contact; None where it is not known.
-        fingerprint: SHA-256 of the file, or of the array, that the picture is from.
+            None if unknown.
+        radius: radius of the contact, pixels; None if unknown.
+        fingerprint: SHA-256 of the file, or of the array, of the picture.
     """
 
     name: str
@@ -72,11 +74,11 @@ class Photographs:
     """Photographs of one sensor, all of one size.
 
     Attributes:
-        background: (h, w, 3) uint8, nothing pressed in.
-        presses: at least one.
-        layout: the name of the layout that they were read from.
-        fingerprint: of the background, as of a press.
-        scale: pixels of these pictures for one of the photographs that were read.
+        background: picture (h, w, 3), uint8, with nothing pressed in.
+        presses: presses, at least one.
+        layout: name of the layout that they were read from.
+        fingerprint: fingerprint of the background, see `PhotographedPress`.
+        scale: size of these pictures relative to the photographs that were read.
     """
 
     background: ByteArray = field(repr=False)
@@ -111,13 +113,13 @@ class Photographs:
         return self.background.shape[1], self.background.shape[0]
 
     def subset(self, indices: Sequence[int]) -> Photographs:
-        """The same background with some of the presses."""
+        """Return the same background with some of the presses."""
         return replace(self, presses=tuple(self.presses[index] for index in indices))
 
     def scaled(self, width: int = WORKING_WIDTH) -> Photographs:
-        """The photographs at a smaller size, each pixel the mean of those that it stands for.
+        """Return the photographs at a smaller size, by averaging pixels.
 
-        Smaller photographs are left as they are.
+        Smaller photographs are not changed.
         """
         if self.size[0] <= width:
             return self
@@ -138,7 +140,7 @@ class Photographs:
         )
 
     def warnings(self) -> list[str]:
-        """Warnings about the exposure of the pictures, one sentence each."""
+        """Return warnings about the exposure of the pictures, one sentence each."""
         found = []
         pictures = [("the background", self.background)]
         pictures += [(press.name, press.picture) for press in self.presses]

@@ -1,7 +1,7 @@
-"""Quantities that a calibration fits, and the design that follows from their values.
+"""Quantities that a calibration fits, and the design for their values.
 
 Each quantity has a start, limits, and a plausible range: the standard deviation of a normal
-distribution about the start, which the photographs outweigh where they tell anything. Quantities of
+distribution about the start, which the photographs outweigh if they are informative. Quantities of
 the camera's processing and the powers of the lights only change how the layers of a picture are
 mixed and stored; the others need a new rendering.
 """
@@ -29,16 +29,16 @@ FloatArray = NDArray[np.float64]
 def quantities_of(
     design: SensorDesign, families: Sequence[str], asked: Sequence[tuple[str, float, float]] = ()
 ) -> list[FitQuantity]:
-    """The quantities of a design that are fitted.
+    """Return the quantities of a design that are fitted.
 
     Args:
-        design: to start from.
-        families: of `FAMILIES`.
-        asked: path, least and largest value of further numbers of the design.
+        design: design to start from.
+        families: names of families, of `FAMILIES`.
+        asked: path, smallest and largest value of further numbers of the design.
 
     Raises:
-        CalibrationError: a family is unknown, or a range does not hold the design's value.
-        DesignError: a path leads to no value.
+        CalibrationError: a family is unknown, or a range does not contain the design's value.
+        DesignError: a path names no value.
     """
     unknown = [name for name in families if name not in FAMILIES]
     if unknown:
@@ -75,12 +75,12 @@ def _asked(design: SensorDesign, path: str, low: float, high: float) -> FitQuant
 def designed(
     design: SensorDesign, chosen: Sequence[FitQuantity], steps: FloatArray
 ) -> SensorDesign:
-    """A design with the numbers of a fit.
+    """Return a design with the numbers of a fit.
 
     Args:
-        design: that the quantities are of.
-        chosen: the quantities.
-        steps: plausible ranges of each from its start.
+        design: design of the quantities.
+        chosen: quantities.
+        steps: distance of each from its start, in plausible ranges.
 
     Raises:
         DesignError: the numbers do not fit together.
@@ -95,7 +95,7 @@ def designed(
 
 
 def _prepared(design: SensorDesign, values: dict[str, float]) -> SensorDesign:
-    """The design with the pieces of the camera whose numbers are set."""
+    """Return the design with the components of the camera whose numbers are set."""
     camera: dict[str, Any] = {}
     if any(path.startswith("camera.colour_matrix") for path in values):
         own = design.camera.colour_matrix
@@ -119,7 +119,7 @@ def _prepared(design: SensorDesign, values: dict[str, float]) -> SensorDesign:
 def chain_with(
     chain: PictureChain, chosen: Sequence[FitQuantity], steps: FloatArray
 ) -> PictureChain:
-    """The picture chain of the fitted design, without building the design."""
+    """Return the picture chain of the fitted design, without building the design."""
     matrix: FloatArray | None = None
     changed: dict[str, Any] = {}
     shading: dict[str, Any] = {}
@@ -149,7 +149,7 @@ def chain_with(
 def power_factors(
     groups: Sequence[str], chosen: Sequence[FitQuantity], steps: FloatArray
 ) -> FloatArray:
-    """(groups,) factors on the layers of the light groups as the design has them."""
+    """Return the factors (groups,) on the layers of the light groups relative to the design."""
     factors = np.ones(len(groups))
     for each, step in zip(chosen, steps, strict=True):
         for index, name in enumerate(groups):

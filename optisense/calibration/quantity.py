@@ -1,4 +1,4 @@
-"""One number that a calibration fits."""
+"""Single number that a calibration fits."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from optisense.design import SensorDesign
 
 LARGEST_POWER = 20.0
 """Largest logarithm of the factor on a number's start, so that no trial step overflows; the limits
-of each number are far narrower."""
+of each number are far narrower.
+"""
 
 
 @dataclass(frozen=True)
 class FitQuantity:
-    """One number that is fitted.
+    """Single number that is fitted.
 
     Attributes:
-        path: of the design, or a name that looks like one where several of its values follow from
+        path: path in the design, or a name of the same form if several of its values follow from
             the number.
-        words: what it is, to be read.
-        unit: of the number; empty if it has none.
+        words: description of the number.
+        unit: unit of the number; empty if it has none.
         start: value before the fit.
         low, high: limits.
         spread: plausible range about the start, of its logarithm if `logarithmic`.
@@ -29,8 +30,9 @@ class FitQuantity:
         renders: whether a change needs a new rendering.
         moves_contacts: whether balls must be pressed in anew after a change, so that they touch
             where the photographs show them.
-        change: the design with a value of the number; None where it is the value at `path`.
-        home: path under which the design says where the number is from; `path` if empty.
+        change: function that returns the design with a value of the number; None if it is the value
+            at `path`.
+        home: path under which the design records the source of the number; `path` if empty.
     """
 
     path: str
@@ -49,7 +51,7 @@ class FitQuantity:
     home: str = ""
 
     def value(self, step: float) -> float:
-        """The number at so many plausible ranges from its start."""
+        """Return the number at a distance of `step` plausible ranges from its start."""
         if self.logarithmic:
             power = min(max(self.spread * step, -LARGEST_POWER), LARGEST_POWER)
             found = self.start * math.exp(power)
@@ -58,5 +60,5 @@ class FitQuantity:
         return min(max(found, self.low), self.high)
 
     def slope(self, step: float) -> float:
-        """How the number changes for one plausible range."""
+        """Return the change of the number per plausible range."""
         return self.spread * (self.value(step) if self.logarithmic else 1.0)

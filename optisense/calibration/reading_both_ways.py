@@ -1,9 +1,9 @@
-"""Readers calibrated on a model and tried on photographs, and the reverse.
+"""Readers calibrated on a model and applied to photographs, and the reverse.
 
 The reader is the one of the objective `reading` (`optisense.reading.lookup`). It learns the change
-of colour at each tilt from the contacts of the presses, where a ball decides how the skin is
-tilted, and reads the same contacts in the other's pictures. A model that stands for a sensor must
-let it read the sensor's balls as large as they are.
+of colour at each tilt from the contacts of the presses, where the ball determines the tilt of the
+skin, and reads the same contacts in the other's pictures. With a model that represents a sensor it
+must read the sensor's balls in their true size.
 """
 
 from __future__ import annotations
@@ -37,23 +37,26 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 INSIDE = 0.9
-"""Radii of a contact up to which its pixels are read: at the edge, hand labels and the place that
-is found by itself are off by a tenth."""
+"""Radius up to which pixels of a contact are read, in radii of the contact: at the edge, hand
+labels and detected positions are off by a tenth.
+"""
 
 FEWEST = 3
-"""Presses from which a reader can be calibrated; fewer say nothing of other places."""
+"""Smallest number of presses from which a reader can be calibrated; fewer don't represent other
+places.
+"""
 
 
 @dataclass(frozen=True)
 class _Ball:
-    """The pixels of a contact, and how the ball tilts the skin there.
+    """Pixels of a contact, and the tilt of the skin by the ball there.
 
     Attributes:
-        where: (h, w) which pixels.
-        offsets: (n, 2) mm from the contact's middle, along the picture's right and up.
-        radius: mm, of the ball.
-        tilts: (n, 2) degrees.
-        places: (n, 2) in the picture, -1 to 1.
+        where: mask (h, w) of the pixels.
+        offsets: offsets (n, 2) from the contact's middle, along the picture's right and up, mm.
+        radius: radius of the ball, mm.
+        tilts: tilts (n, 2), degrees.
+        places: positions (n, 2) in the picture, -1 to 1.
     """
 
     where: NDArray[np.bool_]
@@ -69,13 +72,13 @@ def realism_and_readings(
     seen: Sequence[SeenContact],
     pictures: ModelPictures,
 ) -> Realism:
-    """All figures of a model's pictures beside photographs.
+    """Return all figures of a model's pictures beside photographs.
 
     Args:
-        model: that made the pictures.
-        photographs: of the sensor.
-        seen: where they show contacts.
-        pictures: of the model, of the same presses.
+        model: model that made the pictures.
+        photographs: photographs of the sensor.
+        seen: contacts in the photographs.
+        pictures: pictures of the model, of the same presses.
     """
     found = realism(photographs, seen, pictures)
     # Far from a contact, a response is the noise of two photographs.
@@ -96,15 +99,15 @@ def read_both_ways(
     """Calibrate a reader on the model and one on the photographs, and read the other's contacts.
 
     Args:
-        photographs: of the sensor.
-        seen: where they show contacts.
-        pictures: of the model, of the same presses.
+        photographs: photographs of the sensor.
+        seen: contacts in the photographs.
+        pictures: pictures of the model, of the same presses.
         rays: the model's chief rays at the photographs' size.
-        axes: (3, 3) of the camera: right, up and viewing direction.
+        axes: axes (3, 3) of the camera: right, up and viewing direction.
         noise: standard deviation of the photographs' noise, levels.
 
     Returns:
-        A reading for each press; none where there are fewer than three.
+        A reading for each press; none if there are fewer than three.
     """
     if len(seen) < FEWEST:
         return ()
@@ -168,7 +171,9 @@ def _pixels(picture: FloatArray, untouched: FloatArray, ball: _Ball) -> Pixels:
 
 
 def _judged(normals: FloatArray, ball: _Ball) -> tuple[float, float]:
-    """The radius that is read over the ball's, and the mean angle between normals, degrees."""
+    """Return the ratio of the radius that is read to the ball's, and the mean angle between
+    normals, degrees.
+    """
     off = angles_between(normals, tilts_to_normals(ball.tilts))
     along = float((ball.offsets * normals[:, :2]).sum())
     read = float((ball.offsets**2).sum()) / max(along, 1e-9)

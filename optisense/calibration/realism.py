@@ -1,6 +1,6 @@
 """Differences between a model's pictures and photographs of the real sensor.
 
-A *response* is a picture with something pressed in, less the picture with nothing. All figures of
+A *response* is a picture with something pressed in minus the picture with nothing. All figures of
 presses compare responses, in two regions: the *contact*, a disc, and the *ring* around it, from 1.1
 to 1.6 radii, where an elastic skin is pulled in. The similarity of whole pictures says little: the
 bare background reaches 0.975 there.
@@ -27,22 +27,24 @@ RING = 1.1, 1.6
 """Inner and outer edge of the ring, in radii of the contact."""
 
 PATCH = 1.35
-"""Radii of the contact that the patch reaches over which the unexplained energy and the similarity
-are measured: the contact and the steepest part of the skin around it."""
+"""Radius of the patch over which the unexplained energy and the similarity are measured, in radii
+of the contact: it contains the contact and the steepest part of the skin around it.
+"""
 
 FAR = 3.0
-"""Radii of the contact beyond which a press should change nothing."""
+"""Distance beyond which a press should change nothing, in radii of the contact."""
 
 SIMILARITY_WINDOW = 0.2
 """Standard deviation of the similarity's window, in radii of the contact: about six pixels of a
 usual contact. In the window of 1.5 pixels that Wang et al. (2004) use for whole pictures, the noise
-of a photograph outweighs the response of a smooth ball."""
+of a photograph outweighs the response of a smooth ball.
+"""
 
 LEVELS = 255.0
 """Range of a picture's levels, from which the constants of the similarity follow."""
 
 SIMILARITY_CONSTANTS = (0.01 * LEVELS) ** 2, (0.03 * LEVELS) ** 2
-"""Constants that keep the similarity finite in dark and even places (Wang et al. 2004)."""
+"""Constants that keep the similarity finite in dark and uniform places (Wang et al. 2004)."""
 
 
 @dataclass(frozen=True)
@@ -50,17 +52,21 @@ class PressRealism:
     """Differences between the model and one photograph of a press, in levels of 255.
 
     Attributes:
-        name: of the photograph.
-        unexplained: energy of the error over that of the real response, in the patch of 1.35 radii.
-        contact: root mean square of the error over that of the real response, in the contact.
-        ring: the same in the ring.
+        name: name of the photograph.
+        unexplained: ratio of the energy of the error to that of the real response, in the patch of
+            1.35 radii.
+        contact: ratio of the root mean square of the error to that of the real response, in the
+            contact.
+        ring: the same ratio in the ring.
         strength: root mean square of the real response in the contact, levels.
         far: root mean square of the error beyond three radii, levels.
-        far_real: the same of the real response, which is mostly noise.
+        far_real: root mean square of the real response beyond three radii, which is mostly noise,
+            levels.
         similarity: structural similarity (SSIM) of the responses, mean over the patch.
-        turn: degrees between the directions in which the model and the sensor brighten over the
-            contact, for R, G and B.
-        gain: how much the model brightens along the sensor's direction, over what the sensor does.
+        turn: angles between the directions in which the model and the sensor brighten over the
+            contact, for R, G and B, degrees.
+        gain: ratio of the model's brightening along the sensor's direction to the sensor's, for R,
+            G and B.
     """
 
     name: str
@@ -80,10 +86,10 @@ class ReadBothWays:
     """Readings of one contact by readers that were calibrated on the other's pictures.
 
     Attributes:
-        name: of the photograph.
-        radius: of the ball that a reader calibrated on the model reads in the photograph, over what
-            it is.
-        degrees: mean angle between those normals and the ball's.
+        name: name of the photograph.
+        radius: ratio of the ball's radius that a reader calibrated on the model reads in the
+            photograph to the true one.
+        degrees: mean angle between the normals that it reads and the ball's, degrees.
         radius_back, degrees_back: the same of a reader that is calibrated on the photographs, in
             the model's picture.
     """
@@ -100,10 +106,10 @@ class BackgroundRealism:
     """Differences between the model's untouched picture and the real one, for R, G and B.
 
     Attributes:
-        correlation: of the pixels.
-        real, model: mean level.
+        correlation: correlation of the pixels.
+        real, model: mean levels.
         error: root mean square of the difference, levels.
-        ratio: peak signal-to-noise ratio of all three, dB.
+        ratio: peak signal-to-noise ratio over all three channels, dB.
     """
 
     correlation: tuple[float, float, float]
@@ -118,10 +124,10 @@ class Realism:
     """Differences between a model and photographs.
 
     Attributes:
-        background: of the untouched sensor.
-        presses: of each press.
-        exposure: of the model's pictures.
-        readings: of each press; none where there are too few to calibrate a reader.
+        background: differences of the untouched sensor.
+        presses: differences of each press.
+        exposure: exposure of the model's pictures.
+        readings: readings of each press; none if there are too few to calibrate a reader.
     """
 
     background: BackgroundRealism
@@ -130,16 +136,18 @@ class Realism:
     readings: tuple[ReadBothWays, ...] = ()
 
     def median(self, name: str) -> float:
-        """The median over the presses of one of their figures."""
+        """Return the median over the presses of one of their figures."""
         return float(np.median([getattr(press, name) for press in self.presses]))
 
     def median_reading(self, name: str) -> float:
-        """The median over the presses of one of the figures of readings; NaN without readings."""
+        """Return the median over the presses of one of the figures of readings; NaN without
+        readings.
+        """
         values = [getattr(each, name) for each in self.readings]
         return float(np.median(values)) if values else math.nan
 
     def as_data(self) -> dict[str, Any]:
-        """All figures, ready for JSON."""
+        """Return all figures, ready for JSON."""
         return asdict(self)
 
 
@@ -149,9 +157,9 @@ def realism(
     """Compare a model's pictures with photographs.
 
     Args:
-        photographs: of the real sensor.
-        seen: where each shows its contact.
-        pictures: of the model, of the same presses.
+        photographs: photographs of the real sensor.
+        seen: contact in each photograph.
+        pictures: pictures of the model, of the same presses.
     """
     real = photographs.background.astype(np.float64)
     presses = tuple(
@@ -167,7 +175,7 @@ def realism(
 
 
 def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) -> PressRealism:
-    """The figures of one press, from both responses (h, w, 3)."""
+    """Return the figures of one press, from both responses (h, w, 3)."""
     distance = distances(real.shape[:2], seen)
     contact = distance <= 1.0
     ring = (distance >= RING[0]) & (distance <= RING[1])
@@ -192,7 +200,7 @@ def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) ->
 
 
 def distances(shape: tuple[int, ...], seen: SeenContact) -> FloatArray:
-    """(h, w) distance of pixels from the contact's middle, in its radii."""
+    """Return the distances (h, w) of pixels from the contact's middle, in its radii."""
     rows, columns = np.mgrid[: shape[0], : shape[1]] + 0.5
     found = np.hypot(columns - seen.centre[0], rows - seen.centre[1])
     return np.asarray(found / max(seen.radius, 1e-9))
@@ -201,10 +209,11 @@ def distances(shape: tuple[int, ...], seen: SeenContact) -> FloatArray:
 def _brightening(
     real: FloatArray, model: FloatArray, channel: int, seen: SeenContact, where: NDArray[np.bool_]
 ) -> tuple[float, float]:
-    """Degrees by which the model's brightening over a contact is turned, and its gain.
+    """Return the angle, degrees, by which the model's brightening over a contact is turned, and its
+    gain.
 
-    The response of a channel over the contact is fitted by a plane; its slope points to where the
-    channel brightens.
+    The response of a channel over the contact is fitted by a plane; its slope points in the
+    direction in which the channel brightens.
     """
     rows, columns = np.nonzero(where)
     x, y = columns + 0.5 - seen.centre[0], rows + 0.5 - seen.centre[1]
@@ -217,13 +226,13 @@ def _brightening(
 
 
 def similarity(one: FloatArray, other: FloatArray, window: float) -> FloatArray:
-    """(h, w) structural similarity of two pictures (h, w, 3), mean over the channels.
+    """Return the structural similarity (h, w) of two pictures (h, w, 3), mean over the channels.
 
     Wang, Bovik, Sheikh and Simoncelli 2004, with a Gaussian window.
 
     Args:
-        one, other: the pictures, levels of 255.
-        window: pixels, its standard deviation.
+        one, other: pictures, levels of 255.
+        window: standard deviation of the window, pixels.
     """
 
     def blurred(values: FloatArray) -> FloatArray:

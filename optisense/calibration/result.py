@@ -1,4 +1,4 @@
-"""What came of a fit of a design to photographs."""
+"""Result of a fit of a design to photographs."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from optisense.design import SensorDesign
 
 @dataclass(frozen=True)
 class Calibration:
-    """A design that was fitted to photographs.
+    """Design that was fitted to photographs.
 
     Attributes:
-        design: the fitted one.
-        exposure: at which its pictures are as bright as the photographs.
-        numbers: what was fitted.
-        alike: pairs of them, in words, that the photographs can't tell apart, and their
+        design: fitted design.
+        exposure: exposure at which its pictures are as bright as the photographs.
+        numbers: fitted numbers.
+        alike: pairs of numbers, in words, that the photographs can't distinguish, and their
             correlation.
-        before, after: the design as it was and as it is, beside all photographs.
-        held_out: names of the presses that the fit did not see.
-        notes: what is doubtful, one sentence each.
+        before, after: comparisons of the original and the fitted design with all photographs.
+        held_out: names of the presses that the fit did not use.
+        notes: doubtful findings, one sentence each.
     """
 
     design: SensorDesign
@@ -36,13 +36,13 @@ class Calibration:
     notes: tuple[str, ...]
 
     def of_presses(self, found: Realism, *, held_out: bool) -> Realism:
-        """The figures of the presses that were held out, or of those that were not."""
+        """Return the figures of the presses that were held out, or of those that were not."""
         presses = [p for p in found.presses if (p.name in self.held_out) == held_out]
         readings = [r for r in found.readings if (r.name in self.held_out) == held_out]
         return replace(found, presses=tuple(presses), readings=tuple(readings))
 
     def as_data(self) -> dict[str, Any]:
-        """All numbers and figures, ready for JSON."""
+        """Return all numbers and figures, ready for JSON."""
         return {
             "exposure": self.exposure,
             "numbers": [asdict(each) for each in self.numbers],

@@ -1,4 +1,4 @@
-"""Contacts that photographs show, and the indenters that press there into a model."""
+"""Contacts in photographs, and the contacts of a model that reproduce them."""
 
 from __future__ import annotations
 
@@ -18,19 +18,22 @@ if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
 
 DEPTH_STEPS = 4
-"""Steps in which the depth of a ball is found that gives a contact of a radius; each one shrinks
-the error several times, and the first is off by at most a third."""
+"""Number of iterations that find the depth of a ball for a given contact radius; each one reduces
+the error several times, and the first is off by at most a third.
+"""
 
 RADIUS_ERROR = 0.01
 """Relative error of a contact's radius at which the search for its depth ends; the grid on which
-the skin's pressure is computed shows contacts to about 1 %."""
+the skin's pressure is computed resolves contacts to about 1 %.
+"""
 
 DOUBTFUL = 0.5
 """Asymmetry from which on the difference of a photograph does not look like that of a ball."""
 
 LABEL_OFF = 0.6
-"""Distance of a label's centre from that of the contact that is found, in radii, and share of the
-radii, from which on the label is doubted. Hand labels are off by a tenth."""
+"""Distance of a label's centre from that of the detected contact, in radii, and relative difference
+of the radii, from which on the label is doubted. Hand labels are off by a tenth.
+"""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class SeenContact:
 
     Attributes:
         centre: column and row of its middle, pixels from the left and top edge.
-        radius: pixels.
+        radius: radius, pixels.
     """
 
     centre: tuple[float, float]
@@ -47,15 +50,15 @@ class SeenContact:
 
 
 def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[SeenContact | None]:
-    """Where each photograph shows its contact.
+    """Return the contact in each photograph.
 
     Args:
-        photographs: with labels or without.
-        refine: whether to look for contacts that are labelled too, near their labels; hand labels
-            are off by pixels.
+        photographs: photographs with labels or without.
+        refine: whether labelled contacts are also searched, near their labels; hand labels are off
+            by pixels.
 
     Returns:
-        None for a photograph that shows no contact.
+        Contacts, with None for a photograph that shows no contact.
     """
     found: list[SeenContact | None] = []
     for press in photographs.presses:
@@ -69,7 +72,7 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
 
 
 def doubts(photographs: Photographs) -> list[str]:
-    """Warnings about presses: no visible contact, or labels that contradict it."""
+    """Return warnings about presses: no visible contact, or labels that contradict it."""
     found = []
     twice = 0
     for press in photographs.presses:
@@ -105,10 +108,10 @@ def doubts(photographs: Photographs) -> list[str]:
 
 
 def check_shape(photographs: Photographs, model: OpticalModel) -> None:
-    """Check that photographs have the shape of the model's pictures.
+    """Check that photographs have the aspect ratio of the model's pictures.
 
     Raises:
-        CalibrationError: they are wider or narrower.
+        CalibrationError: the photographs are wider or narrower.
     """
     width, height = photographs.size
     own_width, own_height = model.design.camera.resolution
@@ -124,13 +127,13 @@ def check_shape(photographs: Photographs, model: OpticalModel) -> None:
 def contact_of(
     press: PhotographedPress, seen: SeenContact, model: OpticalModel, rays: ChiefRays
 ) -> Contact:
-    """The contact of a model that touches where a photograph shows it.
+    """Return the contact of a model that touches where a photograph shows it.
 
     Args:
-        press: whose ball presses.
-        seen: where.
-        model: of the sensor.
-        rays: its chief rays, at the photograph's size.
+        press: press of a ball.
+        seen: contact in the photograph.
+        model: model of the sensor.
+        rays: chief rays of the model, at the photograph's size.
 
     Raises:
         CalibrationError: the contact is not on the skin, too wide for the ball, or too deep.
@@ -171,10 +174,11 @@ def contact_of(
 def place_on_skin(
     centre: tuple[float, float], rays: ChiefRays, name: str
 ) -> tuple[tuple[float, float, float], float]:
-    """The point of the skin, mm, that a place of the picture shows, and mm for a pixel there.
+    """Return the point of the skin, mm, at a position in the picture, and the size of a pixel
+    there, mm.
 
     Raises:
-        CalibrationError: the camera sees no skin there.
+        CalibrationError: the camera sees no skin at this position.
     """
     column, row = centre[0] - 0.5, centre[1] - 0.5
     steps = np.array([[0.0, 0.0], [-1.0, 0.0], [1.0, 0.0], [0.0, -1.0], [0.0, 1.0]])

@@ -1,4 +1,4 @@
-"""What a calibration may change, and how it goes about it."""
+"""Settings of a calibration."""
 
 from __future__ import annotations
 
@@ -10,15 +10,19 @@ from optisense.errors import CalibrationError
 from optisense.near import suggestion
 
 FIT_PHOTONS = 300_000
-"""Photons of the light of the fit; its noise is a few per cent and smooth, and the same in all
-rounds."""
+"""Number of photons of the light of the fit; its noise is a few per cent and smooth, and the same
+in all rounds.
+"""
 
 ROUNDS = 3
-"""Rounds of rendering and fitting, by default; contacts move by less than half a pixel in a third
-round."""
+"""Default number of rounds of rendering and fitting; contacts move by less than half a pixel in a
+third round.
+"""
 
 HELD_OUT = 3
-"""Every third press is held out and only judged, where there are at least as many."""
+"""Interval of held-out presses: every third press is held out and only evaluated, if there are at
+least as many.
+"""
 
 
 @dataclass(frozen=True)
@@ -26,12 +30,12 @@ class CalibrationSettings:
     """Settings of a calibration.
 
     Attributes:
-        families: what may change, of `families.FAMILIES`.
-        asked: path, least and largest value of further numbers of the design.
-        rounds: of rendering and fitting.
-        photons: of the light of the fit; that of the comparison has as many or more.
-        seed: of the light.
-        refine: whether labelled contacts are looked for near their labels first.
+        families: families of numbers that may change, of `families.FAMILIES`.
+        asked: path, smallest and largest value of further numbers of the design.
+        rounds: number of rounds of rendering and fitting.
+        photons: number of photons of the light of the fit; the comparison has as many or more.
+        seed: seed of the light.
+        refine: whether labelled contacts are first searched near their labels.
         held_out: names of the presses that are held out; every third one if None.
     """
 

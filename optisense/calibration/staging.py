@@ -1,5 +1,6 @@
-"""Photographs of a model instead of a real sensor: to try out a calibration, whose answer is known,
-and to keep photographs in a folder."""
+"""Photographs of a model instead of a real sensor, for tests of a calibration with a known answer,
+and a writer of folders of photographs.
+"""
 
 from __future__ import annotations
 
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 USUAL_NOISE = 2.0
-"""Standard deviation of the noise of photographs, levels of 255: that of published ones of a
-GelSight Mini."""
+"""Default standard deviation of the noise of photographs, in levels of 255: that of published ones
+of a GelSight Mini.
+"""
 
 
 def photograph_model(
@@ -37,19 +39,19 @@ def photograph_model(
     seed: int = 0,
     noise: float = USUAL_NOISE,
 ) -> Photographs:
-    """Photographs of a model as if it were a real sensor.
+    """Return photographs of a model as if it were a real sensor.
 
     Args:
-        model: of the sensor.
-        contacts: balls, one for each photograph.
-        exposure: factor on the radiance; found by itself if None.
-        resolution: width and height in pixels; the camera's own if None.
-        photons: of the light.
-        seed: of light and noise.
+        model: model of the sensor.
+        contacts: contacts of balls, one for each photograph.
+        exposure: factor on the radiance; automatic if None.
+        resolution: width and height in pixels; those of the camera if None.
+        photons: number of photons of the light.
+        seed: seed of light and noise.
         noise: standard deviation of the noise added to each pixel, levels.
 
     Raises:
-        CalibrationError: something other than a ball presses.
+        CalibrationError: an indenter is not a ball.
         OptiSenseError: the model can't be rendered.
     """
     for contact in contacts:
@@ -84,7 +86,7 @@ def save_photographs(folder: str | Path, photographs: Photographs) -> None:
 
     Raises:
         OutputError: a file can't be written.
-        CalibrationError: two presses have the same name, or one is no name of a PNG file.
+        CalibrationError: two presses have the same name, or a name is no name of a PNG file.
     """
     place = Path(folder)
     names = [press.name for press in photographs.presses]

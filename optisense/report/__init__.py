@@ -1,6 +1,6 @@
-"""Reports: one self-contained HTML page a render, to look at, keep and send.
+"""Reports: self-contained HTML pages of renders, scores and studies.
 
-Names load on first use: the page of a render does not wait for what that of scores needs.
+Names load on first use: the page of a render does not wait for the imports of that of scores.
 """
 
 from __future__ import annotations

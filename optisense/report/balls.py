@@ -1,4 +1,4 @@
-"""Outlines and numbers of several pressed balls, to draw over their picture."""
+"""Outlines and numbers of several pressed balls, drawn over their picture."""
 
 from __future__ import annotations
 
@@ -12,26 +12,30 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 LEAST_PIXELS = 12
-"""A ball that covers fewer pixels of the picture (about 4 x 3) can't be made out."""
+"""Smallest number of pixels that a visible ball covers (about 4 x 3); smaller ones can't be made
+out.
+"""
 
 LEAST_PIECE = 6
-"""Pixels of a separate piece of a ball, as a mirror's edge cuts it, that gets an outline."""
+"""Smallest number of pixels of a separate piece of a ball, as a mirror's edge cuts it, that gets an
+outline.
+"""
 
 
 LETTERS = 10.0
-"""Width in pixels of a picture that is kept free for a number beside a ball."""
+"""Width that is kept free for a number beside a ball, in pixels of the picture."""
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball as a picture shows it.
+    """Ball in a picture.
 
     Attributes:
-        number: of the ball, from 1.
-        pixels: that it covers.
-        outlines: (k, 2) column and row of the corners of a polygon around each piece of it, in
-            pixels from the upper left, the largest piece first; a folded mirror shows one ball in
-            several pieces.
+        number: number of the ball, from 1.
+        pixels: number of pixels that it covers.
+        outlines: corners (k, 2), as column and row, of a polygon around each piece of it, in pixels
+            from the upper left, the largest piece first; a folded mirror shows one ball in several
+            pieces.
     """
 
     number: int
@@ -40,19 +44,19 @@ class Ball:
 
     @property
     def seen(self) -> bool:
-        """Whether it can be made out."""
+        """True if the ball is large enough to be made out."""
         return self.pixels >= LEAST_PIXELS
 
 
 def find_balls(
     points: NDArray[np.float32], mask: NDArray[np.bool_], places: FloatArray
 ) -> tuple[Ball, ...]:
-    """Tell apart the balls of a picture: a pixel belongs to the ball whose place is nearest.
+    """Return the balls of a picture; each pixel belongs to the ball whose position is nearest.
 
     Args:
-        points: (h, w, 3) mm, what each pixel sees.
-        mask: (h, w), which pixels see a ball.
-        places: (n, 3) mm, of the balls.
+        points: points (h, w, 3) that the pixels see, mm.
+        mask: mask (h, w) of the pixels that see a ball.
+        places: positions (n, 3) of the balls, mm.
     """
     from scipy.ndimage import label
 
@@ -72,7 +76,9 @@ def find_balls(
 
 
 def _around(piece: NDArray[np.bool_]) -> FloatArray:
-    """(k, 2): the convex polygon around all pixels of a piece, half a pixel wider than these."""
+    """Return the convex polygon (k, 2) around all pixels of a piece, half a pixel wider than
+    these.
+    """
     from shapely import MultiPoint
 
     rows, columns = np.nonzero(piece)
@@ -82,11 +88,11 @@ def _around(piece: NDArray[np.bool_]) -> FloatArray:
 
 
 def marks_svg(balls: Sequence[Ball], width: int, height: int) -> Markup:
-    """Outlines and numbers of the balls that can be made out, to lie over a picture.
+    """Return outlines and numbers of the visible balls as SVG, to lie over a picture.
 
     Args:
-        balls: of the picture.
-        width, height: of the picture, pixels.
+        balls: balls of the picture.
+        width, height: size of the picture, pixels.
     """
     shapes = []
     for ball in balls:
@@ -104,7 +110,7 @@ def marks_svg(balls: Sequence[Ball], width: int, height: int) -> Markup:
 
 
 def _number(ball: Ball, width: int) -> str:
-    """The ball's number beside its largest piece, where it hides nothing of it."""
+    """Return the ball's number beside its largest piece, where it covers nothing of it."""
     low, high = ball.outlines[0].min(axis=0), ball.outlines[0].max(axis=0)
     right = high[0] + LETTERS < width
     x = high[0] + 1.0 if right else low[0] - 1.0
@@ -114,7 +120,7 @@ def _number(ball: Ball, width: int) -> str:
 
 
 def told(balls: Sequence[Ball]) -> str:
-    """How many of the balls the picture shows, as a sentence; empty where there are none."""
+    """Return the number of balls that the picture shows, as a sentence; empty if there are none."""
     if not balls:
         return ""
     hidden = [str(ball.number) for ball in balls if not ball.seen]

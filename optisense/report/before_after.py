@@ -1,4 +1,4 @@
-"""A design seen from its camera: a picture, its chief rays, and their distortion."""
+"""View of a design from its camera: a picture, its chief rays, and their distortion."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 ACROSS = 320
-"""Width in pixels of each of the two pictures that are compared."""
+"""Width of each of the two pictures that are compared, in pixels."""
 
 STRETCHED = 90.0
-"""Percentile of the pixels' stretching that stands for the worst tenth."""
+"""Percentile of the pixels' stretching that represents the worst tenth."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class RayFigures:
     """Measures of a design that follow from chief rays alone; NaN where they are undefined.
 
     Attributes:
-        aoap: the score.
-        coverage: part of the sensing surface's triangles that the camera sees.
+        aoap: score AOAP.
+        coverage: share of the sensing surface's triangles that the camera sees.
         upright: mean cosine between ray and surface normal, over all pixels.
-        seeing: part of the pixels that see the surface.
-        evenness: the score 2to3PW.
-        stretching: median over the pixels of how much longer than wide a small circle of the
-            picture is on the surface; 1 is undistorted.
-        worst_stretching: the same, exceeded by a tenth of the pixels.
-        map: (h, w) the stretching of each pixel, NaN where there is none.
+        seeing: share of the pixels that see the surface.
+        evenness: score 2to3PW.
+        stretching: median over the pixels of the ratio of length to width on the surface of a small
+            circle of the picture; 1 is undistorted.
+        worst_stretching: stretching that a tenth of the pixels exceed.
+        map: stretching (h, w) of each pixel, NaN where there is none.
     """
 
     aoap: float
@@ -55,16 +55,16 @@ class RayFigures:
 
 @dataclass(frozen=True)
 class Look:
-    """How a design looks from its camera. What could not be worked out, or was not asked for, is
-    None.
+    """View of a design from its camera. Fields are None if they could not be computed or were not
+    requested.
 
     Attributes:
-        picture: (h, w, 3) uint8, with nine balls pressed in.
-        balls: where the picture shows each of them.
+        picture: picture (h, w, 3), uint8, with nine balls pressed in.
+        balls: balls in the picture.
         pressed: radius and depth of the balls, mm.
-        figures: of the chief rays.
+        figures: measures of the chief rays.
         rays: chief rays to draw.
-        failure: why something is missing.
+        failure: reason why a field is missing.
     """
 
     picture: NDArray[np.uint8] | None = None
@@ -86,11 +86,12 @@ def look(
     """Trace a design's chief rays, and render it with the balls that its objectives press into it.
 
     Args:
-        design: the sensor.
-        settings: of the objectives, whose ball, depth and resolution of the rays are taken.
+        design: design of the sensor.
+        settings: settings of the objectives, of which ball, depth and resolution of the rays are
+            used.
         pictures: whether to render; the rays alone take a tenth of a second.
-        photons: to trace for the picture.
-        seed: of the light.
+        photons: number of photons for the picture.
+        seed: seed of the light.
 
     Raises:
         SetupError: the renderer can't run on this machine.
@@ -116,10 +117,10 @@ def look(
 
 
 def ray_figures(evaluation: Evaluation) -> RayFigures:
-    """What the chief rays of a sensor tell.
+    """Return the measures of a sensor's chief rays.
 
     Raises:
-        RenderError, ObjectiveError: they can't be traced.
+        RenderError, ObjectiveError: the rays can't be traced.
     """
     from optisense.optics.transport.chief_rays import pixel_stretching
 

@@ -1,4 +1,4 @@
-"""Changes of a cage by a search: its moved control points, drawn on the part that they bend."""
+"""Changes of a cage by a search: its moved control points, drawn on the part that they deform."""
 
 from __future__ import annotations
 
@@ -19,34 +19,38 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 STILL = 1e-6
-"""mm: a control point that moved by less counts as unmoved; rounding of a blend stays below."""
+"""Largest displacement of a control point that counts as unmoved, mm; rounding of a blend stays
+below.
+"""
 
 MOST_LAYERS = 4
-"""Panels of a figure: the layers of the lattice whose points moved farthest."""
+"""Largest number of panels of a figure: the layers of the lattice whose points moved farthest."""
 
 MOST_NUMBERS = 30
-"""Numbered points in a panel; of a finer lattice those that moved farthest, as numbers that overlap
-can't be read."""
+"""Largest number of numbered points in a panel: of a finer lattice those that moved farthest, as
+overlapping numbers can't be read.
+"""
 
 INSIDE = 0.02
-"""The outermost layers of a lattice lie on its box, where the part ends: it is cut this part of the
-box's size farther inside."""
+"""Distance by which the outermost layers of a lattice are cut inside its box, as a share of the
+box's size; the layers lie on the box, where the part ends.
+"""
 
 AXES = "xyz"
 
 
 @dataclass(frozen=True)
 class CageChange:
-    """The control points of one cage before and after.
+    """Control points of one cage before and after.
 
     Attributes:
-        name: of the cage.
-        before, after: (n, 3) mm, the control points in their order.
-        resolution: of the lattice along x, y, z.
-        box: (2, 3) mm, of the lattice at rest.
-        outlines: for each layer of the lattice, polylines (k, 3) mm of the bent parts' outlines,
-            before and after.
-        layered: the axis (0 to 2) along which points moved least; layers are stacked along it.
+        name: name of the cage.
+        before, after: control points (n, 3) in their order, mm.
+        resolution: number of points of the lattice along x, y, z.
+        box: box of the lattice at rest, (2, 3) mm.
+        outlines: outlines of the deformed parts for each layer of the lattice, as polylines (k, 3)
+            in mm, before and after.
+        layered: axis (0 to 2) along which points moved least; layers are stacked along it.
     """
 
     name: str
@@ -59,16 +63,18 @@ class CageChange:
 
     @property
     def moves(self) -> FloatArray:
-        """(n, 3) mm."""
+        """Displacements of the control points, (n, 3) mm."""
         return self.after - self.before
 
     @property
     def lengths(self) -> FloatArray:
-        """(n,) mm."""
+        """Lengths of the displacements, (n,) mm."""
         return np.asarray(np.linalg.norm(self.moves, axis=1))
 
     def rows(self) -> list[list[str]]:
-        """Point, place before, displacement and its length, the longest first."""
+        """Return number, position before, displacement and its length of each point, the longest
+        first.
+        """
         return [
             [
                 str(number),
@@ -81,7 +87,7 @@ class CageChange:
         ]
 
     def summary(self) -> str:
-        """How many points moved, and how far."""
+        """Return a sentence on how many points moved, and how far."""
         moved = self.lengths[self.lengths > STILL]
         farthest = int(self.lengths.argmax())
         return (
@@ -91,7 +97,7 @@ class CageChange:
 
 
 def cage_changes(before: SensorDesign, after: SensorDesign) -> list[CageChange]:
-    """The cages whose control points differ between two designs."""
+    """Return the cages whose control points differ between two designs."""
     found = []
     for name, cage in before.cages.items():
         if name not in after.cages or after.cages[name].resolution != cage.resolution:
@@ -110,7 +116,7 @@ def cage_changes(before: SensorDesign, after: SensorDesign) -> list[CageChange]:
 
 
 def cage_figure(change: CageChange) -> Figure:
-    """The control points layer by layer, with numbers and arrows from before to after."""
+    """Draw the control points layer by layer, with numbers and arrows from before to after."""
     count = change.resolution[change.layered]
     grid = np.moveaxis(np.arange(len(change.before)).reshape(change.resolution), change.layered, 0)
     spans = np.delete(np.ptp(np.vstack([change.before, change.after]), axis=0), change.layered)
@@ -136,7 +142,7 @@ def cage_figure(change: CageChange) -> Figure:
 def _layer(
     axes: Axes, change: CageChange, numbers: NDArray[np.int64], layer: int, plane: tuple[int, int]
 ) -> None:
-    """One layer (a, b) of the lattice, seen in a plane of two axes."""
+    """Draw one layer (a, b) of the lattice in the plane of two axes."""
     chosen = list(plane)
     before, after = change.before[:, chosen], change.after[:, chosen]
     for lines in (numbers, numbers.T):
@@ -172,7 +178,8 @@ def _layer(
     axes.plot(*after[every].T, " ")  # arrows alone do not widen the limits of a panel
     numbered = moved[np.argsort(-change.lengths[moved])][:MOST_NUMBERS]
     for rank, number in enumerate(numbered[np.lexsort(after[numbered].T)]):
-        # At the arrow's tip, where points are farther apart; neighbours in height take turns.
+        # Labels are at the arrows' tips, where points are farther apart; those of neighbours
+        # alternate.
         right = rank % 2 == 0
         axes.annotate(
             str(number),
@@ -191,7 +198,7 @@ def _layer(
 
 
 def _layers(box: FloatArray, resolution: tuple[int, int, int], axis: int) -> list[FloatArray]:
-    """A point and a normal (2, 3) of the plane of each layer, a little inside the box."""
+    """Return a point and a normal, (2, 3), of the plane of each layer, slightly inside the box."""
     low, high = box[:, axis]
     inset = INSIDE * (high - low)
     found = []
@@ -203,6 +210,6 @@ def _layers(box: FloatArray, resolution: tuple[int, int, int], axis: int) -> lis
 
 
 def _outlines(design: SensorDesign, parts: list[str], plane: FloatArray) -> list[FloatArray]:
-    """(k, 3) polylines where a plane cuts the parts of a cage."""
+    """Return polylines (k, 3) of the intersections of a plane with the parts of a cage."""
     meshes = design.deformed_meshes()
     return [line for name in parts if name in meshes for line in cut(meshes[name], *plane)]

@@ -1,4 +1,4 @@
-"""The page of a calibration: the design before and after, beside photographs."""
+"""Page of a calibration: the design before and after, beside photographs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FIGURES = {
     "similarity": "similarity of the responses",
     "far": "far field, levels",
 }
-"""Figures of presses whose medians the page shows, and in words."""
+"""Figures of presses whose medians the page shows, with their labels."""
 
 READINGS = {
     "radius": "ball read by the model's reader, times",
@@ -32,7 +32,7 @@ READINGS = {
     "radius_back": "ball read by the photographs' reader in the model, times",
     "degrees_back": "normals read by it off, degrees",
 }
-"""Figures of readings whose medians the page shows, and in words."""
+"""Figures of readings whose medians the page shows, with their labels."""
 
 
 def write_calibration(path: str | Path, found: Calibration) -> Path:
@@ -46,7 +46,7 @@ def write_calibration(path: str | Path, found: Calibration) -> Path:
 
 
 def render_calibration(found: Calibration) -> str:
-    """The page of `write_calibration` as text."""
+    """Return the page of `write_calibration` as text."""
     before, after = found.before, found.after
     count = len(after.realism.presses)
     return page(
@@ -101,7 +101,7 @@ def render_calibration(found: Calibration) -> str:
 
 
 def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
-    """Medians before and after, of the presses that were fitted and of those held out."""
+    """Return medians before and after, of the presses that were fitted and of those held out."""
 
     def sides(held_out: bool) -> list[Realism | None]:
         each = [

@@ -14,17 +14,18 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 ACROSS = 13
-"""Rays across the picture: odd, so that one runs along the camera's axis. More of them would hide
-the sensor behind them."""
+"""Number of rays across the picture: odd, so that one runs along the camera's axis, and small, so
+that the sensor is visible behind them.
+"""
 
 
 @dataclass(frozen=True)
 class CameraRays:
-    """The ways of a grid of chief rays through glass and by way of mirrors, nothing pressed in.
+    """Paths of a grid of chief rays through glass and by way of mirrors, with nothing pressed in.
 
     Attributes:
-        rays: row by row, from the picture's upper left.
-        shape: rows and columns of the grid, both odd.
+        rays: rays, row by row, from the picture's upper left.
+        shape: number of rows and columns of the grid, both odd.
     """
 
     rays: list[DrawnRay]
@@ -35,7 +36,7 @@ class CameraRays:
         """Trace the rays of a model.
 
         Raises:
-            RenderError: the camera makes no sense.
+            RenderError: the camera is invalid.
         """
         from optisense.optics.ray_paths import trace_paths
         from optisense.optics.transport.chief_rays import RayOutcome
@@ -50,7 +51,7 @@ class CameraRays:
         )
 
     def in_section(self, along_rows: bool) -> list[DrawnRay]:
-        """The rays of the middle row, or of the middle column, of the picture."""
+        """Return the rays of the middle row, or of the middle column, of the picture."""
         rows, columns = self.shape
         middle = rows // 2 * columns
         if along_rows:
@@ -58,8 +59,8 @@ class CameraRays:
         return self.rays[columns // 2 :: columns]
 
     def segments(self) -> dict[str, NDArray[np.float32]]:
-        """Pairs of ends, (2 k, 3) mm, of every second ray both ways: "seen" of those that reach the
-        sensing surface, and "lost" of those that do not.
+        """Return pairs of ends, (2 k, 3) mm, of every second ray in both directions: "seen" for
+        those that reach the sensing surface, and "lost" for the others.
         """
         found: dict[str, list[NDArray[np.float64]]] = {"seen": [], "lost": []}
         for row in range(0, self.shape[0], 2):

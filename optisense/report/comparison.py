@@ -1,4 +1,4 @@
-"""The page of a comparison: a model beside photographs of the real sensor."""
+"""Page of a comparison: a model beside photographs of the real sensor."""
 
 from __future__ import annotations
 
@@ -23,16 +23,17 @@ FloatArray = NDArray[np.float64]
 
 CONTRAST = 2.0
 """Factor on responses and errors in the pictures, which show them around a middle grey: they are
-some tens of levels of 255."""
+some tens of levels of 255.
+"""
 
 GREY = 128.0
-"""Level that stands for no response."""
+"""Level of a response of 0 in the pictures."""
 
 CUT = 2.4
-"""Radii of the contact that the pictures of a press show to each side."""
+"""Half of the side of the pictures of a press, in radii of the contact."""
 
 LEAST_CUT = 24
-"""Pixels that they show to each side, at least."""
+"""Smallest half of the side of the pictures of a press, in pixels."""
 
 COLOURS = {"R": "#c0392b", "G": "#2e8b57", "B": "#1f6fb2"}
 """Colours of the curves of the channels."""
@@ -49,7 +50,7 @@ def write_comparison(path: str | Path, design: SensorDesign, found: Comparison) 
 
 
 def render_comparison(design: SensorDesign, found: Comparison) -> str:
-    """The page of `write_comparison` as text."""
+    """Return the page of `write_comparison` as text."""
     figures = found.realism
     width, height = found.photographs.size
     return page(
@@ -76,7 +77,7 @@ def render_comparison(design: SensorDesign, found: Comparison) -> str:
 
 
 def background_pictures(found: Comparison) -> list[tuple[str, str]]:
-    """Caption and address of the pictures of the background."""
+    """Return caption and address of the pictures of the background."""
     real, model = found.photographs.background, found.pictures.background
     return [
         ("photograph", data_uri(real)),
@@ -86,7 +87,7 @@ def background_pictures(found: Comparison) -> list[tuple[str, str]]:
 
 
 def channel_rows(found: Comparison) -> list[tuple[str, str, str, str]]:
-    """Figures of the background for R, G and B."""
+    """Return the figures of the background for R, G and B."""
     ground = found.realism.background
 
     def cells(values: tuple[float, float, float], digits: int) -> tuple[str, str, str]:
@@ -102,7 +103,7 @@ def channel_rows(found: Comparison) -> list[tuple[str, str, str, str]]:
 
 
 def press_row(press: PressRealism) -> tuple[str, ...]:
-    """The figures of a press, as the table shows them."""
+    """Return the figures of a press for the table."""
     return (
         press.name,
         f"{press.unexplained:.3f}",
@@ -116,7 +117,9 @@ def press_row(press: PressRealism) -> tuple[str, ...]:
 
 
 def reading_rows(found: Realism) -> list[tuple[str, ...]]:
-    """What is read in each contact by readers that were calibrated on the other's pictures."""
+    """Return the readings of each contact by readers that were calibrated on the other's
+    pictures.
+    """
     return [
         (
             each.name,
@@ -130,7 +133,7 @@ def reading_rows(found: Realism) -> list[tuple[str, ...]]:
 
 
 def press_section(found: Comparison, index: int) -> dict[str, Any]:
-    """The pictures and the profile of one press."""
+    """Return the pictures and the profile of one press."""
     press, seen = found.photographs.presses[index], found.seen[index]
     real = press.picture.astype(np.float64) - found.photographs.background
     model = found.pictures.presses[index] - found.pictures.background
@@ -156,14 +159,14 @@ def press_section(found: Comparison, index: int) -> dict[str, Any]:
 
 
 def shown(levels: FloatArray) -> NDArray[np.uint8]:
-    """Levels as a picture."""
+    """Return levels as a picture."""
     return np.clip(np.round(levels), 0, 255).astype(np.uint8)
 
 
 def profile_figure(
     real: FloatArray, model: FloatArray, centre: tuple[float, float], radius: float
 ) -> Figure:
-    """Responses along the row and the column through a contact's middle."""
+    """Draw the responses along the row and the column through a contact's middle."""
     figure = new_figure(10.0, 2.6)
     height, width = real.shape[:2]
     column, row = min(int(centre[0]), width - 1), min(int(centre[1]), height - 1)
@@ -187,7 +190,7 @@ def profile_figure(
 def _around(
     shape: tuple[int, ...], centre: tuple[float, float], reach: float
 ) -> tuple[slice, slice]:
-    """The rows and columns of a square about a place, as far as the picture has them."""
+    """Return the rows and columns of a square about a point, clipped to the picture."""
     column, row = centre
     rows = slice(max(0, int(row - reach)), min(shape[0], int(row + reach) + 1))
     return rows, slice(max(0, int(column - reach)), min(shape[1], int(column + reach) + 1))

@@ -1,4 +1,4 @@
-"""The page on which the contacts that were found in photographs are corrected."""
+"""Page for correcting the contacts that were found in photographs."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ from optisense.report.pictures import data_uri
 from optisense.writing import write_text
 
 USUAL_RADIUS = 0.1
-"""Radius of the circle in a photograph without a contact, a share of the picture's width."""
+"""Radius of the circle in a photograph without a contact, as a share of the picture's width."""
 
 DOT = 0.006
-"""Radius of the dot in a contact's middle, a share of the picture's width; the grip has double."""
+"""Radius of the dot in a contact's middle, as a share of the picture's width; the handle has twice
+the size.
+"""
 
 
 def write_contacts(
@@ -33,11 +35,11 @@ def write_contacts(
     Its button saves the circles as `presses.csv`, in pixels of the photographs as they were read.
 
     Args:
-        path: of the page.
-        title: of the photographs' folder.
-        photographs: at working size.
-        seen: the contacts in them; None where there is none.
-        notes: what is doubtful, one sentence each.
+        path: path of the page.
+        title: name of the photographs' folder.
+        photographs: photographs at working size.
+        seen: contacts in them; None where there is none.
+        notes: doubtful findings, one sentence each.
 
     Raises:
         OutputError: the file can't be written.

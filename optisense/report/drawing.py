@@ -1,4 +1,4 @@
-"""Helpers that the figures of a page share."""
+"""Helper functions for the figures of a page."""
 
 from __future__ import annotations
 
@@ -15,21 +15,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 110
-"""Resolution of figures, at which they are as wide as the page's text on a usual screen."""
+"""Resolution of figures, in dots per inch, at which they are as wide as the page's text on a usual
+screen.
+"""
 
 BLUE, RED, GREY, PALE, AMBER = "#1f6fb2", "#c0392b", "#7b8794", "#c6d4e1", "#d98c1f"
-"""Trials, the best, the start, what stands behind, failures."""
+"""Colours of trials, the best trial, the start, backgrounds, and failures."""
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure, inches."""
+    """Return an empty figure; sizes are in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def legend_above(axes: Axes, columns: int = 2) -> None:
-    """A legend above a plot, where it hides nothing of it."""
+    """Draw a legend above a plot, where it covers nothing of it."""
     axes.legend(
         fontsize=8,
         loc="lower left",
@@ -41,17 +43,17 @@ def legend_above(axes: Axes, columns: int = 2) -> None:
 
 
 def figure_uri(figure: Figure) -> str:
-    """A figure as the address of an ``<img>``, its data inside."""
+    """Return a figure as the address of an ``<img>`` that contains its data."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DOTS_PER_INCH)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
 def swatch_of(colour: Sequence[float]) -> str:
-    """The colour of a light as CSS, its brightest channel full.
+    """Return the colour of a light as CSS, scaled to a brightest channel of 255.
 
     Args:
-        colour: (3,) of the light, of any scale.
+        colour: colour (3,) of the light, on any scale.
     """
     brightest = max(*colour, 1e-9)
     red, green, blue = (round(255 * value / brightest) for value in colour)
@@ -59,6 +61,6 @@ def swatch_of(colour: Sequence[float]) -> str:
 
 
 def encoded(values: NDArray[Any], dtype: Any) -> str:
-    """An array for a page's script: little-endian numbers as base64 text."""
+    """Encode an array for a page's script: little-endian numbers as base64 text."""
     little_endian = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
     return base64.b64encode(little_endian.tobytes()).decode("ascii")

@@ -1,4 +1,4 @@
-"""The edges that make a solid readable: creases and open borders."""
+"""Feature edges of a solid: creases and open borders."""
 
 from __future__ import annotations
 
@@ -9,20 +9,21 @@ from optisense.geometry import TriangleMesh
 
 
 def feature_edges(mesh: TriangleMesh, crease: float) -> NDArray[np.float64]:
-    """Edges between faces that meet at more than `crease` degrees, and edges of one face only.
+    """Return edges between faces that meet at more than `crease` degrees, and edges of one face
+    only.
 
     Args:
-        mesh: any mesh; vertices at the same place count as one.
-        crease: degrees between the two faces' normals.
+        mesh: any mesh; coincident vertices count as one.
+        crease: smallest angle between the two faces' normals, degrees.
 
     Returns:
-        (k, 2, 3) end points, mm.
+        End points (k, 2, 3), mm.
     """
     welded = mesh.welded()
     faces = welded.faces.astype(np.int64)
     ends = np.roll(faces, -1, axis=1)
     count = len(welded.vertices)
-    # Edges as one number each: several times faster to sort than pairs.
+    # Edges are encoded as one number each, which sorts several times faster than pairs.
     edges = (np.minimum(faces, ends) * count + np.maximum(faces, ends)).reshape(-1)
     order = np.argsort(edges, kind="stable")
     unique, starts, counts = np.unique(edges[order], return_index=True, return_counts=True)

@@ -1,4 +1,4 @@
-"""The templates of pages, and pages made of them."""
+"""Templates of pages, and rendering of pages from them."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from optisense.text import shown_in_html
 
 
 def template(name: str) -> str:
-    """A file of the package's templates as text."""
+    """Return a file of the package's templates as text."""
     return (files("optisense.report") / "templates" / name).read_text(encoding="utf-8")
 
 
 def page(name: str, **values: Any) -> str:
-    """The text of an HTML page, made of the template of a name.
+    """Return the text of an HTML page from a template.
 
     Args:
-        name: of the template, without ``.html.j2``.
-        values: that it shows; what is no `Markup` is escaped.
+        name: name of the template, without ``.html.j2``.
+        values: values that it shows; those that are no `Markup` are escaped.
     """
     environment = Environment(
         loader=FunctionLoader(lambda each: template(f"{each}.html.j2")),
@@ -39,11 +39,11 @@ def page(name: str, **values: Any) -> str:
 
 
 def script(name: str) -> Markup:
-    """A script of the package's templates, to stand in a page."""
+    """Return a script of the package's templates, to be included in a page."""
     return Markup(template(name))
 
 
 def as_json(value: Any) -> Markup:
-    """JSON that can't end the script element it stands in."""
+    """Return JSON that can't end the script element that contains it."""
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return Markup(text.replace("<", "\\u003c"))

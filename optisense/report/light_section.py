@@ -1,4 +1,4 @@
-"""The ledger of the light as a section of a page: bars, a table, and photon paths in 3-D."""
+"""Section of a page on the ledger of the light: bars, a table, and photon paths in 3-D."""
 
 from __future__ import annotations
 
@@ -24,20 +24,26 @@ if TYPE_CHECKING:
     from optisense.optics.place_light import Place, PlaceLight
 
 REPORT_PHOTONS = photons_of("draft")
-"""Photons of the ledger in the report of a render: the noise of a line is then 0.3 to 0.4 % of the
-group's light, which no bar shows. With the ways they take 3 to 5 % of the time of a render."""
+"""Number of photons of the ledger in the report of a render: the noise of a line is then 0.3 to 0.4
+% of the group's light, which no bar shows. Together with the paths they take 3 to 5 % of the time
+of a render.
+"""
 
 PHOTONS_PER_LIGHT = 100
-"""Photons of each light that a ledger has at least."""
+"""Smallest number of photons per light of a ledger."""
 
 LEAST_DRAWN = 0.005
-"""Share of a group's light below which a place is drawn together with others."""
+"""Smallest share of a group's light for which a place is drawn on its own; smaller ones are drawn
+together.
+"""
 
 LEAST_TOLD = 0.0005
-"""Share that the table tells as a number: 0.1 % when rounded."""
+"""Smallest share that the table shows as a number: 0.1 % when rounded."""
 
 LEAST_LABELLED = 0.09
-"""Share of a bar that has room for its number, on a telephone's screen of 390 pixels too."""
+"""Smallest share of a bar that has room for its number, also on a telephone's screen of 390
+pixels.
+"""
 
 OTHER = "other places"
 OTHER_COLOUR = "#9aa5b1"
@@ -50,8 +56,9 @@ COLOURS: Mapping[str, Sequence[str]] = {
     "escaped": ("#c96a00", "#ef9a2e", "#f6c06f", "#f3d9a4"),
     "lost": ("#66727f",),
 }
-"""A hue for each way in which light ends, and its shades for the places, the largest first. No hue
-is one of a usual light group."""
+"""Hues for the ways in which light ends, and their shades for the places, the largest first. No hue
+is one of a usual light group.
+"""
 
 
 @dataclass(frozen=True)
@@ -59,10 +66,10 @@ class LightSection:
     """Data of the section.
 
     Attributes:
-        ledger: where the light of each group goes.
+        ledger: ledger of the light of each group.
         paths: typical photons of each group.
-        places: the light at places of the skin.
-        camera: the light that reaches the camera, where it is known.
+        places: light at places of the skin.
+        camera: light that reaches the camera, if known.
     """
 
     ledger: LightLedger
@@ -81,11 +88,11 @@ class LightSection:
         """Follow the light of a model.
 
         Args:
-            model: the sensor.
-            photons: of the ledger; as many as suit a drawing if left out.
-            seed: another one gives other photons.
-            at: places of the skin that are looked at, as of `optisense.optics.light_at`.
-            camera: the light that reaches the camera, to be shown as well.
+            model: model of the sensor.
+            photons: number of photons of the ledger; as many as suit a drawing if None.
+            seed: seed of the photons.
+            at: places of the skin to examine, see `optisense.optics.light_at`.
+            camera: light that reaches the camera, to be shown as well.
 
         Raises:
             ContactError: a place is off the surface.
@@ -104,7 +111,7 @@ class LightSection:
 
     @cached_property
     def colours(self) -> dict[str, str]:
-        """Colours of the places that are drawn on their own, what takes most light first."""
+        """Colours of the places that are drawn on their own, those that take most light first."""
         kinds, used = self.ledger.kinds(), dict.fromkeys(COLOURS, 0)
         found = {}
         for where in self.ledger.places():
@@ -115,7 +122,7 @@ class LightSection:
         return found
 
     def values(self, design: SensorDesign) -> dict[str, Any]:
-        """What the template ``light`` shows."""
+        """Return the values of the template ``light``."""
         groups = list(self.ledger.emitted)
         noise = max((entry.noise for entry in self.ledger.entries), default=0.0)
         return {
@@ -136,8 +143,9 @@ class LightSection:
         }
 
     def ways(self) -> list[dict[str, Any]]:
-        """For the 3-D view: of each place its name and colour, and by light group how many photons
-        end there and the segments of their ways, pairs of ends in mm as text.
+        """Return the data of the 3-D view: name and colour of each place, and by light group the
+        number of photons that end there and the segments of their paths, pairs of ends in mm as
+        text.
         """
         found: dict[str, dict[str, list[Any]]] = {}
         for group, paths in self.paths.items():
@@ -163,7 +171,7 @@ class LightSection:
         return [self.ledger.share(group, where) for group in self.ledger.emitted]
 
     def _others(self, group: str) -> float:
-        """The share of all places that are not drawn on their own."""
+        """Return the share of all places that are not drawn on their own."""
         entries = [entry for entry in self.ledger.entries if entry.group == group]
         return sum(entry.share for entry in entries if entry.where not in self.colours)
 
@@ -194,7 +202,7 @@ class LightSection:
 
 
 def ledger_page(design: SensorDesign, section: LightSection) -> str:
-    """The page of ``optisense ledger`` as text."""
+    """Return the page of ``optisense ledger`` as text."""
     return page(
         "ledger",
         title=design.name,

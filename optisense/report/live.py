@@ -1,4 +1,4 @@
-"""A page that is served on this machine only, and refreshes itself."""
+"""Server of a page that refreshes itself, for this machine only."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from optisense.errors import OutputError
 HERE = "127.0.0.1"
 
 MOST_WAITING = 16
-"""Number of pictures that may be waited for; a reader looks at one at a time."""
+"""Largest number of pictures in the queue; a reader looks at one at a time."""
 
 PATIENCE = 300.0
-"""Seconds in which a picture is rendered even on a busy machine; after them there is none."""
+"""Longest wait for a picture, s, which suffices to render one even on a busy machine."""
 
 PICTURE = re.compile(r"/trial/(\d{1,9})\.png")
 
 
 class LiveServer:
-    """Serves a page, its version, and pictures of trials, to browsers of this machine.
+    """Server of a page, its version, and pictures of trials, for browsers of this machine.
 
-    Requests are answered by threads; pictures are made by whoever calls `wait`, since the renderer
-    works in one thread. Nothing but these addresses is answered, and only to requests that name
-    this machine as their host: pages of other sites, which a browser may also show, get nothing.
+    Requests are answered by threads; pictures are made by the caller of `wait`, since the renderer
+    works in one thread. Only these addresses are answered, and only to requests that name this
+    machine as their host: pages of other sites in the same browser get nothing.
 
     Attributes:
-        address: of the page.
+        address: address of the page.
     """
 
     def __init__(self, port: int = 0) -> None:
-        """Begin to serve.
+        """Start serving.
 
         Args:
-            port: 0 takes a free one.
+            port: port; 0 takes a free one.
 
         Raises:
-            OutputError: the port can't be had.
+            OutputError: the port is not available.
         """
         self._page, self._version = b"", "0"
         self._asked: queue.Queue[tuple[int, Future[bytes | None]]] = queue.Queue(MOST_WAITING)
@@ -57,12 +57,12 @@ class LiveServer:
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
     def show(self, page: str, version: str) -> None:
-        """Serve this page from now on; pages of other versions ask for it."""
+        """Serve this page from now on; open pages of other versions reload it."""
         self._page, self._version = page.encode("utf-8"), version
 
     def wait(self, seconds: float) -> tuple[int, Future[bytes | None]] | None:
-        """The number of a trial whose picture is asked for, and where to put it (a PNG file, or
-        None); None where none was asked for in so many seconds.
+        """Return the number of a trial whose picture is requested, and the future for its answer (a
+        PNG file, or None); None if none is requested within `seconds`.
         """
         try:
             return self._asked.get(timeout=seconds)
@@ -70,7 +70,7 @@ class LiveServer:
             return None
 
     def close(self) -> None:
-        """Serve no more."""
+        """Stop serving."""
         self._server.shutdown()
         self._server.server_close()
 
@@ -83,7 +83,7 @@ class LiveServer:
             return None
 
     def _answer(self, path: str) -> tuple[bytes, str] | None:
-        """What is at an address, and its type."""
+        """Return the content at an address, and its type."""
         if path == "/":
             return self._page, "text/html; charset=utf-8"
         if path == "/version":
@@ -119,6 +119,6 @@ class LiveServer:
                 self.wfile.write(body)
 
             def log_message(self, format: str, *args: object) -> None:
-                """Say nothing: the terminal is the command's."""
+                """Print nothing: the terminal belongs to the command."""
 
         return Handler

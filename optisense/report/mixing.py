@@ -1,4 +1,4 @@
-"""The layers of light groups as the page's mixer takes them: fine enough to be added up."""
+"""Layers of light groups as the page's mixer takes them, precise enough to be summed."""
 
 from __future__ import annotations
 
@@ -16,30 +16,33 @@ from optisense.report.pictures import data_uri
 FloatArray = NDArray[np.floating]
 
 CODES = 4096
-"""Levels of a layer: 16 for each grey level of a picture, so that twice the sum of eight layers is
-right within one grey level."""
+"""Number of levels of a layer: 16 for each grey level of a picture, so that twice the sum of eight
+layers is correct within one grey level.
+"""
 
 CURVE_STEPS = 2048
-"""Steps of the table of the tone curve over the root of the linear level; two neighbours differ by
-at most one grey level where the curve is as steep as sRGB's."""
+"""Number of steps of the table of the tone curve over the square root of the linear level;
+neighbours differ by at most one grey level for a curve as steep as sRGB's.
+"""
 
 
 def mixing_data(
     layers: Mapping[str, FloatArray], exposure: float, chain: PictureChain
 ) -> dict[str, Any]:
-    """What the page needs to show a picture by other brightnesses of the light groups.
+    """Return the data with which the page shows a picture for other brightnesses of the light
+    groups.
 
-    The levels of a layer are those before overexposure and clipping, which belong to the sum. They
-    are stored by the root of their size, in two pictures of 8 and 4 bits, since browsers read no
-    finer ones.
+    The levels of a layer are those before overexposure and clipping, which apply to the sum. They
+    are stored by their square root, in two pictures of 8 and 4 bits, since browsers read no finer
+    ones.
 
     Args:
-        layers: (h, w, 3) linear radiance, for each light group.
-        exposure: the factor on the radiance.
-        chain: of the camera.
+        layers: linear radiance (h, w, 3) for each light group.
+        exposure: factor on the radiance.
+        chain: picture chain of the camera.
 
     Returns:
-        Can be written as JSON.
+        Values that can be written as JSON.
     """
     response = chain.response
     spread = None
@@ -69,6 +72,6 @@ def _coded(levels: FloatArray) -> dict[str, Any]:
 
 
 def _curve(chain: PictureChain) -> str:
-    """Grey levels of the squares of 0 to 1, one byte each."""
+    """Return the grey levels of the squares of 0 to 1, one byte each."""
     levels = np.linspace(0.0, 1.0, CURVE_STEPS + 1, dtype=np.float32) ** 2
     return base64.b64encode(chain.encode(levels).tobytes()).decode("ascii")

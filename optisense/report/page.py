@@ -1,4 +1,4 @@
-"""The HTML page of a render: one file that holds everything and asks the network for nothing."""
+"""HTML page of a render: one file that contains all its data and needs no network."""
 
 from __future__ import annotations
 
@@ -28,41 +28,41 @@ from optisense.writing import write_text
 
 
 class RenderedImage(Protocol):
-    """The properties of a tactile image that a page needs (see `optisense.optics.TactileImage`)."""
+    """Properties of a tactile image that a page needs (see `optisense.optics.TactileImage`)."""
 
     @property
     def radiance(self) -> NDArray[np.float32]:
-        """(h, w, 3), linear."""
+        """Linear radiance (h, w, 3)."""
 
     @property
     def layers(self) -> Mapping[str, NDArray[np.float32]]:
-        """(h, w, 3), linear, for each light group."""
+        """Linear radiance (h, w, 3) for each light group."""
 
     @property
     def normals(self) -> NDArray[np.float32]:
-        """(h, w, 3), unit normals in the design's frame."""
+        """Unit normals (h, w, 3) in the design's frame."""
 
     @property
     def contact_mask(self) -> NDArray[np.bool_]:
-        """(h, w)."""
+        """Mask (h, w) of the pixels in contact."""
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """How it was rendered; can be written as JSON."""
+        """Settings of the rendering, which can be written as JSON."""
 
     @property
     def indenters(self) -> Mapping[str, TriangleMesh]:
-        """What pressed in, in the design's frame (mm), by a name to show."""
+        """Meshes of the indenters in the design's frame (mm), by a name to show."""
 
     @property
     def interrupted(self) -> bool:
-        """Whether it was stopped before it was finished."""
+        """True if the rendering was stopped before it was finished."""
 
     def skin_maps(self) -> SkinMaps | None:
-        """Pressure behind each pixel; None where no pressures are known."""
+        """Return the pressure at each pixel, or None if no pressures are known."""
 
     def picture(self, exposure: float | Literal["auto"] = "auto") -> NDArray[np.uint8]:
-        """(h, w, 3), as a camera would give it."""
+        """Return the picture (h, w, 3) that a camera would give."""
 
 
 def write_report(
@@ -79,14 +79,14 @@ def write_report(
     """Write a render as one self-contained HTML page.
 
     Args:
-        path: the file to write; it is written whole or not at all.
-        design: the sensor that was rendered.
-        image: what its camera saw.
-        contacts: what touched it.
-        exposure: of the picture, as for `TactileImage.picture`.
-        rays: chief rays of the camera (`CameraRays.of` a model), drawn there too.
-        real: how far the sensor is from a real one (`compare_with_real`), if that is known.
-        light: where the sensor's light goes (`LightSection.of` a model), drawn there too.
+        path: path of the file, which is written whole or not at all.
+        design: design of the sensor that was rendered.
+        image: tactile image.
+        contacts: contacts in the image.
+        exposure: exposure of the picture, see `TactileImage.picture`.
+        rays: chief rays of the camera (`CameraRays.of` a model), to be drawn.
+        real: comparison with a real sensor (`compare_with_real`), if there is one.
+        light: ledger and paths of the light (`LightSection.of` a model), to be drawn.
 
     Returns:
         The path.
@@ -111,7 +111,7 @@ def render_page(
     real: RealComparison | None = None,
     light: LightSection | None = None,
 ) -> str:
-    """The page of `write_report` as text."""
+    """Return the page of `write_report` as text."""
     height, width = image.contact_mask.shape
     assumed, sourced = tables.provenance_rows(design)
     return page(
@@ -143,7 +143,7 @@ def render_page(
 def _exposure(
     design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
 ) -> tuple[float, PictureChain]:
-    """The factor on the radiance, and the camera without its noise."""
+    """Return the factor on the radiance, and the camera without its noise."""
     camera = design.camera.picture_chain().without_noise()
     factor = camera.auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
     return factor, camera
@@ -158,7 +158,7 @@ def _mixing(
 def _pictures(
     design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
 ) -> list[dict[str, str]]:
-    """The pictures with their captions; the tactile image comes first."""
+    """Return the pictures with their captions; the tactile image comes first."""
     picture = image.picture(exposure)
     factor, camera = _exposure(design, image, exposure)
     shown: list[tuple[str, Callable[[], NDArray[np.uint8]], str, str]]
@@ -177,7 +177,7 @@ def _pictures(
             drawn = partial(pressure_colours, maps.pressure)
             shown.append(("pressure", drawn, "pressure", most))
         shown.append(("contact", overlay, "contact", f"{covered:.1f} % of the picture"))
-    with ThreadPoolExecutor() as pool:  # NumPy and zlib work outside Python's lock
+    with ThreadPoolExecutor() as pool:  # NumPy and zlib release Python's lock
         addresses = list(pool.map(lambda pixels: data_uri(pixels()), [row[1] for row in shown]))
     return [
         {"name": name, "uri": address, "caption": caption, "note": note}
@@ -191,7 +191,7 @@ def _exposed(layer: NDArray[np.float32], factor: float, camera: PictureChain) ->
 
 
 def _place_to_look_at(mask: NDArray[np.bool_]) -> tuple[int, int]:
-    """Column and row where the first profile runs: the middle of the contact, if there is one."""
+    """Return column and row of the first profile: the middle of the contact, if there is one."""
     height, width = mask.shape
     rows, columns = np.nonzero(mask)
     if len(rows) == 0:

@@ -1,4 +1,4 @@
-"""Arrays as PNG pictures inside a page."""
+"""Encoding of arrays as PNG pictures inside a page."""
 
 from __future__ import annotations
 
@@ -13,20 +13,22 @@ FloatArray = NDArray[np.floating]
 ByteArray = NDArray[np.uint8]
 
 MOST_STRETCHED = 4.0
-"""The ratio at which the scale of stretching ends: a ball four times as long as wide is hardly a
-ball any more, and finer differences beyond that matter little."""
+"""Stretching at the end of the colour scale: a ball four times as long as wide hardly looks like a
+ball, and finer differences beyond that matter little.
+"""
 
 
 UP = 2
-"""The filter type of PNG that keeps the difference of each row from the row above it; pictures of
-smooth surfaces become a third smaller by it."""
+"""PNG's filter type that stores the difference of each row from the row above it; pictures of
+smooth surfaces become a third smaller with it.
+"""
 
 
 def png(picture: ByteArray) -> bytes:
-    """A PNG file of a picture.
+    """Return a PNG file of a picture.
 
     Args:
-        picture: (h, w, 3) or (h, w) uint8, row 0 on top.
+        picture: picture (h, w, 3) or (h, w), uint8, row 0 on top.
     """
     if picture.dtype != np.uint8 or picture.ndim not in (2, 3):
         raise ValueError(f"expected a (h, w[, 3]) uint8 picture, got {picture.dtype}")
@@ -35,7 +37,7 @@ def png(picture: ByteArray) -> bytes:
     rows = picture.reshape(height, -1)
     filtered = np.full((height, rows.shape[1] + 1), UP, dtype=np.uint8)
     filtered[:1, 1:] = rows[:1]
-    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])  # modulo 256, as the format says
+    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])  # modulo 256, as the format requires
     header = struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)
     return b"".join(
         [
@@ -48,20 +50,20 @@ def png(picture: ByteArray) -> bytes:
 
 
 def data_uri(picture: ByteArray) -> str:
-    """A picture as the address of an ``<img>``, its data inside."""
+    """Return a picture as the address of an ``<img>`` that contains its data."""
     return "data:image/png;base64," + base64.b64encode(png(picture)).decode("ascii")
 
 
 def normal_colours(normals: FloatArray, axes: NDArray[np.float64]) -> ByteArray:
-    """Surface normals as the usual normal-map colours, seen by the camera.
+    """Return surface normals as the usual normal-map colours, seen by the camera.
 
     Args:
-        normals: (h, w, 3) unit normals in the design's frame; zero or NaN where there is none.
-        axes: (3, 3) rows: image right, image up, viewing direction, in the design's frame.
+        normals: unit normals (h, w, 3) in the design's frame; zero or NaN where there is none.
+        axes: rows (3, 3): image right, image up, viewing direction, in the design's frame.
 
     Returns:
-        (h, w, 3) uint8: red = image right, green = image up, blue = towards the camera; black
-        where there is no surface.
+        Colours (h, w, 3), uint8: red = image right, green = image up, blue = towards the camera;
+        black where there is no surface.
     """
     valid = np.isfinite(normals).all(axis=-1) & (np.linalg.norm(normals, axis=-1) > 0.5)
     seen = np.nan_to_num(normals) @ (axes * np.array([[1.0], [1.0], [-1.0]])).T
@@ -73,13 +75,14 @@ def normal_colours(normals: FloatArray, axes: NDArray[np.float64]) -> ByteArray:
 
 
 def stretching_colours(stretching: FloatArray) -> ByteArray:
-    """A map of how pixels are stretched: dark blue is undistorted, yellow `MOST_STRETCHED` or more.
+    """Return a map of the stretching of pixels: dark blue is undistorted, yellow `MOST_STRETCHED`
+    or more.
 
     Args:
-        stretching: (h, w), 1 or more; NaN, drawn black, where nothing is seen.
+        stretching: stretching (h, w), 1 or more; NaN, drawn black, where nothing is seen.
 
     Returns:
-        (h, w, 3) uint8.
+        Colours (h, w, 3), uint8.
     """
     from matplotlib import colormaps
 
@@ -90,13 +93,13 @@ def stretching_colours(stretching: FloatArray) -> ByteArray:
 
 
 def pressure_colours(pressure: FloatArray) -> ByteArray:
-    """A map of pressure from black (none) by red and yellow to white (the greatest).
+    """Return a map of pressure from black (none) by red and yellow to white (the greatest).
 
     Args:
-        pressure: (h, w), 0 or more; NaN, drawn black, where nothing is seen.
+        pressure: pressure (h, w), 0 or more; NaN, drawn black, where nothing is seen.
 
     Returns:
-        (h, w, 3) uint8.
+        Colours (h, w, 3), uint8.
     """
     known = np.nan_to_num(pressure)
     share = known / max(float(known.max()), np.finfo(np.float64).tiny)
@@ -105,7 +108,9 @@ def pressure_colours(pressure: FloatArray) -> ByteArray:
 
 
 def mask_overlay(picture: ByteArray, mask: NDArray[np.bool_]) -> ByteArray:
-    """The picture in grey with the masked pixels in their own colours and a white outline."""
+    """Return the picture in grey with the masked pixels in their own colours and a white
+    outline.
+    """
     grey = (picture.astype(np.float64) @ [0.299, 0.587, 0.114] * 0.45)[..., None]
     shown = np.where(mask[..., None], picture, grey.astype(np.uint8))
     padded = np.pad(mask, 1)

@@ -1,4 +1,4 @@
-"""The sources of the light at a place of the skin, as a section of a page.
+"""Section of a page on the sources of the light at a place of the skin.
 
 Each light group has a bar, and a drawing of the directions that its light comes from.
 """
@@ -21,14 +21,16 @@ WAY_COLOURS = ("#0f7a41", "#6fc07a", "#4b3f8f", "#bf7a4a", "#f2c27b")
 """Colours of the light's paths, in the order of `optisense.optics.place_light.WAY_WORDS`."""
 
 LEAST_LABELLED = 0.12
-"""Share of a bar that has room for its number."""
+"""Smallest share of a bar that has room for its number."""
 
 SKY_RADIUS = 90.0
-"""Units of the drawing from the normal of the skin, in the middle, to its horizon: one a degree."""
+"""Radius of the drawing from the normal of the skin, in the middle, to its horizon: one unit per
+degree.
+"""
 
 
 def places_values(places: Sequence[PlaceLight], design: SensorDesign) -> list[dict[str, Any]]:
-    """What the template ``places`` shows."""
+    """Return the values of the template ``places``."""
     return [_place(place, design) for place in places]
 
 
@@ -78,7 +80,7 @@ def _group(name: str, light: GroupLight, design: SensorDesign) -> dict[str, Any]
 
 
 def _sky(sky: NDArray[np.float64]) -> list[dict[str, str]]:
-    """Sectors of rings, darker where more light comes from for their solid angle."""
+    """Return the sectors of the rings, darker for more light per solid angle."""
     tilts, turns = sky.shape
     edges = np.linspace(0.0, np.pi / 2, tilts + 1)
     solid = (np.cos(edges[:-1]) - np.cos(edges[1:])) * 2 * np.pi / turns

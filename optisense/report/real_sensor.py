@@ -1,4 +1,6 @@
-"""A built-in sensor beside a picture of a real one: the same press, and how far the two differ."""
+"""Comparison of a built-in sensor with a picture of a real one: the same press, and their
+differences.
+"""
 
 from __future__ import annotations
 
@@ -21,26 +23,27 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 SENSOR = "gelsight-mini"
-"""The built-in sensor that a picture is there of."""
+"""Built-in sensor of which there is a real picture."""
 
 PICTURE = "gelsight-mini-ball.png"
-"""A picture of a real GelSight Mini, 320 x 240; `real/NOTICE.md` says where it is from."""
+"""Picture of a real GelSight Mini, 320 x 240; `real/NOTICE.md` names its source."""
 
 BALL_RADIUS = 4.75
-"""Radius in mm of the ball in the picture, as its publishers state it."""
+"""Radius of the ball in the picture, mm, as its publishers state it."""
 
 BALL_PLACE = 261.8, 147.5
-"""Column and row of the ball's middle in the picture, found in it to about 2.5 pixels."""
+"""Column and row of the ball's middle in the picture, located in it to about 2.5 pixels."""
 
 CONTACT_RADIUS = 2.1
-"""mm: 33.5 pixels of the picture, which shows about 0.0625 mm a pixel."""
+"""Radius of the contact in the picture, mm: 33.5 pixels, at about 0.0625 mm per pixel."""
 
 MOST_PHOTONS = 1_000_000
-"""Photons of the model's picture; its noise is then far below the differences."""
+"""Largest number of photons of the model's picture; its noise is then far below the differences."""
 
 AROUND = 1.6
-"""The background is measured farther from the ball than so many radii of its contact, where nothing
-of its shadow falls."""
+"""Distance from the ball, in radii of its contact, beyond which the background is measured, since
+no shadow of the ball falls there.
+"""
 
 DARK, BRIGHT = 5.0, 95.0
 """Percentiles of the background between which its evenness is measured."""
@@ -48,15 +51,18 @@ DARK, BRIGHT = 5.0, 95.0
 
 @dataclass(frozen=True)
 class RealComparison:
-    """A real picture, the model's picture of the same press, and figures of both.
+    """Real picture, the model's picture of the same press, and measures of both.
 
     Attributes:
-        real, model: (h, w, 3) uint8; the model's exposure gives it the real median brightness.
+        real, model: pictures (h, w, 3), uint8; the model's exposure gives it the real median
+            brightness.
         difference: root mean square difference of pixels, levels of 255.
-        own_spread: the same of the real picture's pixels from their mean, to compare with.
-        shares: (2, 3) of the real and of the model's light, parts of it in red, green and blue.
-        evenness: (2, 3) linear brightness of the background's dark over its bright parts.
-        shading: (3,) correlation of both pictures' linear brightness over the ball.
+        own_spread: root mean square deviation of the real picture's pixels from their mean, for
+            comparison, levels.
+        shares: shares (2, 3) of the real and of the model's light in red, green and blue.
+        evenness: ratio (2, 3) of the linear brightness of the background's dark to its bright
+            parts.
+        shading: correlation (3,) of both pictures' linear brightness over the ball.
     """
 
     real: NDArray[np.uint8]
@@ -68,7 +74,9 @@ class RealComparison:
     shading: FloatArray
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """What is measured, of the real and of the model's picture, in red, green and blue."""
+        """Return labels and measures of the real and of the model's picture, in red, green and
+        blue.
+        """
         shares, evenness = 100.0 * self.shares, self.evenness
         return [
             ("light in red / green / blue, %", _channels(shares[0], 0), _channels(shares[1], 0)),
@@ -81,7 +89,7 @@ class RealComparison:
 
 
 def has_real_picture(design: SensorDesign) -> bool:
-    """Whether a design is the sensor that a real picture is there of."""
+    """Return whether a design is the sensor of the real picture."""
     from optisense.design.difference import differences
     from optisense.library import with_own_lights
     from optisense.sensors import load
@@ -97,16 +105,17 @@ def compare_with_real(
     seed: int = 0,
     progress: Callable[[RenderProgress], None] | None = None,
 ) -> RealComparison | None:
-    """Press the ball of the real picture into a model, at the same place and as wide.
+    """Press the ball of the real picture into a model, at the same place and with the same contact
+    radius.
 
     Returns:
-        The comparison; None where too few photons were traced to see anything by.
+        Comparison, or None if too few photons were traced for a picture.
 
     Args:
-        model: of the sensor that `has_real_picture`.
-        photons: to trace; the light of an earlier image with as many serves again.
-        seed: of the light.
-        progress: called while the picture is rendered; may raise KeyboardInterrupt.
+        model: model of a sensor for which `has_real_picture` is true.
+        photons: number of photons; the light of an earlier image with as many is reused.
+        seed: seed of the light.
+        progress: function that is called during the rendering; it may raise KeyboardInterrupt.
 
     Raises:
         KeyboardInterrupt: Ctrl-C ended the rendering.
@@ -129,7 +138,7 @@ def compare_with_real(
         raise KeyboardInterrupt
     seen = np.asarray(image.radiance, dtype=np.float64)
     linear = decode(real)
-    if not np.median(seen) > 0.0:  # too few photons to see anything by
+    if not np.median(seen) > 0.0:  # too few photons for a picture
         return None
     exposure = float(np.median(linear) / np.median(seen))
     drawn = image.picture(exposure)

@@ -1,4 +1,4 @@
-"""A design as data for the page's 3-D view: solids, lights, camera and contacts."""
+"""Data of a design for the page's 3-D view: solids, lights, camera and contacts."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from optisense.report.drawing import encoded
 from optisense.report.edges import feature_edges
 
 CREASE = 35.0
-"""Edges sharper than this (degrees) are drawn and not shaded smoothly."""
+"""Angle between faces, degrees, from which on their edge is drawn and not shaded smoothly."""
 
 MAX_TRIANGLES = 400_000
-"""More are not put into a page: a browser would stall on them."""
+"""Largest number of triangles of a part in a page; a browser would stall on more."""
 
 MARKER_SIZE = 0.35
-"""Radius (mm) at which lights without an emitting window are drawn."""
+"""Radius at which lights without an emitting window are drawn, mm."""
 
 
 def scene_data(
@@ -32,19 +32,19 @@ def scene_data(
     rays: CameraRays | None = None,
     ways: Sequence[Mapping[str, Any]] = (),
 ) -> dict[str, Any]:
-    """The 3-D view's data, ready for JSON.
+    """Return the 3-D view's data, ready for JSON.
 
     Args:
-        design: the sensor.
-        indenters: what touches it, in the design's frame.
+        design: design of the sensor.
+        indenters: meshes of the indenters, in the design's frame.
         rays: chief rays of the camera, if they are to be drawn.
-        ways: of photons, as of a `LightSection`.
+        ways: paths of photons, see `LightSection`.
 
     Returns:
         ``parts`` (name, role, colour, alpha, meshes), ``lights`` (groups with discs and
-        directions), ``camera`` (pose and frustum), ``rays`` (pairs of ends of those that reach
-        the sensing surface, ``seen``, and of others, ``lost``; empty where there are none),
-        ``ways``, ``centre`` (3,) and ``size`` in mm.
+        directions), ``camera`` (pose and frustum), ``rays`` (pairs of ends of those that reach the
+        sensing surface, ``seen``, and of others, ``lost``; empty if there are none), ``ways``,
+        ``centre`` (3,) and ``size`` in mm.
     """
     meshes = design.deformed_meshes()
     parts = [_part(name, design.parts[name].role.value, mesh) for name, mesh in meshes.items()]
@@ -104,7 +104,7 @@ def _lights(name: str, group: LightGroup) -> dict[str, Any]:
 
 
 def _window_radius(group: LightGroup) -> float:
-    """Radius (mm) of a disc as large as the light's emitting window."""
+    """Return the radius of a disc as large as the light's emitting window, mm."""
     from optisense import library
 
     try:
@@ -116,7 +116,7 @@ def _window_radius(group: LightGroup) -> float:
 
 
 def _camera(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> dict[str, Any]:
-    """The pupil and the four corners of what the camera sees, at the sensing surface's depth."""
+    """Return the pupil and the four corners of the field of view at the sensing surface's depth."""
     camera = design.camera
     position = np.asarray(camera.position, dtype=np.float64)
     _, up, forward = camera.axes()
@@ -128,7 +128,7 @@ def _camera(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> dict[str, 
     depths = (np.concatenate(surfaces) - position) @ forward if surfaces else np.array([20.0])
     depth = max(float(np.median(depths)), 1.0)
     rays = directions(camera, np.array([0.0, 1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0, 1.0]))
-    ahead = np.maximum(rays @ forward, np.cos(np.radians(75.0)))  # of a fisheye's, not too far
+    ahead = np.maximum(rays @ forward, np.cos(np.radians(75.0)))  # not too far for a fisheye
     corners = list(position + depth * rays / ahead[:, None])
     return {
         "name": camera.model,

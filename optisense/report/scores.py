@@ -1,4 +1,4 @@
-"""The page of a sensor's scores: a table, its section, and the figure and parts of each score."""
+"""Page of a sensor's scores: a table, its section, and the figure and parts of each score."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ from optisense.report.files import page
 from optisense.writing import write_text
 
 DOTS_PER_INCH = 110
-"""Resolution of figures, at which they are as wide as the page's text on a usual screen."""
+"""Resolution of figures, in dots per inch, at which they are as wide as the page's text on a usual
+screen.
+"""
 
 Table = tuple[list[str], list[list[str]]]
 """Column heads and rows."""
@@ -31,9 +33,9 @@ def write_score_report(path: str | Path, scored: Scored, objectives: list[Object
     """Write scores as one self-contained HTML page.
 
     Args:
-        path: the file to write; it is written whole or not at all.
-        scored: the scores.
-        objectives: what they were scored by.
+        path: path of the file, which is written whole or not at all.
+        scored: scores.
+        objectives: objectives of the scores.
 
     Returns:
         The path.
@@ -46,7 +48,7 @@ def write_score_report(path: str | Path, scored: Scored, objectives: list[Object
 
 
 def render_scores(scored: Scored, objectives: list[Objective]) -> str:
-    """The page of `write_score_report` as text."""
+    """Return the page of `write_score_report` as text."""
     summaries = {each.name: each.summary for each in objectives}
     return page(
         "scores",
@@ -80,7 +82,9 @@ def _headline(scored: Scored) -> list[tuple[str, str]]:
 
 
 def _rays(scored: Scored) -> Sequence[DrawnRay]:
-    """Chief rays for the section; none where nothing was scored or the camera can't be traced."""
+    """Return chief rays for the section; none if nothing was scored or the camera can't be
+    traced.
+    """
     if not scored.runs:
         return ()
     try:
@@ -103,8 +107,8 @@ def _row(scored: Scored, name: str, score: Score) -> dict[str, str]:
 
 
 def _score(scored: Scored, name: str, score: Score, summary: str) -> dict[str, Any]:
-    """An objective's section. Its heading is the value of the table; figure and parts are those of
-    the first seed, whose own value stands beside them.
+    """Return an objective's section. Its heading is the value of the table; figure and parts are
+    those of the first seed, whose own value is shown beside them.
     """
     row = _row(scored, name, score)
     numbers = [
@@ -132,17 +136,19 @@ def _score(scored: Scored, name: str, score: Score, summary: str) -> dict[str, A
 
 
 def _figure(score: Score) -> str:
-    """The score's figure as the address of an ``<img>``; empty if a user's drawing fails."""
+    """Return the score's figure as the address of an ``<img>``; empty if a user's drawing fails."""
     buffer = io.BytesIO()
     try:
         score.figure().savefig(buffer, format="png", dpi=DOTS_PER_INCH)
-    except Exception:  # the figure of a user's objective is a user's code; the score stands
+    except Exception:  # the figure of a user's objective is a user's code; the score is kept
         return ""
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
 def _table(value: Any) -> Table | None:
-    """Lists of dicts become tables; dicts of single values rows; what else is nested stays out."""
+    """Return lists of dicts as tables and dicts of single values as rows; deeper nesting is left
+    out.
+    """
     if isinstance(value, Mapping):
         flat = {k: v for k, v in value.items() if not isinstance(v, list | Mapping)}
         return ([str(k) for k in flat], [[_text(v) for v in flat.values()]]) if flat else None
@@ -154,7 +160,7 @@ def _table(value: Any) -> Table | None:
 
 
 def _text(value: Any) -> str:
-    """A value on one line."""
+    """Return a value on one line."""
     if isinstance(value, Mapping):
         return ", ".join(f"{key}: {_text(inner)}" for key, inner in value.items())
     if isinstance(value, list):

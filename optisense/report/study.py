@@ -1,4 +1,4 @@
-"""The page of a study: how the search went, what it found, and every trial."""
+"""Page of a study: the course of the search, its result, and every trial."""
 
 from __future__ import annotations
 
@@ -38,10 +38,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_COLUMNS = 8
-"""Parameters in the table of trials: those that go most with the score."""
+"""Largest number of parameters in the table of trials: those with the strongest association with
+the score.
+"""
 
 FEW_CHANGES = 8
-"""Rows of a table of changes that are shown at once; the others are folded away."""
+"""Number of rows of a table of changes that are shown at first; the others are folded away."""
 
 
 def write_study_report(
@@ -55,10 +57,10 @@ def write_study_report(
     """Write a study as one self-contained HTML page.
 
     Args:
-        path: the file to write; it is written whole or not at all.
-        study: finished or not.
-        looks: of the designs "before" and "after", where they were rendered.
-        pictures: (h, w, 3) of some trials, by number (`TrialPictures`), which a click shows.
+        path: path of the file, which is written whole or not at all.
+        study: study, finished or not.
+        looks: views of the designs "before" and "after", if they were rendered.
+        pictures: pictures (h, w, 3) of some trials, by number (`TrialPictures`), shown on a click.
         named: the study's folder as the user names it, for the commands on the page.
 
     Returns:
@@ -79,15 +81,15 @@ def render_study(
     named: str | None = None,
     live: str | None = None,
 ) -> str:
-    """The page of `write_study_report` as text.
+    """Return the page of `write_study_report` as text.
 
     Args:
-        study: finished or not.
-        looks: of the designs "before" and "after", where they were rendered.
-        pictures: of some trials, by number.
+        study: study, finished or not.
+        looks: views of the designs "before" and "after", if they were rendered.
+        pictures: pictures of some trials, by number.
         named: the study's folder as the user names it.
-        live: the version of the page, where a `LiveServer` serves it: the page then refreshes
-            itself, and asks the server for the pictures of trials.
+        live: version of the page, if a `LiveServer` serves it: the page then refreshes itself, and
+            requests the pictures of trials from the server.
     """
     trials = study.trials
     names = study.settings.names
@@ -168,19 +170,19 @@ def render_study(
 
 
 class _Figures:
-    """The figures of a page that answer for trials.
+    """Figures of a page with positions of trials.
 
     Attributes:
-        found: by name.
+        found: figures by name.
     """
 
     def __init__(self, known: set[int]) -> None:
-        """`known`: numbers of the trials that the page tells about."""
+        """Store `known`, the numbers of the trials on the page."""
         self.found: dict[str, TrialFigure] = {}
         self._known = known
 
     def draw(self, name: str, make: Callable[..., Figure | None]) -> bool:
-        """Draw one; whether there was something to draw."""
+        """Draw a figure, and return whether there was something to draw."""
         marks = Marks()
         figure = make(marks=marks)
         if figure is not None:
@@ -188,12 +190,12 @@ class _Figures:
         return figure is not None
 
     def uri(self, name: str) -> str:
-        """The picture of one; empty where it was not drawn."""
+        """Return the picture of a figure; empty if it was not drawn."""
         return self.found[name].uri if name in self.found else ""
 
 
 def moves_rays(study: Study) -> bool:
-    """Whether a parameter of a study may change the ways of chief rays."""
+    """Return whether a parameter of a study may change the paths of chief rays."""
     return study.space.reshapes or any(
         name.startswith(("camera.", "materials.", "parts.")) for name in study.space.names
     )
@@ -255,7 +257,9 @@ def _front_row(trial: Trial, names: Sequence[str]) -> list[str]:
 
 
 def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[dict[str, Any]]:
-    """Before and after: the picture with its balls, and the section with chief rays."""
+    """Return the views before and after: the picture with its balls, and the section with chief
+    rays.
+    """
     found = []
     for label in ("before", "after"):
         design = _design(best) if label == "after" else study.space.design
@@ -277,7 +281,7 @@ def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[
 
 
 def _picture(seen: Look) -> dict[str, Any]:
-    """The picture, what lies over it, and what it shows."""
+    """Return the picture, the marks over it, and a sentence about it."""
     if seen.picture is None:
         return {"picture": "", "marks": "", "told": ""}
     height, width = seen.picture.shape[:2]
@@ -307,7 +311,7 @@ def _cage(change: CageChange) -> dict[str, Any]:
 
 
 def _overlay(study: Study, best: Trial | None) -> str:
-    """Both outlines in one drawing, where a shape or a place has changed."""
+    """Return both outlines in one drawing, if a shape or a position has changed."""
     after = _design(best)
     if best is None or best.is_start or after is None:
         return ""

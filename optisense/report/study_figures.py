@@ -1,4 +1,4 @@
-"""Figures of a study: how it went, what its parameters did, and what it has to trade off."""
+"""Figures of a study: its convergence, the influence of its parameters, and its trade-offs."""
 
 from __future__ import annotations
 
@@ -24,27 +24,30 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 MOST_PANELS = 12
-"""Parameters that are drawn: those that go most with the score."""
+"""Largest number of parameters that are drawn: those with the strongest association with the
+score.
+"""
 
 COLUMNS = 4
 """Number of panels beside one another in a figure; their labels stay readable at the page's
-width."""
+width.
+"""
 MOST_NUMBERED = 8
-"""Trials of a front that have their number beside them."""
+"""Largest number of trials of a front that are labelled with their number."""
 
 LONGEST = 34
-"""Number of letters of a parameter's name that fit above a small panel."""
+"""Largest number of letters of a parameter's name that fit above a small panel."""
 
 
 @dataclass(frozen=True)
 class Influence:
-    """The association of a score with one parameter over the trials of a study.
+    """Association of a score with one parameter over the trials of a study.
 
     Attributes:
-        number: of the parameter.
-        strength: 0 to 1: of numbers, Spearman's rank correlation without its sign; of choices,
-            the correlation ratio (the root of the part of the variance that lies between the
-            options).
+        number: index of the parameter.
+        strength: strength, 0 to 1: for numbers the absolute value of Spearman's rank correlation,
+            for choices the correlation ratio (the root of the share of the variance that lies
+            between the options).
     """
 
     number: int
@@ -54,12 +57,12 @@ class Influence:
 def convergence(
     trials: Sequence[Trial], names: Sequence[str], marks: Marks | None = None
 ) -> Figure:
-    """Scores in the order of the trials, and the best so far; one panel an objective.
+    """Draw scores in the order of the trials, and the best so far; one panel per objective.
 
     Args:
-        trials: of the study.
-        names: of its objectives.
-        marks: takes down where which trial is drawn.
+        trials: trials of the study.
+        names: names of its objectives.
+        marks: record of the positions of trials in the figure.
     """
     figure = new_figure(9.5, 0.6 + 2.7 * len(names))
     start = next((trial for trial in trials if trial.is_start), None)
@@ -100,7 +103,9 @@ def convergence(
 
 
 def influences(trials: Sequence[Trial], name: str) -> list[Influence]:
-    """How much a score goes with each parameter, the strongest first; failed trials left out."""
+    """Return the association of a score with each parameter, the strongest first; failed trials are
+    left out.
+    """
     known = [trial for trial in trials if np.isfinite(trial.scores.get(name, np.nan))]
     if len(known) < 3:
         return []
@@ -118,7 +123,7 @@ def influences(trials: Sequence[Trial], name: str) -> list[Influence]:
 
 
 def rank_correlation(one: ArrayLike, other: ArrayLike) -> float:
-    """Spearman's rank correlation; 0 where one of both is constant."""
+    """Return Spearman's rank correlation; 0 if one of both is constant."""
     from scipy.stats import rankdata
 
     first, second = rankdata(one), rankdata(other)
@@ -128,7 +133,9 @@ def rank_correlation(one: ArrayLike, other: ArrayLike) -> float:
 
 
 def correlation_ratio(groups: ArrayLike, values: ArrayLike) -> float:
-    """The root of the part of the values' variance that lies between groups; 0 if there is none."""
+    """Return the root of the share of the values' variance that lies between groups; 0 if there is
+    none.
+    """
     member, given = np.asarray(groups), np.asarray(values, dtype=np.float64)
     total = float(((given - given.mean()) ** 2).sum())
     if total == 0.0:
@@ -141,13 +148,14 @@ def correlation_ratio(groups: ArrayLike, values: ArrayLike) -> float:
 def parameters(
     trials: Sequence[Trial], name: str, best: Trial | None, marks: Marks | None = None
 ) -> Figure | None:
-    """The score against the parameters that go most with it; None without enough trials.
+    """Draw the score against the parameters with the strongest association; None if there are too
+    few trials.
 
     Args:
-        trials: of the study.
-        name: of the score.
-        best: the trial that is marked.
-        marks: takes down where which trial is drawn.
+        trials: trials of the study.
+        name: name of the score.
+        best: trial that is marked.
+        marks: record of the positions of trials in the figure.
     """
     chosen = influences(trials, name)[:MOST_PANELS]
     if not chosen:
@@ -203,14 +211,14 @@ def front(
     best: Trial | None,
     marks: Marks | None = None,
 ) -> Figure:
-    """Two objectives against each other, with the trials that no other beats in all of them.
+    """Draw two objectives against each other, with the Pareto front.
 
     Args:
-        trials: of the study.
-        chosen: those that no other beats.
-        names: of the objectives.
-        best: the trial that is marked.
-        marks: takes down where which trial is drawn.
+        trials: trials of the study.
+        chosen: trials of the front.
+        names: names of the objectives.
+        best: trial that is marked.
+        marks: record of the positions of trials in the figure.
     """
     one, other = names[:2]
     values = np.array([[trial.scores[one], trial.scores[other]] for trial in trials])
@@ -264,7 +272,7 @@ def front(
 
 
 def spread_out(trials: Sequence[Trial], name: str, most: int) -> list[Trial]:
-    """At most so many trials, from the lowest score of a name to the highest."""
+    """Return at most `most` trials, from the lowest score of a name to the highest."""
     if not trials:
         return []
     ordered = sorted(trials, key=lambda trial: trial.scores[name])
@@ -273,7 +281,7 @@ def spread_out(trials: Sequence[Trial], name: str, most: int) -> list[Trial]:
 
 
 def sections(before: SensorDesign, after: SensorDesign) -> Figure:
-    """The outlines of two designs in one cut, in the frame of the first."""
+    """Draw the outlines of two designs in one section, in the frame of the first."""
     low, high = section(before).bounds
     figure = new_figure(
         8.5, float(np.clip(7.0 * (high - low)[1] / (high - low)[0], 2.0, 6.0)) + 0.6
@@ -299,7 +307,9 @@ def sections(before: SensorDesign, after: SensorDesign) -> Figure:
 
 
 def _limits(axes: Axes, values: FloatArray, horizontal: bool = False) -> None:
-    """Few very bad scores must not squeeze all others: the lowest ones may lie outside."""
+    """Set limits so that few very bad scores do not squeeze all others; the lowest may lie
+    outside.
+    """
     if len(values) < 2:
         return
     low, middle, high = np.quantile(values, [0.0, 0.25, 1.0]).tolist()

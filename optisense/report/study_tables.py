@@ -18,22 +18,24 @@ from optisense.search.study.study import Study, beside
 from optisense.search.study.trial import Trial
 
 MOST_TRIALS = 200
-"""Number of trials in the table, the best ones; a page with thousands would load slowly."""
+"""Largest number of trials in the table, the best ones; a page with thousands would load slowly."""
 
 MOST_CHANGES = 40
-"""Parameters in the list of changes, the largest change first."""
+"""Largest number of parameters in the list of changes, the largest change first."""
 
 MOST_CAUSES = 10
-"""Number of causes of failure in the table, the commonest ones; the others are counted together."""
+"""Largest number of causes of failure in the table, the most frequent ones; the others are counted
+together.
+"""
 
 WORSE = 0.02
-"""A figure of the rays that got worse by a smaller part of itself is as good as before."""
+"""Relative change of a ray measure below which it does not count as worse."""
 
 NONE = "–"
-"""A cell for which there is no number."""
+"""Text of a cell without a number."""
 
 ONE_POINT = re.compile(r"cages\.[^.]+\.(?:points|blend)\[")
-"""Parameters that are coordinates of single control points."""
+"""Pattern of parameters that are coordinates of single control points."""
 
 
 class Table(NamedTuple):
@@ -43,7 +45,7 @@ class Table(NamedTuple):
     rows: list[list[str]]
 
     def without_empty_columns(self) -> Table:
-        """The same without columns that have no entry in any row."""
+        """Return the table without columns that have no entry in any row."""
         kept = [
             column
             for column in range(len(self.heads))
@@ -56,8 +58,10 @@ class Table(NamedTuple):
 
 
 def scores(study: Study, start: Trial | None, best: Trial | None) -> Table:
-    """Every objective and what stands beside it, before and after, with the study's seed and with
-    fresh ones. Columns without any number are left out.
+    """Return every objective and the numbers beside it, before and after, with the study's seed and
+    with fresh ones.
+
+    Columns without any number are left out.
     """
     rows = []
     for name in study.settings.names:
@@ -77,8 +81,8 @@ def scores(study: Study, start: Trial | None, best: Trial | None) -> Table:
 
 
 def conditions(study: Study, start: Trial | None, best: Trial | None) -> Table | None:
-    """Each condition with the value before and after, and the margin of the best; None if there
-    are none.
+    """Return each condition with the value before and after, and the margin of the best; None if
+    there are none.
     """
     rows = []
     for text in study.settings.requirements:
@@ -98,7 +102,7 @@ def _or_nan(value: float | None) -> float:
 
 
 def fresh(trial: Trial, name: str) -> str:
-    """The mean over fresh seeds with its deviation; empty where there is none."""
+    """Return the mean over fresh seeds with its deviation; empty if there is none."""
     mean, spread = trial.fresh_score(name), trial.fresh_spread(name)
     if not math.isfinite(mean):
         return ""
@@ -108,7 +112,7 @@ def fresh(trial: Trial, name: str) -> str:
 
 
 def why_no_fresh(study: Study, trials: Sequence[Trial]) -> str:
-    """Why no trial has a score with fresh seeds; empty where some have."""
+    """Return the reason why no trial has a score with fresh seeds; empty if some have."""
     if any(trial.fresh for trial in trials) or not any(math.isfinite(t.score) for t in trials):
         return ""
     reasons = {
@@ -121,7 +125,7 @@ def why_no_fresh(study: Study, trials: Sequence[Trial]) -> str:
 
 
 def ray_figures(before: RayFigures | None, after: RayFigures | None) -> Table | None:
-    """What the chief rays tell of both designs; None where they were not traced."""
+    """Return the measures of the chief rays of both designs, or None if they were not traced."""
     if before is None and after is None:
         return None
     rows = [
@@ -151,8 +155,8 @@ def _figure(side: RayFigures | None, field: str, percent: bool) -> str:
 
 
 def got_worse(before: RayFigures | None, after: RayFigures | None) -> list[str]:
-    """What the rays tell of in which the second design is worse than the first, each with both
-    numbers; empty where it is nowhere worse.
+    """Return the ray measures in which the second design is worse than the first, each with both
+    numbers.
     """
     if before is None or after is None:
         return []
@@ -169,12 +173,12 @@ def got_worse(before: RayFigures | None, after: RayFigures | None) -> list[str]:
 def changes(
     study: Study, start: Trial | None, best: Trial | None, drawn_cages: bool
 ) -> list[list[str]]:
-    """Parameter, before and after, the largest change relative to its range first.
+    """Return parameter, values before and after, the largest change relative to its range first.
 
     Args:
-        study: the study.
-        start, best: its trials.
-        drawn_cages: whether the control points of cages are told elsewhere and left out.
+        study: study.
+        start, best: trials of the study.
+        drawn_cages: whether the control points of cages are shown elsewhere and left out.
     """
     if best is None:
         return []
@@ -190,7 +194,7 @@ def changes(
 
 
 def trials(study: Study, found: Sequence[Trial], columns: Sequence[int]) -> Table:
-    """The best trials, with the parameters that matter most."""
+    """Return the best trials, with the parameters of the strongest influence."""
     scored = (trial for trial in found if math.isfinite(trial.score))
     fine = sorted(scored, key=lambda trial: rank_of(trial.outcome, study.objective), reverse=True)
     rows = []
@@ -213,7 +217,7 @@ def trials(study: Study, found: Sequence[Trial], columns: Sequence[int]) -> Tabl
 
 
 def failures(found: Sequence[Trial]) -> tuple[Table, int]:
-    """Causes of failure, the commonest first, and how many more there are than are listed."""
+    """Return the causes of failure, the most frequent first, and the number of omitted ones."""
     causes = by_cause((t.number, t.failure) for t in found if t.failure is not None)
     rows = [
         [each.text, str(len(each.numbers)), f"trial {each.numbers[0]}: {each.example}"]
@@ -223,7 +227,7 @@ def failures(found: Sequence[Trial]) -> tuple[Table, int]:
 
 
 def settings(study: Study) -> list[tuple[str, str]]:
-    """What was searched and how, by name and value."""
+    """Return the settings of the search, by name and value."""
     known = study.settings
     rows = [("varied", "; ".join(f"{path}: {_plain(v)}" for path, v in known.space.items()))]
     rows += [(f"option {key}", _plain(value)) for key, value in known.options.items()]
@@ -239,12 +243,12 @@ def settings(study: Study) -> list[tuple[str, str]]:
 
 
 def number(value: float) -> str:
-    """A score as text."""
+    """Return a score as text."""
     return f"{value:.4g}" if math.isfinite(value) else "failed"
 
 
 def value_text(value: float | int | str) -> str:
-    """A parameter's value as text."""
+    """Return a parameter's value as text."""
     return f"{value:.5g}" if isinstance(value, float) else str(value)
 
 

@@ -1,4 +1,4 @@
-"""The page's tables: settings, contacts, and where the design's numbers come from."""
+"""Tables of the page: settings, contacts, and the provenance of the design's numbers."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ LABELS = {
     "samples_per_pixel": "samples a pixel",
     "seconds": "time",
 }
-"""Settings whose name is not what a reader would call them."""
+"""Labels of settings whose name is not what a reader would call them."""
 
 ELSEWHERE = ("design", "contacts", "presses", "resolution", "interrupted")
 """Settings that the page shows in another place."""
 
 
 def headline(settings: Mapping[str, Any], width: int, height: int) -> list[Row]:
-    """The few facts that stand under the title."""
+    """Return the few facts below the title."""
     facts = [("picture", f"{width} × {height}")]
     seconds = settings.get("seconds")
     total = seconds.get("total") if isinstance(seconds, Mapping) else None
@@ -43,7 +43,7 @@ def headline(settings: Mapping[str, Any], width: int, height: int) -> list[Row]:
 
 
 def setting_rows(settings: Mapping[str, Any], unit: str = "") -> list[Row]:
-    """Every setting by name and value; those within settings as ``outer, inner``."""
+    """Return every setting by name and value; nested ones as ``outer, inner``."""
     rows: list[Row] = []
     for key, value in settings.items():
         label = LABELS.get(key, key.replace("_", " "))
@@ -58,11 +58,11 @@ def setting_rows(settings: Mapping[str, Any], unit: str = "") -> list[Row]:
 def contact_rows(
     contacts: Sequence[Contact], presses: Sequence[Mapping[str, float]] = ()
 ) -> list[dict[str, str]]:
-    """What touches the sensor, where, how deep, and the force and area where they are known.
+    """Return the contacts with place and depth, and force and area if they are known.
 
     Args:
-        contacts: what touches.
-        presses: of each contact, `PressedSkin.in_numbers`; none where the skin is not elastic.
+        contacts: contacts.
+        presses: `PressedSkin.in_numbers` of each contact; empty if the skin is not elastic.
     """
     rows = []
     for number, contact in enumerate(contacts):
@@ -85,7 +85,7 @@ def contact_rows(
 
 
 def provenance_rows(design: SensorDesign) -> tuple[list[dict[str, str]], list[dict[str, str]]]:
-    """The design's values that are assumed, and those with a source."""
+    """Return the design's values that are assumed, and those with a source."""
     rows = [
         {"path": path, "status": entry.status.value, "source": entry.source}
         for path, entry in design.provenance.items()
@@ -95,7 +95,7 @@ def provenance_rows(design: SensorDesign) -> tuple[list[dict[str, str]], list[di
 
 
 def _value(key: str, value: Any) -> str:
-    """A value with the unit that its key tells."""
+    """Return a value with the unit that its key implies."""
     unit = " %" if key.endswith("percent") else " s" if key.startswith("seconds") else ""
     if isinstance(value, bool):
         return "yes" if value else "no"
@@ -109,7 +109,7 @@ def _value(key: str, value: Any) -> str:
 
 
 def _indenter(indenter: Any) -> str:
-    """A shape's kind and sizes, as ``sphere, radius 1.5 mm``."""
+    """Return a shape's kind and sizes, such as ``sphere, radius 1.5 mm``."""
     text = type(indenter).__name__.removesuffix("Indenter").lower()
     if is_dataclass(indenter):
         for field in fields(indenter):

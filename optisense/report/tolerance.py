@@ -1,4 +1,6 @@
-"""The page of a tolerance: how scores spread, and which manufacturing error matters most."""
+"""Page of a tolerance analysis: the distribution of scores, and the share of each manufacturing
+error.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
 
 def write_tolerance_report(path: str | Path, tolerance: Tolerance) -> Path:
-    """Write a tolerance as one self-contained HTML page.
+    """Write a tolerance analysis as one self-contained HTML page.
 
     Raises:
         OutputError: the file can't be written.
@@ -39,7 +41,7 @@ def write_tolerance_report(path: str | Path, tolerance: Tolerance) -> Path:
 
 
 def render_tolerance(tolerance: Tolerance) -> str:
-    """The page of `write_tolerance_report` as text."""
+    """Return the page of `write_tolerance_report` as text."""
     design = tolerance.design
     return page(
         "tolerance",
@@ -62,7 +64,7 @@ def render_tolerance(tolerance: Tolerance) -> str:
 
 
 def spread_figure(name: str, found: ScoreDistribution) -> Figure:
-    """The scores of all sensors with their percentiles, and the share of each error."""
+    """Draw the scores of all sensors with their percentiles, and the share of each error."""
     shares = {source: share for source, share in found.shares.items() if share is not None}
     figure = new_figure(11.0, max(3.2, 1.4 + 0.42 * len(shares)))
     left, right = figure.subplots(1, 2, width_ratios=[1.25, 1.0])
@@ -100,13 +102,13 @@ def spread_figure(name: str, found: ScoreDistribution) -> Figure:
 
 
 def shown_size(path: str, size: float) -> str:
-    """The size of an error with its unit, such as ``0.1 mm``."""
+    """Return the size of an error with its unit, such as ``0.1 mm``."""
     unit = unit_of(path)
     return f"{size:g}{unit}" if unit == "°" else f"{size:g} {unit}".rstrip()
 
 
 def noise_share(found: ScoreDistribution) -> float:
-    """The part of the variance that the noise of the image makes up; at most 1."""
+    """Return the share of the variance that is due to the noise of the image; at most 1."""
     if not (found.noise > 0.0 and found.deviation > 0.0):
         return 0.0
     return min(1.0, (found.noise / found.deviation) ** 2)

@@ -1,4 +1,4 @@
-"""Positions of trials in the figures of a page, so that the page can answer a pointer."""
+"""Positions of trials in the figures of a page, so that the page can respond to a pointer."""
 
 from __future__ import annotations
 
@@ -23,40 +23,46 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_ANSWERING = 1000
-"""Number of trials that the figures answer for, the best ones; each takes some 300 bytes of the
-page and 20 of each panel."""
+"""Largest number of trials in the data of the figures, the best ones; each takes some 300 bytes of
+the page and 20 of each panel.
+"""
 
 MOST_VALUES = 12
-"""Number of parameters that are told of a trial, those that go most with the score."""
+"""Largest number of parameters that are shown for a trial, those with the strongest association
+with the score.
+"""
 
 Place = tuple[int, float, float]
-"""Number of a trial, and where a figure shows it, in shares of its width from the left and of its
-height from the top."""
+"""Number of a trial, and its position in a figure, as shares of the width from the left and of the
+height from the top.
+"""
 
 
 @dataclass
 class Marks:
-    """The trials that a figure shows.
+    """Trials that a figure shows.
 
     Attributes:
-        drawn: axes, (n,) numbers of trials, and (n, 2) places in the units of the axes.
+        drawn: axes, numbers (n,) of trials, and positions (n, 2) in the units of the axes.
     """
 
     drawn: list[tuple[Axes, NDArray[np.int64], NDArray[np.float64]]] = field(default_factory=list)
 
     def add(self, axes: Axes, numbers: ArrayLike, x: ArrayLike, y: ArrayLike) -> None:
-        """Note trials that were plotted.
+        """Record trials that were plotted.
 
         Args:
-            axes: they are in.
-            numbers: (n,) of the trials.
-            x, y: (n,) in the units of the axes.
+            axes: axes with the trials.
+            numbers: numbers (n,) of the trials.
+            x, y: positions (n,) in the units of the axes.
         """
         places = np.column_stack([np.asarray(x, dtype=float), np.asarray(y, dtype=float)])
         self.drawn.append((axes, np.asarray(numbers, dtype=np.int64), places))
 
     def places(self, figure: Figure, of: set[int]) -> list[Place]:
-        """Where a figure that was drawn shows those trials; those outside of its axes left out."""
+        """Return the positions of trials in a figure that was drawn; those outside of its axes are
+        left out.
+        """
         found: list[Place] = []
         for axes, numbers, places in self.drawn:
             inside = axes.bbox.padded(2.0)
@@ -71,11 +77,11 @@ class Marks:
 
 @dataclass(frozen=True)
 class TrialFigure:
-    """A figure of a page, and the trials in it.
+    """Figure of a page, and the trials in it.
 
     Attributes:
-        uri: its picture.
-        places: of the trials.
+        uri: picture of the figure.
+        places: positions of the trials.
     """
 
     uri: str
@@ -86,16 +92,16 @@ class TrialFigure:
         """Draw a figure.
 
         Args:
-            figure: as it was made.
-            marks: of its trials.
+            figure: figure before it is drawn.
+            marks: positions of its trials.
             of: numbers of the trials that the page knows.
         """
-        address = figure_uri(figure)  # which also lays it out
+        address = figure_uri(figure)  # this also computes its layout
         return TrialFigure(address, marks.places(figure, of))
 
 
 def answering(trials: Sequence[Trial]) -> list[Trial]:
-    """The trials that the figures answer for: all, or the best of very many."""
+    """Return the trials in the data of the figures: all, or the best of very many."""
     if len(trials) <= MOST_ANSWERING:
         return list(trials)
 
@@ -113,14 +119,14 @@ def told(
     pictures: Mapping[int, NDArray[np.uint8]],
     named: str | None,
 ) -> dict[str, Any]:
-    """What the page tells of trials, ready for JSON.
+    """Return the data of trials for the page, ready for JSON.
 
     Args:
-        study: that they are of.
-        trials: those that the figures answer for.
-        strongest: the parameters by how much they go with the score, by number.
-        pictures: (h, w, 3) of some trials, by number.
-        named: the study's folder as the user names it; None tells the folder's own name.
+        study: study of the trials.
+        trials: trials in the data of the figures.
+        strongest: indices of the parameters by the strength of their association with the score.
+        pictures: pictures (h, w, 3) of some trials, by number.
+        named: the study's folder as the user names it; None takes the folder's own name.
     """
     folder = named or ("STUDY" if study.folder is None else study.folder.name)
     names = study.space.names

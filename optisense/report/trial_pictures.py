@@ -20,17 +20,19 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 ACROSS = 240
-"""Width of a picture in pixels: it is shown 390 pixels wide at most, beside the trial's numbers."""
+"""Width of a picture in pixels: it is shown at most 390 pixels wide, beside the trial's numbers."""
 
 PHOTONS = 200_000
-"""Number of photons of a picture: its noise, some 4 %, is hardly seen at this size."""
+"""Number of photons of a picture: its noise, some 4 %, is hardly visible at this size."""
 
 
 class TrialPictures:
-    """Renders trials with the nine balls that objectives press in; each once."""
+    """Renderer of trials with the nine balls that objectives press in; each trial is rendered
+    once.
+    """
 
     def __init__(self, study: Study) -> None:
-        """Nothing is rendered yet."""
+        """Store the settings; nothing is rendered yet."""
         taken = ("radius", "depth", "skin")
         given = study.settings.settings
         self._settings = Settings(**{key: given[key] for key in taken if key in given})
@@ -38,7 +40,7 @@ class TrialPictures:
         self._found: dict[int, NDArray[np.uint8] | None] = {}
 
     def of(self, trial: Trial) -> NDArray[np.uint8] | None:
-        """(h, w, 3) of a trial; None where its design can't be rendered.
+        """Return the picture (h, w, 3) of a trial, or None if its design can't be rendered.
 
         Raises:
             SetupError: the renderer can't run on this machine.
@@ -71,13 +73,13 @@ class TrialPictures:
 
 
 def worth_a_picture(study: Study, trials: Sequence[Trial], count: int) -> list[Trial]:
-    """The trials that a reader looks at first: some along the front of several objectives, and the
-    best ones by the first.
+    """Return the trials that a reader is most likely to look at: some along the front of several
+    objectives, and the best ones by the first.
 
     Args:
-        study: the study.
-        trials: of it.
-        count: how many at most.
+        study: study.
+        trials: trials of the study.
+        count: largest number of trials.
     """
     names = study.settings.names
     fine = [trial for trial in trials if np.isfinite(trial.score)]

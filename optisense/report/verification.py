@@ -1,4 +1,4 @@
-"""The page of a verification: two sensors side by side, and whether one reads better."""
+"""Page of a verification: two sensors side by side, and the verdict which one reads better."""
 
 from __future__ import annotations
 
@@ -21,13 +21,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WORST_ANGLE = 30.0
-"""Degrees at which the colours of a normal's error end; few read normals are off by more."""
+"""Angle at the end of the colour scale for a normal's error, degrees; few normals are off by
+more.
+"""
 
 BESIDE = 1.0
-"""Share of a contact's size that pictures show around it."""
+"""Margin around a contact in pictures, as a share of the contact's size."""
 
 SMALLEST_CROP = 40
-"""Pixels that a cut-out of a picture has at least on each side."""
+"""Smallest side of a cut-out of a picture, in pixels."""
 
 FloatArray = NDArray[np.float64]
 
@@ -38,9 +40,9 @@ def write_verification_report(
     """Write a verification as one self-contained HTML page.
 
     Args:
-        path: the file to write; it is written whole or not at all.
-        found: what was compared.
-        axes: of each sensor's camera, (3, 3) rows: image right, image up and viewing direction.
+        path: path of the file, which is written whole or not at all.
+        found: verification.
+        axes: rows (3, 3) of each sensor's camera: image right, image up and viewing direction.
 
     Returns:
         The path.
@@ -53,7 +55,7 @@ def write_verification_report(
 
 
 def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]) -> str:
-    """The page of `write_verification_report` as text."""
+    """Return the page of `write_verification_report` as text."""
     settings = found.settings
     reading = settings.reading
     return page(
@@ -86,7 +88,7 @@ def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]
 
 
 def change_figure(found: Verification) -> Figure:
-    """The change of the normals' error for each object and place, and the mean of all."""
+    """Draw the change of the normals' error for each object and place, and the mean of all."""
     before, after = (errors.mean(axis=2) for errors in found.normals)
     change = after - before
     names = list(found.settings.objects)
@@ -110,7 +112,7 @@ def change_figure(found: Verification) -> Figure:
 
 
 def _rows(found: Verification) -> list[list[str]]:
-    """Label, first sensor, second sensor, change and interval."""
+    """Return label, first sensor, second sensor, change and interval."""
     one, other = found.views
     return [
         _change("normals off by (degrees)", found.normal_change, 1),
@@ -134,7 +136,7 @@ def _change(label: str, change: ErrorChange, digits: int) -> list[str]:
 def _object(
     found: Verification, row: int, name: str, axes: tuple[FloatArray, FloatArray]
 ) -> dict[str, Any]:
-    """An object's errors, and its first place as both sensors show it."""
+    """Return an object's errors, and its first place as both sensors show it."""
     means = [errors[row].mean() for errors in found.normals]
     depths = [errors[row].mean() for errors in found.depths]
     sides = []
@@ -158,7 +160,7 @@ def _object(
 
 
 def _pictures(kept: PressPictures, axes: FloatArray) -> list[tuple[str, str]]:
-    """Caption and address of the cut-outs around a contact."""
+    """Return caption and address of the cut-outs around a contact."""
     rows, columns = _around(np.isfinite(kept.angles))
     shown = {
         "picture": kept.picture,
@@ -173,7 +175,7 @@ def _pictures(kept: PressPictures, axes: FloatArray) -> list[tuple[str, str]]:
 
 
 def _around(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
-    """Rows and columns that show a contact and what lies around it; all where there is none."""
+    """Return rows and columns of a contact and its surroundings; all if there is none."""
     if not mask.any():
         return slice(None), slice(None)
     found = []
@@ -187,7 +189,9 @@ def _around(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
 
 
 def _error_colours(angles: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """(h, w, 3): black is right, yellow `WORST_ANGLE` or more, grey where nothing touches."""
+    """Return colours (h, w, 3): black is correct, yellow `WORST_ANGLE` or more, grey outside of
+    contacts.
+    """
     from matplotlib import colormaps
 
     share = np.clip(np.nan_to_num(angles) / WORST_ANGLE, 0.0, 1.0)
