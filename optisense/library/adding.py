@@ -1,4 +1,4 @@
-"""Checking a user's own part and storing it in the user's library folder."""
+"""Check of a user's own part, and its storage in the user's library folder."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 @dataclass(frozen=True)
 class Added:
-    """A part that was stored.
+    """Part that was stored.
 
     Attributes:
-        kind: what kind of part.
-        name: what designs call it.
-        entry: the entry.
+        kind: kind of the part.
+        name: name for designs.
+        entry: entry of the part.
         file: its file in the user's folder.
     """
 
@@ -45,15 +45,15 @@ class Added:
 
 
 def add_file(file: str | Path, kind: str | None = None, name: str | None = None) -> Added:
-    """Add an entry from a YAML file; the files that it may name come along.
+    """Add an entry from a YAML file, with the files that it may name.
 
     Args:
-        kind: material, coating, light or camera; None finds out from the file.
-        name: what designs call it; None takes the name of the file.
+        kind: material, coating, light or camera; None infers it from the file.
+        name: name for designs; None takes the name of the file.
 
     Raises:
-        LibraryError: the file can't be read or is no entry (says the line), its kind can't be
-            told, or the name is taken.
+        LibraryError: the file can't be read or is no entry (the message names the line), its kind
+            is unclear, or the name is taken.
         OutputError: the user's folder can't be written.
     """
     file = Path(file)
@@ -77,10 +77,10 @@ def add_file(file: str | Path, kind: str | None = None, name: str | None = None)
 
 
 def _taken_along(value: Model, name: str) -> dict[str, bytes]:
-    """What is in the files of a value, which names them after its entry from now on."""
+    """Return the contents of the files of a value, and rename these after its entry."""
     found = files_of(value)
     own = {file: f"{name}{Path(file).suffix}" for file in found}
-    if len(set(own.values())) < len(own):  # several of one suffix keep their own names too
+    if len(set(own.values())) < len(own):  # several with one suffix keep their own names too
         own = {file: f"{name}-{Path(file).name}" for file in found}
     if isinstance(value, KindModel):
         value.renamed(own.__getitem__, value.folder)
@@ -103,22 +103,22 @@ def add_ies(
     status: Status = Status.ASSUMED,
     date: str | None = None,
 ) -> Added:
-    """Add a light from its IES file, and what that file does not tell.
+    """Add a light from its IES file and the data that this file lacks.
 
     Args:
-        flux: mW, radiant.
+        flux: radiant flux, mW.
         colour: R, G, B, 0 to 1.
-        colour_name: what the colour is called in the entry.
-        name: what designs call the light; None takes the name of the file.
-        wavelength: nm.
-        current: mA at which the light gives its flux.
-        window: mm, width and height of its opening; it is simulated as a point all the same.
-        package: mm, width, length and height.
-        source, status, date: where these numbers are from.
+        colour_name: name of the colour in the entry.
+        name: name of the light for designs; None takes the name of the file.
+        wavelength: dominant wavelength, nm.
+        current: current at which the light has its flux, mA.
+        window: width and height of its opening, mm; it is simulated as a point all the same.
+        package: width, length and height of its body, mm.
+        source, status, date: source of these numbers.
 
     Raises:
-        LibraryError: the file can't be read or is damaged (says the line), a number makes no
-            sense, or the name is taken.
+        LibraryError: the file can't be read or is damaged (the message names the line), a number is
+            out of its range, or the name is taken.
         OutputError: the user's folder can't be written.
     """
     file = Path(file)
@@ -161,14 +161,14 @@ def add_tuning(
     description: str | None = None,
     temperature: float = DAYLIGHT,
 ) -> Added:
-    """Add a camera with what a tuning file of libcamera says of its lens, sensor and processor.
+    """Add a camera with the data of its lens, sensor and processor in a tuning file of libcamera.
 
     Args:
-        file: JSON.
-        like: the camera of the library whose projection, field of view and size it has.
-        name: what designs call it; None takes the name of the file.
-        description: what it is, in a line.
-        temperature: K, of the light for which its colours are taken.
+        file: JSON file.
+        like: camera of the library whose projection, field of view and size it has.
+        name: name for designs; None takes the name of the file.
+        description: description in one line.
+        temperature: colour temperature of the light for which its colours are taken, K.
 
     Raises:
         LibraryError: the file can't be read or is no tuning file, there is no such camera, or the
@@ -206,7 +206,7 @@ def check_new_name(name: str) -> None:
     """Check that a part can be given this name.
 
     Raises:
-        LibraryError: it has other characters than letters, digits, '-' and '_', or is taken.
+        LibraryError: the name has other characters than letters, digits, '-' and '_', or is taken.
     """
     if NAME.fullmatch(name) is None:
         raise LibraryError(
@@ -224,17 +224,17 @@ def check_new_name(name: str) -> None:
 
 
 def _stored(kind: Kind, name: str, entry: AnyEntry, files: Mapping[str, bytes]) -> Path:
-    """Write an entry unless another process has taken its name meanwhile; returns its file."""
+    """Write an entry unless another process has taken its name meanwhile, and return its file."""
     with held(own_folder(), wait=True, hint=WHERE_TO_STORE):
         check_new_name(name)
         return write_own(kind, name, entry, files)
 
 
 def parse_colour(text: str) -> tuple[str, Colour]:
-    """The name and R, G, B of a colour given as 'red', 'green', 'blue', 'white' or '1,0.5,0'.
+    """Return name and R, G, B of a colour given as 'red', 'green', 'blue', 'white' or '1,0.5,0'.
 
     Raises:
-        LibraryError: it is neither.
+        LibraryError: the text is neither.
     """
     if text in NAMED_COLOURS:
         return text, NAMED_COLOURS[text]
@@ -254,7 +254,7 @@ def parse_colour(text: str) -> tuple[str, Colour]:
 
 
 def _about(ies: bytes) -> str:
-    """What the header of an IES file says of where it comes from."""
+    """Return the header of an IES file on its origin."""
     header = ies.decode("latin-1").split("TILT=")[0]
     words = [
         match[1].strip()

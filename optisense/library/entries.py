@@ -24,22 +24,22 @@ NOT_NUMBERS = frozenset({"kind", "shape", "library", "colour", "part", "maker"})
 
 
 class Source(Model):
-    """The source of one or several numbers."""
+    """Source of one or several numbers."""
 
     status: Status
     source: Text
     date: Annotated[str, Field(pattern=r"^\d{4}(-\d{2}(-\d{2})?)?$")] | None = None
-    """When the source was published, or else read (year, year-month or full)."""
+    """Date when the source was published, or else read (year, year-month or full)."""
 
 
 class Entry(Model, Generic[Value]):
-    """A library entry.
+    """Library entry.
 
     Attributes:
-        description: what it is, in a line.
-        maker: who makes or sells it.
-        value: the material, coating, light or camera.
-        sources: for each field with a number, where it comes from.
+        description: description in one line.
+        maker: maker or vendor.
+        value: material, coating, light or camera.
+        sources: source of each field with a number.
     """
 
     description: Text
@@ -48,20 +48,20 @@ class Entry(Model, Generic[Value]):
     sources: Annotated[dict[str, Source], Field(min_length=1)]
 
     def numbers(self) -> list[str]:
-        """The fields that need a source."""
+        """Return the fields that need a source."""
         given = self.value.model_dump(exclude_none=True)
         return [field for field in given if field not in NOT_NUMBERS]
 
     def source_names(self) -> list[str]:
-        """The names that `sources` may have."""
+        """Return the names that `sources` may have."""
         return [*type(self.value).model_fields, "maker"]
 
     def source(self, field: str) -> Source | None:
-        """Where a number of `numbers` comes from, or None when it is not told."""
+        """Return the source of a number of `numbers`, or None if there is none."""
         return self.sources.get(field)
 
     def unsourced(self) -> list[str]:
-        """The numbers whose source is not told."""
+        """Return the numbers without a source."""
         return [field for field in self.numbers() if self.source(field) is None]
 
     @model_validator(mode="after")
@@ -78,14 +78,14 @@ class Entry(Model, Generic[Value]):
 
 
 class TypicalLight(Model):
-    """The output of one colour of a light at its nominal current.
+    """Output of one colour of a light at its nominal current.
 
     Attributes:
         colour: R, G, B for a design's light group.
         part: order number at the maker.
-        wavelength: nm, dominant.
-        current: mA, nominal.
-        flux: mW, radiant, at this current.
+        wavelength: dominant wavelength, nm.
+        current: nominal current, mA.
+        flux: radiant flux at this current, mW.
     """
 
     colour: Colour
@@ -96,13 +96,13 @@ class TypicalLight(Model):
 
 
 class LightEntry(Entry[LightModel]):
-    """A light with its package and its colours.
+    """Light with its package and its colours.
 
-    A source for `flux` speaks of all colours, one for `flux.red` of one of them.
+    A source for `flux` refers to all colours, one for `flux.red` to one of them.
 
     Attributes:
-        package: mm, width, length and height of its body.
-        window: mm, width and height of the opening of a light that is simulated as a point.
+        package: width, length and height of its body, mm.
+        window: width and height of the opening of a light that is simulated as a point, mm.
         typical: its colours, by name.
     """
 
@@ -111,7 +111,7 @@ class LightEntry(Entry[LightModel]):
     typical: dict[Name, TypicalLight] = Field(default_factory=dict)
 
     def numbers(self) -> list[str]:
-        """The fields that need a source; those of a colour as `flux.red`."""
+        """Return the fields that need a source; those of a colour as `flux.red`."""
         own = [name for name in ("package", "window") if getattr(self, name) is not None]
         colours = [
             f"{field}.{colour}"
@@ -122,26 +122,26 @@ class LightEntry(Entry[LightModel]):
         return [*super().numbers(), *own, *colours]
 
     def source_names(self) -> list[str]:
-        """The names that `sources` may have."""
+        """Return the names that `sources` may have."""
         fields = [field for field in TypicalLight.model_fields if field != "colour"]
         each = [f"{field}.{colour}" for colour in self.typical for field in fields]
         return [*super().source_names(), "package", "window", *fields, *each]
 
     def source(self, field: str) -> Source | None:
-        """Where a number of `numbers` comes from, or None when it is not told."""
+        """Return the source of a number of `numbers`, or None if there is none."""
         return self.sources.get(field) or self.sources.get(field.split(".")[0])
 
 
 class LensFacts(Model):
-    """The view of a camera module as sold.
+    """View of a camera module as sold.
 
     Attributes:
-        projection: how angle turns into image height.
-        fov: degrees, across the image width.
+        projection: projection of angles to image heights.
+        fov: field of view across the image width, degrees.
         resolution: pixels of the sensor, width and height.
-        pixel_size: micrometres.
-        focal_length: mm.
-        f_number: focal length over the diameter of the entrance pupil.
+        pixel_size: pixel size, micrometres.
+        focal_length: focal length, mm.
+        f_number: focal length divided by the diameter of the entrance pupil.
     """
 
     projection: Literal["perspective", "equidistant"] = "perspective"
@@ -153,13 +153,15 @@ class LensFacts(Model):
 
 
 class CameraModel(ImagingModel, LensFacts):
-    """A camera module as sold: its view, and what its lens, its sensor and its processor do.
+    """Camera module as sold: its view, and the effects of its lens, sensor and processor.
 
-    `imaging` has what a design can take over besides the view.
+    `imaging` has the data that a design can take over besides the view.
     """
 
     def imaging(self) -> dict[str, Any]:
-        """The known fields of its `ImagingModel`: plain values by field, as for a design file."""
+        """Return the known fields of its `ImagingModel`: plain values by field, as for a design
+        file.
+        """
         values = self.model_dump(mode="json", include=set(ImagingModel.model_fields))
         return {name: value for name, value in values.items() if value is not None}
 
@@ -184,7 +186,7 @@ class CameraModel(ImagingModel, LensFacts):
         return self
 
     def angles(self) -> tuple[float, float, float]:
-        """Degrees seen across the image's width, its height and its diagonal."""
+        """Return the angles seen across the image's width, its height and its diagonal, degrees."""
         width, height = self.resolution
         across = np.array([width, height, np.hypot(width, height)]) / width
         if self.projection == "equidistant":

@@ -25,17 +25,17 @@ UNITS = {
 
 
 LONGEST_TABLE = 4
-"""Rows of a table that is shown number by number."""
+"""Largest number of rows of a table that is shown number by number."""
 
 
 @dataclass(frozen=True)
 class Fact:
-    """A field of an entry.
+    """Field of an entry.
 
     Attributes:
-        name: of the field; that of a light's colour as `flux.red`.
-        value: with its unit.
-        source: where it comes from; None for words, and where it is not told.
+        name: name of the field; that of a light's colour as `flux.red`.
+        value: value with its unit.
+        source: source of the value; None for words, and if there is none.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Fact:
 
 
 def summary(entry: AnyEntry) -> str:
-    """The most telling numbers, in a few words."""
+    """Return the most informative numbers, in a few words."""
     value: Any = entry.value
     if isinstance(value, CameraModel):
         wide, high, _ = value.angles()
@@ -54,7 +54,7 @@ def summary(entry: AnyEntry) -> str:
 
 
 def facts(entry: AnyEntry) -> list[Fact]:
-    """All fields of an entry with their sources."""
+    """Return all fields of an entry with their sources."""
     own = entry.value.model_dump(mode="json", exclude_none=True)
     units = {name: unit_of(type(entry.value), name) for name in own}
     found = [
@@ -74,7 +74,7 @@ def facts(entry: AnyEntry) -> list[Fact]:
 
 
 def consequences(entry: AnyEntry) -> list[str]:
-    """Quantities that follow from the numbers of an entry, a line each.
+    """Return quantities that follow from the numbers of an entry, one per line.
 
     Raises:
         LibraryError: the IES file of a light is missing or malformed.
@@ -94,7 +94,7 @@ def consequences(entry: AnyEntry) -> list[str]:
 
 
 def _text(name: str, value: object, unit: str = "") -> str:
-    """A value with its unit, without Python's quotes and brackets."""
+    """Return a value with its unit, without Python's quotes and brackets."""
     unit = unit or UNITS.get(name, "")
     if isinstance(value, dict):
         text = ", ".join(

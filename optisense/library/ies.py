@@ -1,4 +1,4 @@
-"""IES files of lights; the reader is shared with designs that bring their own file."""
+"""IES files of lights; the reader is shared with designs that contain their own file."""
 
 from optisense.design.ies import IesProfile, parse_ies, read_ies
 

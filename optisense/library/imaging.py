@@ -1,4 +1,4 @@
-"""Cameras of designs that do with the light what a camera of the library does."""
+"""Transfer of a library camera's imaging (shading, noise, colours) to a design."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from optisense.library.loader import camera, entry
 def with_imaging(
     design: SensorDesign, name: str, *, focus_distance: float | None = None
 ) -> SensorDesign:
-    """The design with a camera of the library's shading, noise, colours and tone curve.
+    """Return the design with the shading, noise, colours and tone curve of a camera of the library.
 
-    The view stays as it is: pose, projection, field of view and resolution. What the library does
-    not know of that camera, such as its distortion, stays too. The sources of the numbers become
-    the design's provenance.
+    The view is not changed: pose, projection, field of view and resolution. Data that the library
+    lacks for that camera, such as its distortion, are not changed either. The sources of the
+    numbers become the design's provenance.
 
     Args:
-        design: not changed.
-        name: of the library's camera.
-        focus_distance: mm, from the entrance pupil to what is sharp, in air; gives the lens the
-            blur of its depth of field. None leaves the blur as it is.
+        design: design, which is not changed.
+        name: name of the library's camera.
+        focus_distance: distance from the entrance pupil to the focus in air, mm; it gives the lens
+            the blur of its depth of field. None does not change the blur.
 
     Raises:
         LibraryError: there is no such camera, it has no such numbers, or the focal length and
-            f-number that its depth of field follows from are not known.
+            f-number for its depth of field are unknown.
         DesignError: the numbers do not fit the design.
     """
     known, found = camera(name), entry("camera", name)

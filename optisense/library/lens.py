@@ -1,4 +1,4 @@
-"""Whether the numbers told of a camera's lens agree with each other."""
+"""Check that the numbers of a camera's lens agree with each other."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Callable
 import numpy as np
 
 LENS_MISFIT = 0.1
-"""A lens may be so much shorter or longer than the field of view asks for: vendors round and
-lenses distort (of the Raspberry Pi cameras the worst is off by 5 %).
+"""Largest relative difference between the focal length and that of the field of view: vendors round
+and lenses distort (of the Raspberry Pi cameras the worst is off by 5 %).
 """
 
 PROJECTIONS: dict[str, Callable[[float], float]] = {
     "perspective": lambda half: float(np.tan(half)) if half < np.pi / 2.0 else np.inf,
     "equidistant": lambda half: half,
 }
-"""Image height over focal length of a ray at an angle (radians) to the axis."""
+"""Ratio of image height to focal length for a ray at an angle (radians) to the axis."""
 
 
 def lens_misfit(
@@ -25,28 +25,28 @@ def lens_misfit(
     pixel_size: float | None,
     focal_length: float | None,
 ) -> tuple[str, str] | None:
-    """Whether a field of view fits the focal length and the width of the image.
+    """Check whether a field of view fits the focal length and the width of the image.
 
-    A perspective lens of focal length f shows 2 atan(w / 2f) across a width w, an equidistant one
-    w / f.
+    A perspective lens of focal length f shows 2 atan(w / 2f) across a width w, an equidistant one w
+    / f.
 
     Args:
         projection: perspective or equidistant.
-        fov: degrees, across the image width.
+        fov: field of view across the image width, degrees.
         resolution: pixels of the sensor, width and height.
-        pixel_size: micrometres.
-        focal_length: mm.
+        pixel_size: pixel size, micrometres.
+        focal_length: focal length, mm.
 
     Returns:
-        What is wrong and what to do; None when they agree within `LENS_MISFIT`, or when the focal
-        length or the pixel size is not told.
+        The problem and its remedy; None if they agree within `LENS_MISFIT`, or if the focal length
+        or the pixel size is unknown.
     """
     if pixel_size is None or focal_length is None:
         return None
     width, height = (0.001 * pixel_size * pixels for pixels in resolution)
 
     def misfit(size: float, law: str) -> float:
-        """How far the focal length is from that of such a lens, as a share of it."""
+        """Return the relative difference of the focal length from that of such a lens."""
         return abs(0.5 * size / PROJECTIONS[law](np.radians(0.5 * fov)) / focal_length - 1.0)
 
     if misfit(width, projection) <= LENS_MISFIT:

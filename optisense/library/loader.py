@@ -1,4 +1,4 @@
-"""Finding the entries of the library: the built-in ones, and the user's own."""
+"""Access to the entries of the library: the built-in ones, and the user's own."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ FOLDER = Path(__file__).parent
 
 
 def names(kind: str) -> list[str]:
-    """The names of all entries of a kind: material, coating, light or camera (or its plural).
+    """Return the names of all entries of a kind: material, coating, light or camera (or its
+    plural).
 
-    The user's own are among them; nothing is read but the names of their files.
+    The user's own are included; only the names of their files are read.
 
     Raises:
         LibraryError: there is no such kind.
@@ -33,7 +34,7 @@ def names(kind: str) -> list[str]:
 
 
 def is_own(kind: str, name: str) -> bool:
-    """Whether an entry is one of the user's own parts.
+    """Return whether an entry is one of the user's own parts.
 
     Raises:
         LibraryError: there is no such kind.
@@ -42,11 +43,11 @@ def is_own(kind: str, name: str) -> bool:
 
 
 def entry(kind: str, name: str) -> AnyEntry:
-    """An entry with its description and the sources of its numbers.
+    """Return an entry with its description and the sources of its numbers.
 
     Raises:
-        LibraryError: there is no such kind or entry (names the near match), the user's own file
-            of it can't be read, or it has the name of a built-in one.
+        LibraryError: there is no such kind or entry (a similar name is suggested), the user's own
+            file of it can't be read, or it has the name of a built-in one.
     """
     singular = kind_named(kind)
     entries, own = _built_in(singular), own_files(singular)
@@ -65,20 +66,20 @@ def entry(kind: str, name: str) -> AnyEntry:
 
 
 def material(name: str) -> Material:
-    """The optical material of this name.
+    """Return the optical material of this name.
 
     Raises:
-        LibraryError: there is none; names the near match.
+        LibraryError: there is none; the message suggests a similar name.
     """
     value: Any = entry("material", name).value
     return value
 
 
 def coating(name: str) -> CoatingModel:
-    """The coating of this name; its `library` field says so.
+    """Return the coating of this name, which is also in its `library` field.
 
     Raises:
-        LibraryError: there is none; names the near match.
+        LibraryError: there is none; the message suggests a similar name.
     """
     value: Any = entry("coating", name).value
     value.library = name
@@ -86,27 +87,28 @@ def coating(name: str) -> CoatingModel:
 
 
 def light(name: str) -> LightModel:
-    """How the light of this name emits.
+    """Return the emission of the light of this name.
 
     Raises:
-        LibraryError: there is none; names the near match.
+        LibraryError: there is none; the message suggests a similar name.
     """
     value: Any = entry("light", name).value
     return value
 
 
 def camera(name: str) -> CameraModel:
-    """The camera of this name.
+    """Return the camera of this name.
 
     Raises:
-        LibraryError: there is none; names the near match.
+        LibraryError: there is none; the message suggests a similar name.
     """
     value: Any = entry("camera", name).value
     return value
 
 
 def emitter(group: LightGroup) -> LightModel:
-    """How the lights of a design's group emit: its own emitter, or the library's light.
+    """Return the emission of the lights of a design's group: its own emitter, or the library's
+    light.
 
     Raises:
         LibraryError: the group has neither.
@@ -123,10 +125,10 @@ def emitter(group: LightGroup) -> LightModel:
 
 
 def kind_named(text: str) -> Kind:
-    """The kind that a word names, singular or plural.
+    """Return the kind that a word names, singular or plural.
 
     Raises:
-        LibraryError: there is no such kind; names the near match.
+        LibraryError: there is no such kind; the message suggests a similar name.
     """
     for kind in KINDS:
         if text in (kind, f"{kind}s"):
@@ -136,8 +138,9 @@ def kind_named(text: str) -> Kind:
 
 @lru_cache(maxsize=len(KINDS))
 def _built_in(kind: Kind) -> dict[str, AnyEntry]:
-    """All built-in entries of a kind by name; lights and cameras have a file each, materials and
-    coatings share one."""
+    """Return all built-in entries of a kind by name; lights and cameras have a file each, materials
+    and coatings share one.
+    """
     if kind in ("light", "camera"):
         files = sorted((FOLDER / f"{kind}s").glob("*.yaml"))
         return {file.stem: read_entry(kind, file) for file in files}

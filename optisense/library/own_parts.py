@@ -1,8 +1,8 @@
 """The user's own parts: a folder with a file for each entry, read together with the built-in ones.
 
-`materials/NAME.yaml`, `coatings/`, `lights/` (with their .ies files) and `cameras/` lie in the
-folder that the environment variable OPTISENSE_LIBRARY names, or else in `optisense/library` of
-the user's configuration folder ($XDG_CONFIG_HOME, or ~/.config).
+`materials/NAME.yaml`, `coatings/`, `lights/` (with their .ies files) and `cameras/` are in the
+folder that the environment variable OPTISENSE_LIBRARY names, or else in `optisense/library` of the
+user's configuration folder ($XDG_CONFIG_HOME, or ~/.config).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ WHERE_TO_STORE = "Name a folder that you may write to in the environment variabl
 
 
 def own_folder() -> Path:
-    """Where the user's own parts are kept; the folder need not exist."""
+    """Return the folder of the user's own parts, which need not exist."""
     named = os.environ.get("OPTISENSE_LIBRARY")
     if named:
         return Path(named).expanduser()
@@ -40,7 +40,7 @@ def own_folder() -> Path:
 
 
 def own_files(kind: Kind) -> dict[str, Path]:
-    """The user's own entries of a kind: their files, by name."""
+    """Return the files of the user's own entries of a kind, by name."""
     folder = own_folder() / f"{kind}s"
     files = sorted(folder.glob("*.yaml")) if folder.is_dir() else []
     return {file.stem: file for file in files if not file.name.startswith(".")}
@@ -52,10 +52,10 @@ def write_own(
     """Write an entry into the user's folder, whose lock is held, whole or not at all.
 
     Args:
-        files: what is in the files that the entry names; they are written beside it first.
+        files: contents of the files that the entry names; they are written beside it first.
 
     Returns:
-        The file of the entry.
+        The path of the entry's file.
 
     Raises:
         OutputError: the folder can't be written.

@@ -1,4 +1,4 @@
-"""Designs that open on any machine, though they use lights of the user's own library."""
+"""Designs with lights of the user's own library, made to open on any machine."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from optisense.library.loader import entry, is_own
 
 
 def with_own_lights(design: SensorDesign) -> SensorDesign:
-    """The design, or a copy of it that describes the user's own lights itself.
+    """Return the design, or a copy that describes the user's own lights itself.
 
-    Materials and coatings are always copied into a design, and a camera's numbers too. A light
-    is only named; other machines know the built-in ones. So each group whose light is one of the
+    Materials and coatings are always copied into a design, and a camera's numbers too. A light is
+    only named; other machines know the built-in ones. So each group whose light is one of the
     user's own gets it as its `emitter`, and saving the design copies its files.
 
     Raises:

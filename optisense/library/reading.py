@@ -1,4 +1,4 @@
-"""Reading entries of the library; what is wrong is told with file and line."""
+"""Reader of entries of the library; errors name file and line."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ KINDS: dict[Kind, Any] = {
 
 
 def read_entry(kind: Kind, file: Path) -> AnyEntry:
-    """Read a file that holds one entry, and the files it may name.
+    """Read a file that holds one entry, and the files that it may name.
 
     Raises:
-        LibraryError: a file can't be read, or is no entry of this kind; says the line.
+        LibraryError: a file can't be read, or is no entry of this kind; the message names the line.
     """
     data, lines = read_yaml(file, LibraryError)
     entry = make_entry(kind, file.stem, data, lines, str(file))
@@ -47,24 +47,24 @@ def read_entry(kind: Kind, file: Path) -> AnyEntry:
 
 
 def files_of(value: Model) -> dict[str, bytes]:
-    """Contents of the files that a value of an entry names, by their names.
+    """Return the contents of the files that a value of an entry names, by their names.
 
     Raises:
-        LibraryError: one can't be read.
+        LibraryError: a file can't be read.
     """
     return value.contents() if isinstance(value, KindModel) else {}
 
 
 def make_entry(kind: Kind, name: str, data: Any, lines: Lines, source: str) -> AnyEntry:
-    """Check the data of an entry.
+    """Check the data of an entry, and return the entry.
 
     Args:
-        data: what YAML gave for it.
-        lines: the line of each value in it; the first line of all is under ().
-        source: the file, for messages.
+        data: data from YAML.
+        lines: line of each value in the data; the first line of all is under ().
+        source: file, for messages.
 
     Raises:
-        LibraryError: it is no entry of this kind; says the line.
+        LibraryError: the data are no entry of this kind; the message names the line.
     """
     adapter: TypeAdapter[AnyEntry] = TypeAdapter(KINDS[kind])
     try:
@@ -76,7 +76,7 @@ def make_entry(kind: Kind, name: str, data: Any, lines: Lines, source: str) -> A
 
 
 def inside(lines: Lines, key: str) -> Lines:
-    """The lines of what is under a key, by their paths from there."""
+    """Return the lines of values under a key, by their paths from there."""
     rest: dict[Steps, int] = {}
     for path, line in lines.items():
         if path[:1] == (key,):
@@ -85,7 +85,7 @@ def inside(lines: Lines, key: str) -> Lines:
 
 
 def kind_of(data: dict[str, Any]) -> Kind | None:
-    """The kind of entry that a file's data describe, or None if it is unknown."""
+    """Return the kind of entry that a file's data describe, or None if it is unknown."""
     value = data.get("value")
     if not isinstance(value, dict):
         return None

@@ -1,7 +1,7 @@
-"""Tuning files of libcamera: what a camera's sensor and lens do, measured by its maker.
+"""Reader of tuning files of libcamera: data of a camera's sensor and lens, measured by its maker.
 
 The files of the Raspberry Pi's cameras are JSON; `src/ipa/rpi/vc4/data` of libcamera has them, and
-`docs/library.md` says what is taken from them. Their levels run from 0 to 65536 (16 bits).
+`docs/library.md` lists the data that are used. Their levels run from 0 to 65536 (16 bits).
 """
 
 from __future__ import annotations
@@ -20,21 +20,23 @@ from optisense.untrusted_files import read_json
 FloatArray = NDArray[np.float64]
 
 FULL = 65536.0
-"""The level of a full pixel in tuning files, which have 16 bits whatever the sensor has."""
+"""Level of a full pixel in tuning files, which have 16 bits whatever the sensor has."""
 
 TABLE_SIZES = {192: (12, 16), 1024: (32, 32)}
-"""Rows and columns of shading tables by how many numbers they have: those of the Raspberry Pi's
-processors VC4 and PiSP."""
+"""Rows and columns of shading tables by their number of entries: those of the Raspberry Pi's
+processors VC4 and PiSP.
+"""
 
 DAYLIGHT = 5000.0
-"""K, the colour temperature for which tables and matrices are taken: white LEDs for lighting rooms
-in neutral white have it. Tactile sensors have no white light of their own to balance by."""
+"""Colour temperature for which tables and matrices are taken, K: that of neutral white LEDs for
+room lighting. Tactile sensors have no white light of their own to balance by.
+"""
 
 LARGEST_FILE = 4_000_000
-"""Bytes; the largest of libcamera's own tuning files has some 100,000."""
+"""Largest size of a tuning file, bytes; the largest of libcamera's own has some 100,000."""
 
 ROUNDING = 5
-"""Decimals that are kept of what is worked out: the files have up to 5."""
+"""Number of decimals that are kept of computed values: the files have up to 5."""
 
 LEAST_DETERMINANT = 1e-3
 """Smallest determinant of a colour matrix that can be inverted; those of real cameras have some 2
@@ -45,11 +47,11 @@ NO_TUNING = "Name a tuning file of libcamera for the Raspberry Pi, such as imx21
 
 @dataclass(frozen=True)
 class Tuning:
-    """The values of a camera's tuning file.
+    """Values of a camera's tuning file.
 
     Attributes:
-        values: fields of `ImagingModel` as plain values, those that the file has.
-        derived: how those that are worked out follow from the file, by field.
+        values: fields of `ImagingModel` as plain values, as far as the file has them.
+        derived: derivation from the file of the values that are computed, by field.
     """
 
     values: dict[str, Any]
@@ -60,9 +62,9 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
     """Read a tuning file.
 
     Args:
-        file: JSON, of format 1 or 2.
-        temperature: K; white balance and colour matrix are interpolated to it, and the colours'
-            shading is that of the nearest temperature in the file.
+        file: JSON file, of format 1 or 2.
+        temperature: colour temperature, K; white balance and colour matrix are interpolated to it,
+            and the colours' shading is that of the nearest temperature in the file.
 
     Raises:
         LibraryError: the file can't be read, is no tuning file, or has a table of another size.
@@ -111,7 +113,7 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
 
 
 def _algorithms(path: Path) -> dict[str, Any]:
-    """The sections of a tuning file, by name without its 'rpi.'."""
+    """Return the sections of a tuning file, by name without its 'rpi.'."""
     try:
         content = read_json(path, LibraryError, LARGEST_FILE, "the tuning file")
     except LibraryError as error:
@@ -141,8 +143,9 @@ def _black_level(section: dict[str, Any], temperature: float) -> dict[str, Any]:
 
 
 def _noise(section: dict[str, Any], temperature: float) -> dict[str, Any]:
-    """Standard deviation: constant + slope sqrt(level); so a full pixel holds FULL / slope^2
-    electrons."""
+    """Return the noise. Its standard deviation is constant + slope sqrt(level), so a full pixel
+    holds FULL / slope^2 electrons.
+    """
     slope, constant = (_number(section[f"reference_{name}"]) for name in ("slope", "constant"))
     if slope <= 0.0 or constant < 0.0:
         raise LibraryError(f"the noise has a slope of {slope:g} and a constant of {constant:g}")
@@ -182,7 +185,9 @@ def _table(numbers: Any) -> list[list[float]]:
 
 
 def _white_balance(section: dict[str, Any], temperature: float) -> dict[str, Any]:
-    """The curve has the temperature and the shares of red and blue in the green of a grey sheet."""
+    """Return the gains. The curve has the temperature and the ratios of red and blue to the green
+    of a grey sheet.
+    """
     if "ct_curve" not in section:
         return {}
     curve = _numbers(section["ct_curve"]).reshape(-1, 3)
@@ -210,7 +215,7 @@ def _tone_curve(section: dict[str, Any], temperature: float) -> dict[str, Any]:
 
 
 def _add_crosstalk(values: dict[str, Any], derived: dict[str, str]) -> None:
-    """What the sensor must see of the light for its processor to undo it."""
+    """Add the crosstalk of the sensor that its processor's matrix undoes."""
     if "colour_matrix" not in values:
         return
     matrix = np.array(values["colour_matrix"])

@@ -1,4 +1,6 @@
-"""Out to the workshop: shapes to print or machine, where the LEDs go, and what to buy."""
+"""Export to the workshop: shapes to print or machine, positions of the LEDs, and a bill of
+materials.
+"""
 
 from optisense.workshop.bill_of_materials import Bill, bill_of_materials
 from optisense.workshop.export import export

@@ -1,4 +1,4 @@
-"""Files from which a maker of circuit boards places LEDs: KiCad's, and JLCPCB's pair of tables.
+"""Files with which a maker of circuit boards places LEDs: KiCad's, and JLCPCB's pair of tables.
 
 x and y are those of the board seen from in front of its top, and so are rotations,
 counter-clockwise, of LEDs on either side.
@@ -25,14 +25,14 @@ from optisense.workshop.placement import (
 )
 
 MARGIN = 1.0
-"""mm of board around the bodies of its LEDs in the outline, which has no other source."""
+"""Width of the board around the bodies of its LEDs in the outline, mm; an assumption."""
 
 USUAL_BODY = 3.5
-"""mm, the side of a body that the library does not know."""
+"""Side of an LED's body that the library does not know, mm."""
 
 
 def assembly_files(design: SensorDesign, placed: Sequence[Placement]) -> dict[str, str]:
-    """The text of each file by its name: four for each board."""
+    """Return the text of each file by its name: four for each board."""
     turns = _turns_on_board(design)
     files: dict[str, str] = {}
     for board in sorted({led.board for led in placed}):
@@ -45,7 +45,7 @@ def assembly_files(design: SensorDesign, placed: Sequence[Placement]) -> dict[st
 
 
 def _turns_on_board(design: SensorDesign) -> dict[str, float]:
-    """Degrees by designator, seen from in front of the board's top."""
+    """Return rotations in degrees by designator, seen from in front of the board's top."""
     lights = [light for group in design.lights.values() for light in group.lights]
     turns = {}
     for number, (light, place) in enumerate(zip(lights, boards_of(lights), strict=True), start=1):
@@ -65,7 +65,7 @@ def _footprint(design: SensorDesign, led: Placement) -> str:
 
 
 def _body(design: SensorDesign, led: Placement) -> tuple[float, float]:
-    """mm, the sides of an LED's body."""
+    """Return the sides of an LED's body, mm."""
     entry = light_entry(design.lights[led.group])
     if entry is None or entry.package is None:
         return USUAL_BODY, USUAL_BODY
@@ -73,7 +73,7 @@ def _body(design: SensorDesign, led: Placement) -> tuple[float, float]:
 
 
 def _kicad(design: SensorDesign, leds: Sequence[Placement], turns: dict[str, float]) -> str:
-    """A position file as KiCad writes them, in its text form."""
+    """Return a position file as KiCad writes them, in its text form."""
     lines = [
         "### Footprint positions ###",
         "## Unit = mm, Angle = deg.",
@@ -90,7 +90,7 @@ def _kicad(design: SensorDesign, leds: Sequence[Placement], turns: dict[str, flo
 
 
 def _cpl(leds: Sequence[Placement], turns: dict[str, float]) -> str:
-    """JLCPCB's table of places."""
+    """Return JLCPCB's table of positions."""
     rows = [
         (led.designator, *(f"{digits(value, 4)}mm" for value in led.on_board),
          led.layer.capitalize(), digits(turns[led.designator], 3))
@@ -100,7 +100,7 @@ def _cpl(leds: Sequence[Placement], turns: dict[str, float]) -> str:
 
 
 def _bom(design: SensorDesign, leds: Sequence[Placement]) -> str:
-    """JLCPCB's table of parts, a row for each group of lights."""
+    """Return JLCPCB's table of parts, a row for each group of lights."""
     rows = []
     for name in dict.fromkeys(led.group for led in leds):
         own = [led for led in leds if led.group == name]
@@ -121,7 +121,7 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def _outline(design: SensorDesign, leds: Sequence[Placement]) -> str:
-    """A rectangle around the LEDs as a DXF drawing (release 12), in mm."""
+    """Return a rectangle around the LEDs as a DXF drawing (release 12), in mm."""
     reach = max(max(_body(design, led)) for led in leds) / 2.0 + MARGIN
     places = np.array([led.on_board for led in leds])
     (x0, y0), (x1, y1) = places.min(axis=0) - reach, places.max(axis=0) + reach

@@ -1,4 +1,4 @@
-"""What a sensor is made of: lights, camera, materials by volume, and the coated area."""
+"""Bill of materials of a sensor: lights, camera, materials by volume, and the coated area."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from optisense.workshop.shapes import Shape, shapes
 MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0
 
 OVERDRIVEN = 1.05
-"""A light that must give this many times its nominal flux is remarked on."""
+"""Ratio of a light's flux to its nominal flux from which on the bill has a remark."""
 
 
 @dataclass(frozen=True)
 class Item:
-    """A line of the bill.
+    """Line of the bill.
 
     Attributes:
         kind: light, camera, material or coating.
-        name: what the design calls it.
-        quantity: how much of it.
+        name: name in the design.
+        quantity: quantity, in `unit`.
         unit: pieces, cm^3 or cm^2.
-        used_for: the light group, or the part.
-        description: what it is.
-        maker: who sells it, "" where unknown.
-        part: the maker's order number, or what will do where none is known.
-        package: mm, width x length x height of a light, "" where unknown.
-        note: what to mind.
-        designators: of lights, as in the tables of places; such as D1-D5.
+        used_for: light group or part that uses it.
+        description: description.
+        maker: vendor, "" if unknown.
+        part: the maker's order number, or an acceptable replacement if it is unknown.
+        package: width x length x height of a light, mm, "" if unknown.
+        note: remarks.
+        designators: designators of lights, as in the tables of positions, such as D1-D5.
     """
 
     kind: str
@@ -55,18 +55,18 @@ class Item:
 
 @dataclass(frozen=True)
 class Bill:
-    """A bill of materials.
+    """Bill of materials.
 
     Attributes:
-        title: the name of the design.
-        items: its lines.
+        title: name of the design.
+        items: lines of the bill.
     """
 
     title: str
     items: list[Item]
 
     def csv(self) -> str:
-        """The bill as a table (RFC 4180)."""
+        """Return the bill as a table (RFC 4180)."""
         text = io.StringIO()
         writer = csv.writer(text)
         writer.writerow(
@@ -82,7 +82,7 @@ class Bill:
         return text.getvalue()
 
     def markdown(self) -> str:
-        """The bill to read, a table for each kind."""
+        """Return the bill as Markdown, with a table for each kind."""
         lines = [f"# Bill of materials: {markdown(self.title)}", ""]
         for kind, heading in HEADINGS.items():
             items = [item for item in self.items if item.kind == kind]
@@ -100,7 +100,7 @@ HEADINGS = {
 
 
 def bill_of_materials(design: SensorDesign) -> Bill:
-    """What a design is made of.
+    """Return the bill of materials of a design.
 
     Volumes are those of the parts as drawn: where parts overlap, the overlap counts in each.
 
@@ -199,8 +199,8 @@ def _material(design: SensorDesign, shape: Shape) -> Item:
 
 
 def _drawn(design: SensorDesign, shape: Shape) -> str:
-    """What a maker must know of how a part is drawn: a sheet has no thickness, and what is assumed
-    of it may be made otherwise.
+    """Return remarks for the maker on how a part is drawn: a sheet has no thickness, and
+    assumptions about it may be changed.
     """
     sheet = "" if shape.is_solid else "a sheet without thickness"
     if shape.thickness is not None:
@@ -211,7 +211,7 @@ def _drawn(design: SensorDesign, shape: Shape) -> str:
 
 
 def _assumed(design: SensorDesign, path: str) -> str:
-    """What is assumed of a part or a number of it; empty where nothing is said to be."""
+    """Return the assumption about a part or a number of it; empty if there is none."""
     known = design.provenance.get(path)
     if known is None or known.status is not Status.ASSUMED or not known.source:
         return ""
@@ -239,7 +239,7 @@ def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
 
 
 def _entry(kind: str, name: str) -> AnyEntry | None:
-    """An entry of the library, None where there is none that can be read."""
+    """Return an entry of the library, or None if there is none that can be read."""
     try:
         return library.entry(kind, name)
     except LibraryError:
@@ -247,7 +247,7 @@ def _entry(kind: str, name: str) -> AnyEntry | None:
 
 
 def _table(items: Sequence[Item]) -> list[str]:
-    """A Markdown table without the columns that are empty."""
+    """Return a Markdown table without the columns that are empty."""
     columns = {
         "name": [item.name for item in items],
         "quantity": [f"{item.quantity:.3g} {item.unit}" for item in items],

@@ -1,4 +1,4 @@
-"""Which LEDs share a circuit board, and on which of its sides they are."""
+"""Assignment of LEDs to circuit boards, and to the sides of the boards."""
 
 from __future__ import annotations
 
@@ -14,28 +14,32 @@ from optisense.design import Light
 FloatArray = NDArray[np.float64]
 
 SAME_PLANE = 0.01
-"""mm: LEDs whose windows are this close to one plane, and face one way, may share a board."""
+"""Largest distance of LEDs' windows from one plane for which they may share a board, mm, if they
+face in one direction.
+"""
 
 SAME_DIRECTION = 1e-3
-"""Radians between directions that count as one."""
+"""Largest angle between directions that count as equal, radians."""
 
 FARTHEST = 15.0
-"""mm: LEDs of one plane that are farther from all others of it have a board of their own; rows of
-LEDs in such sensors have a pitch of 2 to 8 mm."""
+"""Largest distance between neighbouring LEDs of one board, mm; rows of LEDs in such sensors have a
+pitch of 2 to 8 mm.
+"""
 
 THICKEST = 6.0
-"""mm between the windows of LEDs back to back on one board: twice the highest LEDs of the library
-(1.9 mm) and a board of 1.6 mm are 5.4."""
+"""Largest distance between the windows of LEDs back to back on one board, mm: twice the highest
+LEDs of the library (1.9 mm) and a board of 1.6 mm are 5.4.
+"""
 
 
 @dataclass(frozen=True)
 class OnBoard:
-    """Where an LED is.
+    """Position of an LED.
 
     Attributes:
-        board: from 1 on, in the order of the LEDs.
+        board: number of the board, from 1, in the order of the LEDs.
         bottom: whether it is on the other side than the board's first LED.
-        right, up: (3,) unit vectors of the board's x and y, the same for both of its sides.
+        right, up: unit vectors (3,) of the board's x and y, the same for both of its sides.
     """
 
     board: int
@@ -55,7 +59,7 @@ class _Side:
 
 
 def boards_of(lights: Sequence[Light]) -> list[OnBoard]:
-    """The board of each LED."""
+    """Return the board of each LED."""
     sides = [side for plane in _planes(lights) for side in _split(lights, plane)]
     sides.sort(key=lambda side: side.members[0])
     found: dict[int, OnBoard] = {}
@@ -78,7 +82,9 @@ def boards_of(lights: Sequence[Light]) -> list[OnBoard]:
 
 
 def axes_at_rest(light: Light) -> FloatArray:
-    """(3, 3) rows: right and up of the window seen from in front, and where the light shines."""
+    """Return rows (3, 3): right and up of the window seen from in front, and the direction of the
+    light.
+    """
     forward = np.array(light.direction) / np.linalg.norm(light.direction)
     right = np.cross((0.0, 0.0, 1.0), forward)
     if np.linalg.norm(right) < 1e-6:
@@ -88,7 +94,7 @@ def axes_at_rest(light: Light) -> FloatArray:
 
 
 def _planes(lights: Sequence[Light]) -> list[list[int]]:
-    """The LEDs that face one way and lie in one plane."""
+    """Return the LEDs that face in one direction and lie in one plane, by plane."""
     planes: list[tuple[FloatArray, float, list[int]]] = []
     for index, light in enumerate(lights):
         forward = axes_at_rest(light)[2]
@@ -104,7 +110,7 @@ def _planes(lights: Sequence[Light]) -> list[list[int]]:
 
 
 def _split(lights: Sequence[Light], plane: list[int]) -> list[_Side]:
-    """A plane's LEDs by the boards they can be on."""
+    """Return a plane's LEDs by the boards that they can be on."""
     frame = axes_at_rest(lights[plane[0]])
     places = np.array([lights[index].position for index in plane])
     labels = np.ones(1, dtype=np.int64)
@@ -120,7 +126,7 @@ def _split(lights: Sequence[Light], plane: list[int]) -> list[_Side]:
 
 
 def _back_to_back(one: _Side, other: _Side) -> bool:
-    """Whether LEDs look away from one another, a board's thickness apart."""
+    """Return whether LEDs face away from one another, a board's thickness apart."""
     normal = one.frame[2]
     if normal @ other.frame[2] > -1.0 + SAME_DIRECTION**2:
         return False

@@ -1,4 +1,6 @@
-"""Domes: bodies whose corners lie in level rings over an upright wall, from the foot to one top."""
+"""Domes: bodies whose corners lie in horizontal rings over a vertical wall, from the foot to one
+top.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +15,21 @@ from optisense.workshop.recognised import SAME
 FloatArray = NDArray[np.float64]
 
 FEWEST = 8
-"""Corners of a ring, and half of the rings of a dome."""
+"""Smallest number of corners of a ring, and twice the smallest number of rings of a dome."""
 
 MOST = 200
-"""Rings; a mesh with more levels is not made of rings."""
+"""Largest number of rings; a mesh with more levels is not made of rings."""
 
 
 @dataclass(frozen=True)
 class Dome:
-    """A dome over an upright wall; its axis is z.
+    """Dome over a vertical wall; its axis is z.
 
     Attributes:
-        foot: mm, z of the foot of the wall.
-        rings: (levels, n, 3) mm, from the upper end of the wall upward; corner k of all rings is
-            in about the same direction.
-        top: (3,) mm.
+        foot: z of the foot of the wall, mm.
+        rings: corners (levels, n, 3) of the rings, from the upper end of the wall upward, mm;
+            corner k of all rings is in about the same direction.
+        top: top, (3,) mm.
     """
 
     foot: float
@@ -36,7 +38,9 @@ class Dome:
 
 
 def dome(mesh: TriangleMesh) -> Dome | None:
-    """The rings of a dome, closed by a flat foot or open there; None if a mesh is none."""
+    """Return the dome of a mesh, closed by a flat foot or open there; None if the mesh is no
+    dome.
+    """
     level = np.round(mesh.vertices[:, 2], 6)
     levels = np.unique(level)
     if not FEWEST // 2 < len(levels) <= MOST:
@@ -49,7 +53,7 @@ def dome(mesh: TriangleMesh) -> Dome | None:
     if min(len(ring) for ring in rings) < FEWEST:
         return None
     lowest = mesh.vertices[level == levels[0]][:, :2]
-    for place in rings[0][:, :2]:  # the wall is upright
+    for place in rings[0][:, :2]:  # the wall is vertical
         if np.abs(lowest - place).max(axis=1).min() > SAME:
             return None
     ways = _angles(rings[0], middle)
@@ -65,12 +69,12 @@ def _angles(ring: FloatArray, middle: FloatArray) -> FloatArray:
 
 
 def _around(ring: FloatArray, middle: FloatArray) -> FloatArray:
-    """The corners of a ring in their order around its middle."""
+    """Return the corners of a ring in their order around its middle."""
     return ring[np.argsort(_angles(ring, middle))]
 
 
 def _at(ring: FloatArray, ways: FloatArray, middle: FloatArray) -> FloatArray:
-    """(n, 3) mm: where the sides of a ring lie in n directions from its middle."""
+    """Return the points of a ring in n directions from its middle, (n, 3) mm."""
     off = ring[:, :2] - middle
     own = _angles(ring, middle)
     after = np.searchsorted(own, ways, side="right") % len(own)

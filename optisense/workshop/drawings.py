@@ -1,6 +1,6 @@
 """Drawings of plates: an outline to cut (DXF), and a sheet with three views and dimensions (SVG).
 
-The plan is on top, the view from the front below it, and that from the left beside it.
+The plan is on top, the front view below it, and the left view beside it.
 """
 
 from __future__ import annotations
@@ -21,35 +21,35 @@ from optisense.workshop.profiles import OutlinePiece, centre_of
 FloatArray = NDArray[np.float64]
 
 GAP = 16.0
-"""mm between two views: room for a dimension and its number."""
+"""Distance between two views, mm: room for a dimension and its number."""
 
 BORDER = 8.0
-"""mm of empty paper around all that is drawn."""
+"""Margin around the drawing, mm."""
 
 OFF = 7.0
-"""mm between a view and the line of its dimension."""
+"""Distance between a view and the line of its dimension, mm."""
 
 TEXT = 2.5
-"""mm, height of letters: the smallest of ISO 3098 that is read easily."""
+"""Height of letters, mm: the smallest of ISO 3098 that is read easily."""
 
 ARROW = 2.0
-"""mm, length of an arrow of a dimension."""
+"""Length of an arrow of a dimension, mm."""
 
 STEPS_OF_CURVE = 4
-"""Points drawn for each corner of a curve in a DXF file, whose release 12 knows no splines."""
+"""Number of points for each corner of a curve in a DXF file, whose release 12 has no splines."""
 
 SHARP = 20.0
-"""Degrees: corners that bend more are edges that are seen from the side."""
+"""Angle from which on a corner counts as an edge that is visible from the side, degrees."""
 
 LEAST_TITLE = 90.0
-"""mm, width of the sheet that the lines of the title need."""
+"""Smallest width of the sheet, mm, which the lines of the title need."""
 
 LEADER = 8.0
-"""mm, length of the line from an arc to its radius."""
+"""Length of the line from an arc to its radius, mm."""
 
 
 def cut_file(plate: Plate) -> str:
-    """The outline of a plate as a DXF drawing in mm, on the layer CUT."""
+    """Return the outline of a plate as a DXF drawing in mm, on the layer CUT."""
     entities: list[list[Pair]] = []
     for outline in plate.outlines:
         if isinstance(outline, Circle):
@@ -83,7 +83,7 @@ def _is_anticlockwise(points: FloatArray) -> bool:
 
 
 def _through(points: FloatArray) -> FloatArray:
-    """A smooth curve through points, finely cut."""
+    """Return a smooth curve through points, finely divided."""
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     shares = np.linspace(0.0, 1.0, STEPS_OF_CURVE + 1)[:-1]
     fine = np.concatenate([(lengths[:-1, None] + shares * np.diff(lengths)[:, None]).reshape(-1),
@@ -93,7 +93,7 @@ def _through(points: FloatArray) -> FloatArray:
 
 @dataclass
 class _Sheet:
-    """What is drawn, in mm with y up; SVG has it down."""
+    """Elements of the drawing, in mm with y up; SVG has y down."""
 
     height: float
     lines: list[str] = field(default_factory=list)
@@ -117,14 +117,14 @@ class _Sheet:
         )
 
     def arrow(self, tip: tuple[float, float], way: tuple[float, float]) -> None:
-        """A full arrowhead at a tip; `way` is a unit vector along it."""
+        """Draw a full arrowhead at a tip; `way` is a unit vector along it."""
         back = np.array(tip) - ARROW * np.array(way)
         across = 0.17 * ARROW * np.array([-way[1], way[0]])
         moves = f"M {self.at(tip)} L {self.at(back + across)} L {self.at(back - across)} Z"
         self.path(moves, "arrow")
 
     def across(self, x0: float, x1: float, foot: float, y: float) -> None:
-        """A dimension along x, below or above what has its edge at `foot`."""
+        """Draw a dimension along x, below or above the edge at `foot`."""
         for x in (x0, x1):
             self.line((x, foot), (x, y + np.sign(y - foot)), "thin")
         self.line((x0, y), (x1, y), "thin")
@@ -132,7 +132,7 @@ class _Sheet:
         self.text((0.5 * (x0 + x1), y + 0.7), number(x1 - x0))
 
     def up(self, y0: float, y1: float, foot: float, x: float) -> None:
-        """A dimension along y, beside what has its edge at `foot`."""
+        """Draw a dimension along y, beside the edge at `foot`."""
         for y in (y0, y1):
             self.line((foot, y), (x + np.sign(x - foot), y), "thin")
         self.line((x, y0), (x, y1), "thin")
@@ -145,7 +145,7 @@ class _Sheet:
     def _arrows(
         self, start: tuple[float, float], end: tuple[float, float], way: tuple[float, float]
     ) -> None:
-        """Inside the dimension where there is room, else from outside."""
+        """Draw arrows inside the dimension if there is room, else from outside."""
         inside = abs(end[0] - start[0]) + abs(end[1] - start[1]) > 3.0 * ARROW
         sign = 1.0 if inside else -1.0
         ahead, behind = (sign * way[0], sign * way[1]), (-sign * way[0], -sign * way[1])
@@ -166,13 +166,13 @@ STYLE = (
 
 
 def drawing(plate: Plate, title: str) -> str:
-    """Three views of a plate at 1:1 with its dimensions, as an SVG picture in mm.
+    """Return three views of a plate at 1:1 with its dimensions, as an SVG picture in mm.
 
     Args:
-        plate: what is drawn.
-        title: the name of the design.
+        plate: plate.
+        title: name of the design.
     """
-    ring = _polygon(plate)  # with its arcs, whose chords a mesh has
+    ring = _polygon(plate)  # with its arcs, of which a mesh has only chords
     width, depth, thick = ring.bounds[2], ring.bounds[3], plate.thickness
     title_height = 8.0 * TEXT
     left, bottom = BORDER + OFF + TEXT, BORDER + title_height
@@ -211,7 +211,7 @@ def drawing(plate: Plate, title: str) -> str:
 
 
 def _plan(sheet: _Sheet, outline: Circle | list[OutlinePiece], corner: FloatArray) -> None:
-    """An outline in the plan."""
+    """Draw an outline in the plan."""
     if isinstance(outline, Circle):
         x, y = (outline.centre + corner).tolist()
         r = outline.radius
@@ -242,7 +242,7 @@ def _plan(sheet: _Sheet, outline: Circle | list[OutlinePiece], corner: FloatArra
 
 
 def _polygon(plate: Plate) -> shapely.Polygon:
-    """The outlines as fine polygons."""
+    """Return the outlines as fine polygons."""
     rings = []
     for outline in plate.outlines:
         if isinstance(outline, Circle):
@@ -269,7 +269,7 @@ def _fine(piece: OutlinePiece) -> FloatArray:
 def _beside(
     sheet: _Sheet, ring: shapely.Polygon, corner: tuple[float, float], thick: float, axis: int
 ) -> None:
-    """A view along the plate: from the front (axis 0, below the plan) or from the left (1)."""
+    """Draw a view along the plate: from the front (axis 0, below the plan) or from the left (1)."""
     low, high = ring.bounds[axis], ring.bounds[2 + axis]
 
     def at(along: float, up: float) -> tuple[float, float]:
@@ -293,7 +293,7 @@ def _beside(
 
 
 def _edges(points: FloatArray, axis: int) -> Iterator[FloatArray]:
-    """Corners that bend sharply, and the ends of a smooth outline along an axis."""
+    """Yield corners with a sharp bend, and the ends of a smooth outline along an axis."""
     before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
     cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     bend = np.degrees(np.abs(np.arctan2(cross, (before * after).sum(axis=1))))
@@ -303,8 +303,9 @@ def _edges(points: FloatArray, axis: int) -> Iterator[FloatArray]:
 
 
 def _is_seen(ring: shapely.Polygon, place: FloatArray, axis: int) -> bool:
-    """Whether nothing of the plate stands before an edge: below it from the front, left of it from
-    the left."""
+    """Return whether an edge is visible: nothing of the plate is before it, below it from the
+    front, left of it from the left.
+    """
     end = place.copy()
     end[1 - axis] = ring.bounds[1 - axis] - 1.0
     way = shapely.LineString([place, end])
@@ -312,7 +313,7 @@ def _is_seen(ring: shapely.Polygon, place: FloatArray, axis: int) -> bool:
 
 
 def _round(sheet: _Sheet, plate: Plate, corner: FloatArray) -> None:
-    """Diameters and places of holes, and radii of arcs, each radius once."""
+    """Draw diameters and positions of holes, and radii of arcs, each radius once."""
     told: set[str] = set()
     for outline in plate.outlines:
         if isinstance(outline, Circle):
@@ -346,5 +347,5 @@ def _round(sheet: _Sheet, plate: Plate, corner: FloatArray) -> None:
 
 
 def number(value: float) -> str:
-    """A length in mm, to a hundredth."""
+    """Format a length in mm, to a hundredth."""
     return f"{value:.2f}".rstrip("0").rstrip(".")

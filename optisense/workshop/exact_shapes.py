@@ -34,32 +34,37 @@ from optisense.workshop.recognised import (
 from optisense.workshop.shapes import Shape
 
 SAME_PLACE = 0.1
-"""mm by which the ends of a body and of its mesh may differ along x, y or z."""
+"""Largest difference between the ends of a body and of its mesh along x, y or z, mm."""
 
 RIGHT_SIDE = 0.5
-"""Share of a plate's thickness by which its ends may differ from those of its mesh, where that is
-less: a plate on the wrong side of its sheet is off by the whole thickness."""
+"""Largest difference between a plate's ends and those of its mesh, as a share of its thickness,
+where that is less: a plate on the wrong side of its sheet is off by the whole thickness.
+"""
 
 FloatArray = NDArray[np.float64]
 
 WORTH_IT = 60
-"""Triangles: a mesh of fewer is written as it is, with its flat faces merged."""
+"""Smallest number of triangles for a recognition of shapes; a smaller mesh is written as it is,
+with its flat faces merged.
+"""
 
 MESH_ERROR = 0.015
-"""Share of its volume (or area) by which a mesh may differ from the body that it was cut from; a
-circle of 24 corners has 1.1 % less area, one of 48 0.3 %."""
+"""Largest relative difference of a mesh's volume (or area) from that of the body; a circle of 24
+corners has 1.1 % less area, one of 48 0.3 %.
+"""
 
 
 def exact_body(shape: Shape) -> Any | None:
-    """A body with planes, cylinders, cones, spheres and smooth surfaces instead of triangles.
+    """Return a body with planes, cylinders, cones, spheres and smooth surfaces instead of
+    triangles.
 
-    None where the shape is not recognised, or what was made of it is not sound or not as large.
+    The result is None if the shape is not recognised, or if the body is invalid or of another size.
     """
     if len(shape.mesh.faces) < WORTH_IT:
         return None
     if shape.sheet is not None and shape.thickness is not None:
-        # First from the sheet: corners of the far face that end an arc are not mitred as the
-        # others are, and lie on another circle.
+        # The sheet is tried first: corners of the far face that end an arc are not mitred like the
+        # others, and lie on another circle.
         for body in _plates(shape.sheet, shape.thickness):
             if _agrees(body, shape):
                 return body
@@ -68,7 +73,9 @@ def exact_body(shape: Shape) -> Any | None:
 
 
 def _plates(sheet: Shape, thickness: float) -> Iterator[Any]:
-    """What Open CASCADE makes of a sheet by a parallel surface on either side, mitred."""
+    """Yield the bodies that Open CASCADE makes of a sheet by a parallel surface on either side,
+    mitred.
+    """
     from OCP.BRepOffset import BRepOffset_MakeOffset, BRepOffset_Skin
     from OCP.GeomAbs import GeomAbs_Intersection
     from OCP.TopAbs import TopAbs_SOLID
@@ -91,7 +98,7 @@ def _plates(sheet: Shape, thickness: float) -> Iterator[Any]:
 
 
 def _apart(sheet: Shape) -> list[Shape]:
-    """The pieces of a sheet that do not touch one another."""
+    """Return the pieces of a sheet that do not touch one another."""
     mesh = sheet.mesh
     ends = np.concatenate([mesh.faces[:, :2], mesh.faces[:, 1:]])
     size = len(mesh.vertices)
@@ -124,7 +131,7 @@ def _body(shape: Shape) -> Any | None:
 
 
 def _dome_body(found: Dome, solid: bool) -> Any | None:
-    """A smooth surface through all rings, on a wall of one face."""
+    """Return a body with a smooth surface through all rings, on a wall of one face."""
     from OCP.BRepBuilderAPI import (
         BRepBuilderAPI_MakeEdge,
         BRepBuilderAPI_MakeFace,
@@ -147,7 +154,7 @@ def _dome_body(found: Dome, solid: bool) -> Any | None:
 
 
 def _through(found: Dome) -> Any:
-    """A cubic B-spline surface through the rings of a dome: u is the way around, v that up."""
+    """Return a cubic B-spline surface through the rings of a dome: u runs around, v up."""
     from OCP.Geom import Geom_BSplineSurface
 
     rings = np.concatenate([found.rings, np.tile(found.top, (1, found.rings.shape[1], 1))])
@@ -165,13 +172,13 @@ def _through(found: Dome) -> Any:
 
 
 def _lengths(grid: FloatArray, axis: int) -> FloatArray:
-    """From 0 to 1: the mean share of the way along an axis of a grid of points (m, n, 3)."""
+    """Return the mean arc length along an axis of a grid of points (m, n, 3), from 0 to 1."""
     steps = np.linalg.norm(np.diff(grid, axis=axis), axis=2).mean(axis=1 - axis)
     return np.asarray(np.concatenate([[0.0], np.cumsum(steps)]) / steps.sum())
 
 
 def _patched_body(mesh: TriangleMesh, solid: bool) -> Any | None:
-    """A body of flat faces and of outlines drawn out; None if a smooth patch is neither."""
+    """Return a body of flat faces and of extruded outlines; None if a smooth patch is neither."""
     faces = []
     for patch in smooth_patches(mesh, SMOOTH):
         piece = mesh.with_faces(mesh.faces[patch]).compacted()
@@ -187,7 +194,7 @@ def _patched_body(mesh: TriangleMesh, solid: bool) -> Any | None:
 
 
 def _flat_face(mesh: TriangleMesh) -> Any | None:
-    """A flat patch as one face with its holes; None if it is not flat."""
+    """Return a flat patch as one face with its holes; None if it is not flat."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
 
     normal = mesh.face_normals[int(mesh.face_areas.argmax())]
@@ -263,7 +270,7 @@ def _anticlockwise(outline: FloatArray, wanted: bool) -> FloatArray:
 
 
 def _with_holes(outlines: Sequence[FloatArray]) -> list[list[FloatArray]]:
-    """Outlines by bodies: each outer one with the holes in it."""
+    """Return outlines by bodies: each outer one with the holes in it."""
     rings = [shapely.Polygon(outline) for outline in outlines]
     depth = [sum(k != n and other.contains(ring) for k, other in enumerate(rings))
              for n, ring in enumerate(rings)]  # fmt: skip
@@ -276,7 +283,7 @@ def _with_holes(outlines: Sequence[FloatArray]) -> list[list[FloatArray]]:
 
 
 def _bent_box(sides: Sequence[FloatArray], cage: Cage, solid: bool) -> Any:
-    """A box as a cage bends it: each side is, exactly, one Bezier surface."""
+    """Return a box as a cage deforms it: each side is, exactly, one Bezier surface."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.Geom import Geom_BezierSurface
 
@@ -292,10 +299,10 @@ def _bent_box(sides: Sequence[FloatArray], cage: Cage, solid: bool) -> Any:
 
 
 def _bezier_points(corners: FloatArray, cage: Cage) -> FloatArray:
-    """(m, n, 3) mm: the control points of a bent rectangle.
+    """Return the control points of a deformed rectangle, (m, n, 3) mm.
 
-    Along each side the cage is a polynomial of one degree less than its points there, so that the
-    surface through as many points is the bent rectangle itself.
+    Along each side the cage is a polynomial of one degree less than its number of points there, so
+    that the surface through as many points is exactly the deformed rectangle.
     """
     way_u, way_v = corners[1, 0] - corners[0, 0], corners[0, 1] - corners[0, 0]
     counts = [cage.resolution[int(np.argmax(np.abs(way)))] for way in (way_u, way_v)]
@@ -312,10 +319,10 @@ def _bezier_points(corners: FloatArray, cage: Cage) -> FloatArray:
 
 
 def _agrees(body: Any, shape: Shape) -> bool:
-    """Whether a body is sound, and of the volume (a sheet: of the area) of its mesh.
+    """Return whether a body is valid, and has the volume (a sheet: the area) of its mesh.
 
-    Both are those of triangles of the body: Open CASCADE's own integrals over a dome of many spans
-    are off by a percent.
+    Both are computed from triangles of the body: Open CASCADE's own integrals over a dome of many
+    spans are off by a percent.
     """
     from OCP.BRepCheck import BRepCheck_Analyzer
 

@@ -1,4 +1,4 @@
-"""Writing all that a workshop needs into one folder."""
+"""Export of all files for a workshop into one folder."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ def export(
     *,
     with_moulds: bool = False,
 ) -> list[Path]:
-    """Write the deformed parts, drawings of plates, where the LEDs go, files for each board, and
-    the bill of materials.
+    """Write the deformed parts, drawings of plates, positions of the LEDs, files for each board,
+    and the bill of materials.
 
-    Nothing appears under its own name before everything is written.
+    No file appears under its own name before all are written.
 
     Args:
         formats: names in `FORMATS`.
-        notes: takes what is worth telling about the files, a sentence each.
+        notes: list to which notes about the files are added, one sentence each.
         with_moulds: whether to write the moulds of the gels, too.
 
     Returns:
-        The files, in the order of the parts.
+        The paths of the files, in the order of the parts.
 
     Raises:
-        DesignError: a part has no mesh, or lies outside of the cage that deforms it; there is no
-            mould of a gel.
-        SetupError: a format needs something that is not installed.
+        DesignError: a part has no mesh, or lies outside of the cage that deforms it; or a gel has
+            no mould.
+        SetupError: a format needs a package that is not installed.
         OutputError: there is no such format, or the folder can't be written.
     """
     for name in formats:
@@ -82,7 +82,7 @@ def export(
 
 
 def _shape_writers(name: str, title: str, made: Sequence[Shape]) -> dict[str, Writer]:
-    """The files of a format, and what writes each."""
+    """Return the files of a format, and the function that writes each."""
     kind = FORMATS.find(name)
     if kind.holds_all:
         return {f"{file_name(title)}{kind.suffix}": lambda path: kind.write(path, title, made)}
@@ -104,7 +104,7 @@ def _write_shape(kind: ShapeFormat, shape: Shape, title: str, path: Path) -> Non
 
 
 def file_name(title: str) -> str:
-    """A name for a file from the name of a design: letters, digits, '-' and '_'."""
+    """Return a file name from the name of a design: letters, digits, '-' and '_'."""
     return re.sub(r"[^A-Za-z0-9_-]+", "-", title).strip("-")[:64] or "design"
 
 
@@ -116,8 +116,9 @@ def _bytes_writer(data: bytes) -> Writer:
 
 
 def _write_all(folder: Path, writers: dict[str, Writer], notes: list[str]) -> list[Path]:
-    """Write each file under a temporary name, and rename them when all are there; what a writer
-    returns as a list is a note."""
+    """Write each file under a temporary name, and rename them when all are complete; a list that a
+    writer returns is added to the notes.
+    """
     finals = [folder / file for file in writers]
     with written_together("the workshop's files") as stage:
         for final, write in zip(finals, writers.values(), strict=True):

@@ -1,4 +1,4 @@
-"""The file formats in which parts are exported: those of this package and of other packages."""
+"""File formats in which parts are exported: those of this package and of other packages."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from optisense.workshop.step_format import require_step, write_step
 
 @dataclass(frozen=True)
 class ShapeFormat:
-    """A file format for the shapes of a design, in mm.
+    """File format for the shapes of a design, in mm.
 
     Attributes:
-        suffix: of the file name, with its dot.
-        write: writes a file; called with its path, the name of the design and the shapes. It may
-            return a list of sentences to tell.
+        suffix: suffix of the file name, with its dot.
+        write: function that writes a file, called with its path, the name of the design and the
+            shapes. It may return a list of notes.
         holds_all: whether one file holds all shapes; otherwise each shape has a file of its own.
-        require: called before any work; raises `SetupError` where something is not installed.
-        note: what a user should know before a long export; empty if nothing.
+        require: function that is called before any work; raises `SetupError` if a package is not
+            installed.
+        note: note for the user before a long export; empty if there is none.
     """
 
     suffix: str
@@ -73,4 +74,6 @@ FORMATS: Registry[ShapeFormat] = Registry(
     },
     _check,
 )
-"""All formats; other packages add theirs under the entry-point group `optisense.formats`."""
+"""Registry of all formats; other packages add theirs under the entry-point group
+`optisense.formats`.
+"""

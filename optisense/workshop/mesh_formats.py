@@ -14,7 +14,7 @@ from optisense.text import one_line, to_html
 from optisense.workshop.shapes import Shape
 
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
-"""The date of files within a 3MF file, so that the same shapes give the same bytes."""
+"""Date of files within a 3MF file, constant so that the same shapes give the same bytes."""
 
 CONTENT_TYPES = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -34,7 +34,9 @@ NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 
 
 def stl_bytes(shape: Shape) -> bytes:
-    """A binary STL file. Its corners are single precision: exact to about 1e-6 of their size."""
+    """Return a binary STL file. Its coordinates are single precision: exact to about 1e-6 of their
+    size.
+    """
     mesh = shape.mesh
     # The header must not begin with "solid", the mark of a text file.
     header = f"OptiSense part {shape.name}, millimetres".encode("ascii", "replace")[:80]
@@ -49,7 +51,8 @@ def stl_bytes(shape: Shape) -> bytes:
 
 
 def three_mf_bytes(title: str, shapes: Sequence[Shape]) -> bytes:
-    """A 3MF file (core specification 1.3) with an object for each shape, all in their places.
+    """Return a 3MF file (core specification 1.3) with an object for each shape, all in their
+    positions.
 
     Solids are of type `model`; sheets, which no printer can make, of type `surface`.
     """
@@ -96,6 +99,6 @@ def _mesh(mesh: TriangleMesh) -> Iterator[str]:
 
 
 def _text(text: str) -> str:
-    """Text between XML tags, without what XML can't hold."""
+    """Return text for XML elements, without characters that XML does not allow."""
 
     return to_html(one_line(text))

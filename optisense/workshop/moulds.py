@@ -1,8 +1,8 @@
 """Moulds in which gels are cast: the gel's negative in two halves, with a sprue and a vent.
 
-The front half shapes the skin and is pulled off along the way that the skin looks; the back half
-closes it. They part where the gel is widest, which on most gels is their flat back, so that the
-line of the parting is not on the skin.
+The front half shapes the skin and is pulled off in the direction of the skin's outward normal; the
+back half closes it. They part where the gel is widest, which on most gels is their flat back, so
+that the parting line is not on the skin.
 """
 
 from __future__ import annotations
@@ -20,37 +20,42 @@ from optisense.geometry.common_space import as_manifold
 from optisense.workshop.shapes import Shape
 
 WALL = 8.0
-"""mm of material around the gel: stiff when printed, and room for the pins."""
+"""Thickness of material around the gel, mm: stiff when printed, and room for the pins."""
 
 PIN, PIN_HEIGHT = 3.0, 3.0
-"""mm, diameter and height of the pins that hold the halves in place; printers make them round."""
+"""Diameter and height of the pins that align the halves, mm; printers make them round."""
 
 CLEARANCE = 0.15
-"""mm between a pin and its hole on each side, which printed parts need to slide."""
+"""Clearance between a pin and its hole on each side, mm, which printed parts need to slide."""
 
 SPRUE, FUNNEL, VENT = 4.0, 8.0, 2.0
-"""mm, diameters: of the sprue at the gel, of its outer end, and of the vent. Silicone flows through
-4 mm by its own weight."""
+"""Diameters of the sprue at the gel, of its outer end, and of the vent, mm. Silicone flows through
+4 mm by its own weight.
+"""
 
 FROM_EDGE = 0.5
-"""mm between sprue or vent and the edge of the gel's back, so that its edge stays whole."""
+"""Distance between sprue or vent and the edge of the gel's back, mm, so that its edge stays
+whole.
+"""
 
 LEVELS = 64
-"""Number of cuts that look for the widest one; between two of them a gel hardly changes."""
+"""Number of sections in the search for the widest one; between two of them a gel hardly changes."""
 
 AT_THE_BACK = 0.05
-"""Share of the gel's height: a widest cut that is no higher than this is taken as its back."""
+"""Height, as a share of the gel's, up to which the widest section is taken to be its back."""
 
 LEAST_DRAFT = 1.0
-"""Degrees: faces that stand steeper along the way of pulling hold on to a rigid mould; moulders of
-silicone ask for 1 to 2."""
+"""Smallest draft angle, degrees: steeper faces stick to a rigid mould; moulders of silicone ask for
+1 to 2.
+"""
 
 UNDERCUT = 0.5
-"""Degrees by which a face must overhang to count as an undercut; less is rounding of the mesh."""
+"""Smallest overhang of a face that counts as an undercut, degrees; less is rounding of the mesh."""
 
 LEAST_FACING = 0.2
-"""The sum of the skin's normals, as a share of its area, below which it looks to all sides and no
-direction of pulling is right: a belt."""
+"""Smallest length of the sum of the skin's normals, as a share of its area, for a direction of
+pulling; below it the skin points in all directions, as that of a belt.
+"""
 
 SIDES = 48
 """Number of sides of round holes and pins, which are then 0.01 mm off the circle."""
@@ -60,15 +65,15 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Mould:
-    """The mould of a gel.
+    """Mould of a gel.
 
     Attributes:
-        name: of the gel.
-        front: the half that shapes the skin, mm in the frame of the design.
-        back: the other half, with sprue and vent.
-        pull: (3,) unit vector, the way that the front is pulled off.
-        upright: mm^2 of the gel's sides with less draft than `LEAST_DRAFT`.
-        undercut: mm^2 that a rigid half can't be pulled off.
+        name: name of the gel.
+        front: half that shapes the skin, mm, in the frame of the design.
+        back: other half, with sprue and vent.
+        pull: unit vector (3,) in the direction in which the front is pulled off.
+        upright: area of the gel's sides with less draft than `LEAST_DRAFT`, mm^2.
+        undercut: area from which a rigid half can't be pulled off, mm^2.
     """
 
     name: str
@@ -79,14 +84,14 @@ class Mould:
     undercut: float
 
     def shapes(self) -> list[Shape]:
-        """Both halves, to be written as parts are."""
+        """Return both halves, in the form of parts."""
         return [
             Shape(f"{self.name}-mould-{end}", Role.BLOCKER, None, mesh)
             for end, mesh in (("front", self.front), ("back", self.back))
         ]
 
     def told(self) -> str:
-        """The draft in a sentence."""
+        """Return a sentence on the draft."""
         if self.undercut > 0.0:
             return (
                 f"{self.name}-mould: {self.undercut:.3g} mm^2 of the gel are undercut, and only a "
@@ -101,24 +106,25 @@ class Mould:
 
 
 def moulds(made: list[Shape]) -> list[Mould]:
-    """The moulds of all gels of a design.
+    """Return the moulds of all gels of a design.
 
     Args:
-        made: the shapes of the design.
+        made: shapes of the design.
 
     Raises:
-        DesignError: a gel is no solid, or the skin looks to all sides; says which.
+        DesignError: a gel is no solid, or the skin points in all directions; the message says
+            which.
     """
     pull = _outward([shape.mesh for shape in made if shape.role is Role.SENSING_SURFACE])
     return [mould_of(shape, pull) for shape in made if shape.role is Role.ELASTOMER]
 
 
 def mould_of(gel: Shape, pull: FloatArray) -> Mould:
-    """The mould of a gel.
+    """Return the mould of a gel.
 
     Args:
-        gel: a solid.
-        pull: (3,) unit vector, the way that its front half is pulled off.
+        gel: shape of the gel, a solid.
+        pull: unit vector (3,) in the direction in which its front half is pulled off.
 
     Raises:
         DesignError: the gel is no solid.
@@ -157,7 +163,7 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
 
 
 def _outward(skins: list[TriangleMesh]) -> FloatArray:
-    """(3,) the way that a skin looks, by area: its faces are wound towards the inside."""
+    """Return the outward direction (3,) of a skin, weighted by area; its normals point inward."""
     corners = np.concatenate([mesh.triangles for mesh in skins])
     twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     total, area = -twice.sum(axis=0), np.linalg.norm(twice, axis=1).sum()
@@ -170,7 +176,9 @@ def _outward(skins: list[TriangleMesh]) -> FloatArray:
 
 
 def _axes(pull: FloatArray, vertices: FloatArray) -> FloatArray:
-    """(3, 3) rows: along the gel's longest side across the pull, across it, and the pull itself."""
+    """Return rows (3, 3): along the gel's longest side perpendicular to the pull, across it, and
+    the pull itself.
+    """
     flat = vertices - np.outer(vertices @ pull, pull)
     flat = flat - flat.mean(axis=0)
     along = np.linalg.svd(flat, full_matrices=False)[2][0]
@@ -180,7 +188,7 @@ def _axes(pull: FloatArray, vertices: FloatArray) -> FloatArray:
 
 
 def _widest(solid: Any, bottom: float, top: float) -> float:
-    """The height of the cut with the largest area, or of the back."""
+    """Return the height of the section with the largest area, or of the back."""
     heights = np.linspace(bottom, top, LEVELS + 2)[1:-1]
     areas = np.array([solid.slice(float(height)).area() for height in heights])
     first = int(np.argmax(areas >= 0.999 * areas.max()))
@@ -206,14 +214,16 @@ def _rod(
 
 
 def _ends(cut: Any, diameters: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Places for two holes in the back of a gel, at its two ends, clear of what a camera sees."""
+    """Return the positions of two holes in the back of a gel, at its two ends, clear of the
+    camera's view.
+    """
     from shapely import Polygon, unary_union
 
     back = unary_union([Polygon(each) for each in cut.to_polygons() if len(each) > 2])
     found = []
     for diameter, sign in zip(diameters, (-1.0, 1.0), strict=True):
         room = back.buffer(-(0.5 * diameter + FROM_EDGE))
-        if room.is_empty:  # too slim for it: in the middle
+        if room.is_empty:  # it is too slim, so the hole is in the middle
             found.append(np.array(back.representative_point().coords[0]))
             continue
         parts = getattr(room, "geoms", [room])
@@ -225,7 +235,7 @@ def _ends(cut: Any, diameters: tuple[float, float]) -> tuple[FloatArray, FloatAr
 
 
 def _draft(local: TriangleMesh, parting: float) -> tuple[float, float]:
-    """mm^2 of sides with too little draft, and of undercuts, in either half."""
+    """Return the areas of sides with too little draft, and of undercuts, in either half, mm^2."""
     corners = local.triangles
     twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     areas = 0.5 * np.linalg.norm(twice, axis=1)

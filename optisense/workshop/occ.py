@@ -13,10 +13,10 @@ from optisense.workshop.profiles import pieces
 
 FloatArray = NDArray[np.float64]
 Lift = Callable[[FloatArray], FloatArray]
-"""From (n, 2) points of an outline to (n, 3) in the sensor."""
+"""Map from points of an outline, (n, 2), to points in the sensor, (n, 3)."""
 
 SEWN = 1e-5
-"""mm: edges of neighbouring faces that are this near become one."""
+"""Largest distance between edges of neighbouring faces that are joined, mm."""
 
 
 def point(place: FloatArray) -> Any:
@@ -26,7 +26,9 @@ def point(place: FloatArray) -> Any:
 
 
 def array_of(kind: str) -> Any:
-    """A table of points; its class has another name before release 8 of Open CASCADE."""
+    """Return the class of a table of points, which has another name before release 8 of Open
+    CASCADE.
+    """
     try:
         module, name = importlib.import_module("OCP.collections"), f"{kind}_gp_Pnt"
     except ImportError:
@@ -35,7 +37,7 @@ def array_of(kind: str) -> Any:
 
 
 def numbers(values: NDArray[Any]) -> Any:
-    """A table of numbers; its class, too, has another name before release 8."""
+    """Return a table of numbers; its class, too, has another name before release 8."""
     whole = np.issubdtype(values.dtype, np.integer)
     try:
         module = importlib.import_module("OCP.collections")
@@ -50,7 +52,7 @@ def numbers(values: NDArray[Any]) -> Any:
 
 
 def wire(corners: FloatArray, lift: Lift, closing: bool = False) -> Any:
-    """The lines, arcs and curves through the corners of an outline, joined.
+    """Return the lines, arcs and curves through the corners of an outline, joined.
 
     Args:
         closing: whether to add a line from the last corner to the first.
@@ -93,7 +95,7 @@ def compound(shapes: Sequence[Any]) -> Any:
 
 
 def sewn(faces: Sequence[Any], solid: bool) -> Any | None:
-    """Faces joined along their edges; of a solid, None if they do not close."""
+    """Return faces joined along their edges; for a solid, None if they do not close."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid, BRepBuilderAPI_Sewing
     from OCP.BRepLib import BRepLib
     from OCP.TopAbs import TopAbs_SHELL

@@ -1,4 +1,4 @@
-"""Where each LED goes: in the frame of the design, and on a flat board."""
+"""Positions of the LEDs: in the frame of the design, and on a flat board."""
 
 from __future__ import annotations
 
@@ -22,24 +22,25 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Placement:
-    """One LED to place.
+    """Position of one LED.
 
     Attributes:
         designator: D1, D2, ... in the order of the design.
-        group: the light group it belongs to.
-        model: the light's name in the library or the design.
-        part: the maker's order number, or "" where the library knows none.
-        position: mm, the middle of its window.
-        direction: unit vector, where it shines.
-        rotation: degrees, counter-clockwise seen from in front of the LED, from the rest position
-            to its own `up`. At rest the height of the window points along +z as far as it can,
-            or along +x where the LED shines along z.
-        board: LEDs of one number lie in one plane, or back to back on the two sides of one board.
-        layer: "top", or "bottom" for LEDs that look away from the board's first one.
-        on_board: mm, x and y on the board seen from in front of its top: y is up at rest, the
-            origin is where the origin of the design falls on it, straight along the normal.
+        group: light group of the LED.
+        model: name of the light in the library or the design.
+        part: the maker's order number, or "" if the library has none.
+        position: middle of its window, mm.
+        direction: unit vector of its direction.
+        rotation: rotation in degrees, counter-clockwise seen from in front of the LED, from the
+            rest position to its own `up`. At rest the height of the window points along +z as far
+            as possible, or along +x if the LED shines along z.
+        board: number of the board; LEDs of one number lie in one plane, or back to back on the two
+            sides of one board.
+        layer: "top", or "bottom" for LEDs that face away from the board's first one.
+        on_board: x and y on the board seen from in front of its top, mm: y is up at rest, the
+            origin is the projection of the design's origin along the normal.
         colour: R, G, B, as in the design.
-        flux: mW, radiant.
+        flux: radiant flux, mW.
     """
 
     designator: str
@@ -57,7 +58,7 @@ class Placement:
 
 
 def placements(design: SensorDesign) -> list[Placement]:
-    """All LEDs of a design, in its order."""
+    """Return the positions of all LEDs of a design, in its order."""
     leds = [(name, group, each) for name, group in design.lights.items() for each in group.lights]
     boards = boards_of([light for _, _, light in leds])
     found: list[Placement] = []
@@ -85,13 +86,15 @@ def placements(design: SensorDesign) -> list[Placement]:
 
 
 def part_number(group: LightGroup) -> str:
-    """The maker's order number for the colour of a group, "" where the library knows none."""
+    """Return the maker's order number for the colour of a group, "" if the library has none."""
     colour = typical_colour(group)
     return colour[1].part or "" if colour is not None else ""
 
 
 def typical_colour(group: LightGroup) -> tuple[str, TypicalLight] | None:
-    """The name and numbers of a library light's colour that is the group's, or None."""
+    """Return name and numbers of the colour of a library light that matches the group's, or
+    None.
+    """
     entry = light_entry(group)
     if entry is None:
         return None
@@ -103,7 +106,7 @@ def typical_colour(group: LightGroup) -> tuple[str, TypicalLight] | None:
 
 
 def what_to_order(group: LightGroup) -> str:
-    """The order number of a group's light, or in words what will do in its place."""
+    """Return the order number of a group's light, or a description of a replacement."""
     number = part_number(group)
     if number:
         return number
@@ -119,7 +122,7 @@ def what_to_order(group: LightGroup) -> str:
 
 
 def light_entry(group: LightGroup) -> LightEntry | None:
-    """The library's entry of a group's light, None where it has none that can be read."""
+    """Return the library's entry of a group's light, or None if there is none that can be read."""
     try:
         entry: Any = library.entry("light", group.model)
     except LibraryError:
@@ -136,7 +139,9 @@ COLUMNS = (
 
 
 def placement_csv(placed: Sequence[Placement]) -> str:
-    """A pick-and-place table (RFC 4180), a row for each LED; lengths to a tenth of a micrometre."""
+    """Return a pick-and-place table (RFC 4180), a row for each LED; lengths are rounded to 0.1
+    um.
+    """
     text = io.StringIO()
     writer = csv.writer(text)
     writer.writerow(COLUMNS)
@@ -161,12 +166,12 @@ def placement_csv(placed: Sequence[Placement]) -> str:
 
 
 def _rotation(light: Light, right: FloatArray, up: FloatArray) -> float:
-    """Degrees from -180 (left out) to 180."""
+    """Return the rotation in degrees, from -180 (excluded) to 180."""
     if light.up is None:
         return 0.0
     across, along = float(np.dot(light.up, right)), float(np.dot(light.up, up))
     if np.hypot(across, along) < 1e-6 * np.linalg.norm(light.up):
-        return 0.0  # it points along the direction and says nothing
+        return 0.0  # `up` is parallel to the direction and gives no rotation
     angle = float(np.degrees(np.arctan2(-across, along)))
     return 180.0 if angle <= -180.0 + 1e-9 else angle + 0.0
 
@@ -176,6 +181,6 @@ def _triple(vector: FloatArray) -> tuple[float, float, float]:
 
 
 def digits(value: float, places: int) -> str:
-    """Fixed digits, without a minus before zero."""
+    """Format a number with fixed digits, without a minus before zero."""
     text = f"{value:.{places}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text

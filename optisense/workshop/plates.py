@@ -1,4 +1,4 @@
-"""Plates: flat parts that are cut out of sheet, each with its outline in its own plane."""
+"""Plates: flat parts that are cut from sheet material, each with its outline in its own plane."""
 
 from __future__ import annotations
 
@@ -18,20 +18,23 @@ from optisense.workshop.step_format import bodies
 FloatArray = NDArray[np.float64]
 
 THICKEST = 10.0
-"""mm: usual laser cutters cut acrylic of up to 10 mm."""
+"""Largest thickness of a plate, mm: common laser cutters cut acrylic of up to 10 mm."""
 
 FLAT = 0.5
-"""Share of a plate's smaller side that it may be thick; a thicker part is a block."""
+"""Largest ratio of a plate's thickness to its smaller side; a thicker part is a block."""
 
 CAST_OR_PAINTED = frozenset({Role.ELASTOMER, Role.SENSING_SURFACE})
 """Roles of parts that are cast or sprayed and not cut."""
 
 ROUND = 12
-"""Corners on one circle from which an outline is meant to be round; octagons stay octagons."""
+"""Smallest number of corners on one circle for an outline that is meant to be round; octagons stay
+octagons.
+"""
 
 SAME_RADIUS = 1e-4
-"""mm by which corners of a round outline may differ in their distance from its middle: rounding of
-files."""
+"""Largest difference of the corners' distances from the middle of a round outline, mm; it covers
+rounding in files.
+"""
 
 ON_AXIS = 1e-9
 """Largest difference from 1 of a unit normal's component along the axis that it is parallel to."""
@@ -39,11 +42,11 @@ ON_AXIS = 1e-9
 
 @dataclass(frozen=True)
 class Circle:
-    """A round hole, or a disc.
+    """Round hole, or disc.
 
     Attributes:
-        centre: (2,) mm.
-        radius: mm.
+        centre: centre, (2,) mm.
+        radius: radius, mm.
     """
 
     centre: FloatArray
@@ -52,16 +55,16 @@ class Circle:
 
 @dataclass(frozen=True)
 class Plate:
-    """A plate to be cut.
+    """Plate to be cut.
 
     Attributes:
-        name: of the part, with a number where a part has several plates.
-        material: the design's name of its material, None where none is said.
-        count: how many of one outline are needed.
-        thickness: mm.
-        outlines: the outer one first, then holes: a circle, or the lines, arcs and curves in their
-            order. Coordinates are mm from the lower left corner of the plate.
-        size: mm, width and height.
+        name: name of the part, with a number if a part has several plates.
+        material: name of its material in the design, None if it has none.
+        count: number of plates with this outline.
+        thickness: thickness, mm.
+        outlines: outlines, the outer one first, then holes: a circle, or the lines, arcs and curves
+            in their order. Coordinates are in mm from the lower left corner of the plate.
+        size: width and height, mm.
     """
 
     name: str
@@ -73,7 +76,7 @@ class Plate:
 
 
 def plates(made: Sequence[Shape]) -> list[Plate]:
-    """The plates among the parts of a design."""
+    """Return the plates among the parts of a design."""
     found: list[Plate] = []
     for shape in made:
         if not shape.is_solid or shape.role in CAST_OR_PAINTED:
@@ -100,11 +103,11 @@ def _with(plate: Plate, *, name: str | None = None, count: int | None = None) ->
 
 
 def _plate(shape: Shape, mesh: TriangleMesh) -> Plate | None:
-    """A body as a plate in the plane of its largest face; None if it is none."""
+    """Return a body as a plate in the plane of its largest face; None if it is no plate."""
     normal = mesh.face_normals[int(mesh.face_areas.argmax())]
     frame = _frame(normal, mesh)
     size = np.ptp(mesh.vertices @ frame.T, axis=0)
-    if size[1] > size[0] + ON_AXIS:  # sheets of paper are wide
+    if size[1] > size[0] + ON_AXIS:  # drawing sheets are wide
         frame = frame[[1, 0, 2]] * np.array([[1.0], [-1.0], [1.0]])
         size = size[[1, 0, 2]]
     flat = TriangleMesh(mesh.vertices @ frame.T, mesh.faces)
@@ -122,7 +125,7 @@ def _plate(shape: Shape, mesh: TriangleMesh) -> Plate | None:
 
 
 def _frame(normal: FloatArray, mesh: TriangleMesh) -> FloatArray:
-    """(3, 3) rows: right and up in the plane of a plate, and its normal.
+    """Return rows (3, 3): right and up in the plane of a plate, and its normal.
 
     In a plane across x, y or z right and up are along axes of the design; else right is along the
     longest edge.
@@ -132,7 +135,7 @@ def _frame(normal: FloatArray, mesh: TriangleMesh) -> FloatArray:
         return np.eye(3)[[(axis + 1) % 3, (axis + 2) % 3, axis]]
     edges = mesh.triangles[:, [1, 2, 0]] - mesh.triangles
     edges = edges.reshape(-1, 3)[np.abs(edges.reshape(-1, 3) @ normal) < 1e-6]
-    # Diagonals of quadrilaterals are no edges of the plate; its upright sides tell which are.
+    # Diagonals of quadrilaterals are no edges of the plate; its sides tell which are.
     sides = mesh.face_normals[np.abs(mesh.face_normals @ normal) < 1e-6]
     along = [e for e in edges if len(sides) and np.abs(sides @ e).min() < 1e-6 * np.linalg.norm(e)]
     right = max(along or list(edges), key=lambda edge: float(np.linalg.norm(edge)))
@@ -141,7 +144,7 @@ def _frame(normal: FloatArray, mesh: TriangleMesh) -> FloatArray:
 
 
 def _outline(corners: FloatArray) -> Circle | list[OutlinePiece]:
-    """An outline, begun at its longest side, so that no arc and no curve is cut in two."""
+    """Return an outline that begins at its longest side, so that no arc or curve is split."""
     points = corners[:-1]
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     middle = points.mean(axis=0) if len(points) % 2 else middle
@@ -154,7 +157,7 @@ def _outline(corners: FloatArray) -> Circle | list[OutlinePiece]:
 
 
 def _alike(one: Plate, other: Plate) -> bool:
-    """Whether two plates are cut along one outline."""
+    """Return whether two plates have the same outline."""
     if abs(one.thickness - other.thickness) > 1e-6 or len(one.outlines) != len(other.outlines):
         return False
     return all(
@@ -164,7 +167,7 @@ def _alike(one: Plate, other: Plate) -> bool:
 
 
 def _corners(outline: Circle | list[OutlinePiece]) -> FloatArray:
-    """(n, 2) mm that tell an outline, sorted."""
+    """Return points (n, 2), mm, that identify an outline, sorted."""
     if isinstance(outline, Circle):
         return np.array([outline.centre, (outline.radius, 0.0)])
     points = np.concatenate([piece.points for piece in outline])

@@ -1,7 +1,7 @@
-"""Flat outlines from the corners of a mesh: their lines, arcs and smooth curves found again.
+"""Reconstruction of the lines, arcs and smooth curves of flat outlines from the corners of a mesh.
 
-A mesh keeps only corners. Corners on one line, or on one circle in equal steps, were cut from a
-line or an arc; smooth runs of other corners are taken for points on a curve.
+A mesh keeps only corners. Corners on one line, or on one circle in equal steps, come from a line or
+an arc; smooth runs of other corners are taken for points on a curve.
 """
 
 from __future__ import annotations
@@ -15,25 +15,26 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 EXACT = 2e-6
-"""mm that corners may deviate from the line or circle that they were cut from: rounding of
-files."""
+"""Largest deviation of corners from the line or circle that they come from, mm; it covers rounding
+in files.
+"""
 
 ARC_CORNERS = 5
-"""Least number of corners on one circle that make an arc; three lie on one circle always."""
+"""Smallest number of corners on one circle that make an arc; three always lie on a circle."""
 
 SMOOTH = 20.0
-"""Degrees that neighbouring sides of a smooth curve bend at most."""
+"""Largest angle between neighbouring sides of a smooth curve, degrees."""
 
 CURVE_CORNERS = 6
-"""Least number of corners in a smooth run that make a curve."""
+"""Smallest number of corners in a smooth run that make a curve."""
 
 
 class OutlinePiece(NamedTuple):
-    """A part of an outline.
+    """Part of an outline.
 
     Attributes:
-        kind: what it is.
-        points: (n, 2) mm, its corners; of a line the two ends, of an arc the ends and one between.
+        kind: kind of the part.
+        points: corners (n, 2), mm; for a line the two ends, for an arc the ends and one in between.
     """
 
     kind: Literal["line", "arc", "curve"]
@@ -41,10 +42,10 @@ class OutlinePiece(NamedTuple):
 
 
 def pieces(corners: FloatArray) -> list[OutlinePiece]:
-    """The lines, arcs and curves of an open polygon.
+    """Return the lines, arcs and curves of an open polygon.
 
     Args:
-        corners: (n, 2) mm, n of at least 2; of a closed outline, the first again at the end.
+        corners: corners (n, 2), mm, n of at least 2; a closed outline repeats the first at the end.
     """
     found: list[OutlinePiece] = []
     loose: list[int] = []
@@ -70,7 +71,7 @@ def pieces(corners: FloatArray) -> list[OutlinePiece]:
 
 
 def _line_end(corners: FloatArray, start: int) -> int:
-    """The last corner on the line through a corner and the next one."""
+    """Return the last corner on the line through a corner and the next one."""
     end = start + 1
     while end + 1 < len(corners):
         way = corners[end + 1] - corners[start]
@@ -85,9 +86,9 @@ def _line_end(corners: FloatArray, start: int) -> int:
 
 
 def _arc_end(corners: FloatArray, start: int) -> int:
-    """The last corner on the circle through a corner and the next two; `start` if none.
+    """Return the last corner on the circle through a corner and the next two; `start` if none.
 
-    The sides must bend one way and by no more than 20 degrees each.
+    The sides must bend in one direction and by no more than 20 degrees each.
     """
     if start + 2 >= len(corners):
         return start
@@ -109,7 +110,7 @@ def _arc_end(corners: FloatArray, start: int) -> int:
 
 
 def centre_of(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray | None:
-    """Of the circle through three points, None where they lie on one line."""
+    """Return the centre of the circle through three points, or None if they lie on one line."""
     ab, ac = b - a, c - a
     twice = 2.0 * (ab[0] * ac[1] - ab[1] * ac[0])
     if abs(twice) < 1e-9 * (ab @ ab + ac @ ac):
@@ -120,7 +121,7 @@ def centre_of(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray | None:
 
 
 def _loose(corners: FloatArray, run: list[int]) -> list[OutlinePiece]:
-    """Curves and lines through corners that lie on no line and no circle."""
+    """Return curves and lines through corners that lie on no line and no circle."""
     if not run:
         return []
     points = corners[run]

@@ -1,5 +1,6 @@
-"""What a mesh was made from, where that can be told: a profile turned about an axis, an outline
-drawn out along an axis, or a box bent by a cage."""
+"""Recognition of the construction of a mesh: a profile turned about an axis, an outline extruded
+along an axis, or a box deformed by a cage.
+"""
 
 from __future__ import annotations
 
@@ -15,26 +16,28 @@ from optisense.geometry.patches import smoothly_joined
 FloatArray = NDArray[np.float64]
 
 SAME = 1e-6
-"""mm: coordinates that agree so well are one; files keep seven digits."""
+"""Largest difference of coordinates that count as equal, mm; files keep seven digits."""
 
 FEWEST_CORNERS = 12
-"""Least number of corners of a full turn; a body with fewer around an axis is meant to have flat
-sides."""
+"""Smallest number of corners of a full turn; a body with fewer around an axis is meant to have flat
+sides.
+"""
 
 NEAR_AXIS = 0.05
-"""Share of the largest radius: a lone vertex so near to the axis is a pole, which may be set
-aside."""
+"""Largest distance from the axis of a single vertex that counts as a pole, as a share of the
+largest radius; poles may be moved off the axis.
+"""
 
 
 @dataclass(frozen=True)
 class Turned:
-    """A body of revolution.
+    """Body of revolution.
 
     Attributes:
         axis: 0, 1 or 2 for x, y or z.
-        centre: (3,) mm, a point of the axis.
-        profile: (n, 2) mm, distance from the axis and place along it; a closed outline ends on its
-            first point.
+        centre: point of the axis, (3,) mm.
+        profile: distance from the axis and position along it, (n, 2) mm; a closed outline ends on
+            its first point.
     """
 
     axis: int
@@ -44,13 +47,13 @@ class Turned:
 
 @dataclass(frozen=True)
 class DrawnOut:
-    """An outline drawn out along an axis.
+    """Outline extruded along an axis.
 
     Attributes:
-        axis: 0, 1 or 2 for x, y or z, the direction.
-        low, high: mm, the ends along it.
-        outlines: (n, 2) mm each, across the axis (y and z, z and x, or x and y); closed ones end on
-            their first point. The first is the outer one, others are holes.
+        axis: direction, 0, 1 or 2 for x, y or z.
+        low, high: ends along the axis, mm.
+        outlines: outlines (n, 2), mm, across the axis (y and z, z and x, or x and y); closed ones
+            end on their first point. The first is the outer one, others are holes.
     """
 
     axis: int
@@ -60,12 +63,14 @@ class DrawnOut:
 
 
 def across(axis: int) -> tuple[int, int]:
-    """The two other axes, in their order around."""
+    """Return the two other axes, in cyclic order."""
     return (axis + 1) % 3, (axis + 2) % 3
 
 
 def turned(mesh: TriangleMesh) -> Turned | None:
-    """The profile of a body of revolution about an axis along x, y or z; None if it is none."""
+    """Return the profile of a body of revolution about an axis along x, y or z; None if the mesh is
+    none.
+    """
     for axis in (2, 0, 1):
         found = _turned_about(mesh, axis)
         if found is not None:
@@ -95,7 +100,7 @@ def _turned_about(mesh: TriangleMesh, axis: int) -> Turned | None:
             return None
     profile = np.array([points[rings == ring].mean(axis=0) for ring in range(len(counts))])
     profile[poles, 0] = 0.0
-    # Sides between rings, in the order in which the faces look outward.
+    # Sides between rings, in the order in which the normals point outward.
     where = rings[mesh.faces]
     sides = np.concatenate([where[:, [0, 1]], where[:, [1, 2]], where[:, [2, 0]]])
     sides = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
@@ -104,14 +109,14 @@ def _turned_about(mesh: TriangleMesh, axis: int) -> Turned | None:
 
 
 def _axis_place(vertices: FloatArray, axis: int, k: int) -> float:
-    """mm: where the axis is along another one, if the largest ring is regular."""
+    """Return the position of the axis along another one, mm, if the largest ring is regular."""
     levels = np.unique(np.round(vertices[:, axis], 5))
     means = [vertices[np.abs(vertices[:, axis] - z) < 2e-5, k].mean() for z in levels[:64]]
     return float(np.median(means))
 
 
 def _joined(points: FloatArray, distance: float) -> NDArray[np.int64]:
-    """The number of the group of each point; points nearer than `distance` are of one group."""
+    """Return the group number of each point; points nearer than `distance` belong to one group."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -125,7 +130,7 @@ def _joined(points: FloatArray, distance: float) -> NDArray[np.int64]:
 
 
 def _walk(sides: NDArray[np.int64], count: int) -> list[int] | None:
-    """The corners of one path, or of one closed outline (its first again at the end)."""
+    """Return the corners of one path, or of one closed outline (its first again at the end)."""
     beside: list[list[int]] = [[] for _ in range(count)]
     for one, other in sides.tolist():
         beside[one].append(other)
@@ -150,9 +155,10 @@ def _walk(sides: NDArray[np.int64], count: int) -> list[int] | None:
 
 
 def drawn_out(mesh: TriangleMesh) -> DrawnOut | None:
-    """The outline of a prism, or of an open sheet, drawn out along x, y or z; None if it is none.
+    """Return the outline of a prism, or of an open sheet, extruded along x, y or z; None if the
+    mesh is none.
 
-    A box is one, too; the axis with the most corners around it counts.
+    A box is one, too; the axis with the most corners around it is used.
     """
     for axis in (2, 1, 0):
         found = drawn_along(mesh, axis)
@@ -162,7 +168,7 @@ def drawn_out(mesh: TriangleMesh) -> DrawnOut | None:
 
 
 def drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
-    """The outline that was drawn out along one axis; None if there is none."""
+    """Return the outline extruded along one axis, or None."""
     normals = np.abs(mesh.face_normals[:, axis])
     areas = mesh.face_areas > 0.0
     upright = normals < 1e-5
@@ -179,7 +185,7 @@ def drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
         and not ((ends - low < SAME).all(axis=1) | (high - ends < SAME).all(axis=1)).all()
     ):
         return None
-    # The sides' corners at the lower end, joined as the sides join them there.
+    # The sides' corners at the lower end, connected as the sides connect them there.
     bottom = along[mesh.faces] - low < SAME
     walls = upright & areas
     pairs = [
@@ -208,7 +214,7 @@ def drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
 
 
 def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:
-    """Outlines by their corners; None where more than two sides meet."""
+    """Return outlines by their corners; None if more than two sides meet."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -227,7 +233,9 @@ def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:
 
 
 def rims(mesh: TriangleMesh) -> list[list[int]] | None:
-    """The loops of edges that have one face only, by their vertices, the first again at the end."""
+    """Return the loops of edges with only one face, by their vertices, the first again at the
+    end.
+    """
     edges = np.sort(
         np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]),
         axis=1,
@@ -242,7 +250,9 @@ def rims(mesh: TriangleMesh) -> list[list[int]] | None:
 
 
 def smooth_patches(mesh: TriangleMesh, sharp: float) -> list[NDArray[np.int64]]:
-    """The faces of a mesh in patches that are parted by edges sharper than `sharp` degrees."""
+    """Return the faces of a mesh in patches that are separated by edges sharper than `sharp`
+    degrees.
+    """
     left = np.ones(len(mesh.faces), dtype=bool)
     found = []
     for face in range(len(mesh.faces)):
@@ -254,10 +264,11 @@ def smooth_patches(mesh: TriangleMesh, sharp: float) -> list[NDArray[np.int64]]:
 
 
 def box_sides(mesh: TriangleMesh) -> list[FloatArray]:
-    """(2, 2, 3) mm corners of each rectangle of a box, or of one rectangle; empty if it is neither.
+    """Return the corners (2, 2, 3) of each rectangle of a box, or of one rectangle, mm; empty if it
+    is neither.
 
-    The corners [0, 0], [0, 1], [1, 0], [1, 1] of a rectangle are seen anticlockwise from outside
-    in the order [0, 0], [1, 0], [1, 1], [0, 1].
+    The corners [0, 0], [0, 1], [1, 0], [1, 1] of a rectangle are seen anticlockwise from outside in
+    the order [0, 0], [1, 0], [1, 1], [0, 1].
     """
     low, high = mesh.bounds
     size = high - low

@@ -1,4 +1,6 @@
-"""The shapes of a design as they are made: deformed by their cages, in one piece, facing out."""
+"""Shapes of a design for manufacturing: deformed by their cages, in one piece, with outward
+normals.
+"""
 
 from __future__ import annotations
 
@@ -10,22 +12,23 @@ from optisense.geometry import TriangleMesh
 from optisense.workshop.thickened import thickened
 
 AIR = 1.0
-"""Refractive index of a part that is not made but left free."""
+"""Refractive index of a part that is not made but left empty."""
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A part to make.
+    """Part to make.
 
     Attributes:
-        name: of the part.
-        role: what it is for.
-        material: the design's name of its material, None for a coated or an absorbing part.
-        mesh: mm, in the frame of the design; corners that coincide are one vertex.
-        rest: the mesh before its cage bent it, None where none does.
-        cage: that bends it.
-        thickness: mm that a sheet is made with, None where it is none or that is not said.
-        sheet: the shape of such a sheet without its thickness.
+        name: name of the part.
+        role: role of the part.
+        material: name of its material in the design, None for a coated or an absorbing part.
+        mesh: mesh in the frame of the design, mm; coincident corners are one vertex.
+        rest: mesh before its cage deformed it, None if it has no cage.
+        cage: cage that deforms it.
+        thickness: thickness of a sheet for manufacturing, mm; None if it is no sheet or has no
+            thickness.
+        sheet: shape of such a sheet without its thickness.
     """
 
     name: str
@@ -39,26 +42,26 @@ class Shape:
 
     @property
     def is_solid(self) -> bool:
-        """Whether the mesh encloses a volume; else it is a sheet."""
+        """True if the mesh encloses a volume; else it is a sheet."""
         return self.mesh.is_closed
 
     @property
     def volume(self) -> float | None:
-        """mm^3 of a solid, None of a sheet."""
+        """Volume of a solid, mm^3; None for a sheet."""
         return abs(self.mesh.volume) if self.is_solid else None
 
 
 def is_air(design: SensorDesign, name: str) -> bool:
-    """Whether a part is a gap that the design draws, such as the film under a belt."""
+    """Return whether a part is a gap that the design contains, such as the air gap under a belt."""
     material = design.materials.get(design.parts[name].material or "")
     medium = None if material is None else material.medium()
     return medium is not None and medium.ior == AIR
 
 
 def shapes(design: SensorDesign) -> list[Shape]:
-    """All parts of a design but its indenters and those of air, in their current shape.
+    """Return all parts of a design except its indenters and those of air, in their current shape.
 
-    Sheets have the thickness that the design says they are made with.
+    Sheets have the thickness that the design gives for manufacturing.
 
     Raises:
         DesignError: a part has no mesh, or lies outside of the cage that deforms it.
@@ -85,7 +88,7 @@ def shapes(design: SensorDesign) -> list[Shape]:
 
 
 def _as_made(shape: Shape, thickness: float | None) -> Shape:
-    """A sheet as the plate that it is made of, where the design says how thick that is."""
+    """Return a sheet as the plate that it is made of, if the design gives its thickness."""
     if thickness is None or shape.is_solid or shape.role is Role.SENSING_SURFACE:
         return shape
     plate = thickened(shape.mesh, thickness)

@@ -1,7 +1,8 @@
 """Shapes as a STEP file, with the extra `step` (Open CASCADE through cadquery-ocp).
 
-Bodies of revolution, prisms and bent boxes are recognised and written with exact surfaces. The
-faces of all others are the triangles of their meshes; those that lie in one plane become one face.
+Bodies of revolution, prisms and deformed boxes are recognised and written with exact surfaces. The
+faces of all others are the triangles of their meshes; those that lie in one plane are merged into
+one face.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from optisense.workshop.shapes import Shape
 
 
 def require_step() -> None:
-    """Find out whether STEP files can be written.
+    """Check whether STEP files can be written.
 
     Raises:
         SetupError: the extra is not installed.
@@ -37,14 +38,14 @@ def require_step() -> None:
 
 
 def write_step(path: Path, shapes: Sequence[Shape], title: str = "sensor") -> list[str]:
-    """Write a STEP file (AP214, mm): an assembly of a product for each shape, in their colours.
+    """Write a STEP file (AP214, mm): an assembly with a product for each shape, in its colour.
 
     Returns:
-        Which shapes stay cut into triangles, a sentence each.
+        Notes on shapes that remain triangulated, one sentence each.
 
     Raises:
         SetupError: the extra is not installed.
-        OutputError: it can't be written.
+        OutputError: the file can't be written.
     """
     require_step()
     from OCP.Interface import Interface_Static
@@ -77,7 +78,8 @@ def write_step(path: Path, shapes: Sequence[Shape], title: str = "sensor") -> li
         colours.SetColor(label, _colour(shape), XCAFDoc_ColorGen)
     tool.UpdateAssemblies()
     writer = STEPCAFControl_Writer()
-    # Without curves in the parameters of surfaces, which readers work out, files are half as large.
+    # Without curves in the parameter space of surfaces, which readers can compute, files are half
+    # as large.
     Interface_Static.SetIVal_s("write.surfacecurve.mode", 0)
     writer.SetNameMode(True)
     writer.SetColorMode(True)
@@ -100,7 +102,7 @@ def _name(label: Any, text: str) -> None:
 
 
 def _colour(shape: Shape) -> Any:
-    """As parts of its role are drawn elsewhere."""
+    """Return the colour in which parts of its role are drawn elsewhere."""
     from OCP.Quantity import Quantity_Color, Quantity_TOC_sRGB
 
     hexadecimal = ROLE_LOOKS[shape.role.value][0].lstrip("#")
@@ -109,7 +111,7 @@ def _colour(shape: Shape) -> Any:
 
 
 def _sign(writer: Any) -> None:
-    """Say in the file's head which program wrote it, instead of a placeholder."""
+    """Write the name of the program into the file's head, instead of a placeholder."""
     from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
     from OCP.TCollection import TCollection_HAsciiString
 
@@ -120,9 +122,9 @@ def _sign(writer: Any) -> None:
 
 
 def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:
-    """The bodies of a closed mesh that holds several: each its outside first, then its cavities.
+    """Return the bodies of a closed mesh: for each its outside first, then its cavities.
 
-    A cavity faces inward, so that the volume it encloses counts against its body's; it belongs to
+    A cavity's normals point inward, so that its volume is subtracted from its body's; it belongs to
     the smallest body around it.
     """
     everything = np.arange(len(mesh.faces))
@@ -137,7 +139,7 @@ def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:
 
 
 def _boundary(shape: Shape) -> Any:
-    """A solid, several of them, or the shell of a sheet."""
+    """Return a solid, several solids, or the shell of a sheet."""
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeSolid
 
     if not shape.is_solid:
@@ -152,7 +154,7 @@ def _boundary(shape: Shape) -> Any:
 
 
 def _shell(mesh: TriangleMesh, closed: bool) -> Any:
-    """A shell with a face for each flat piece of a mesh."""
+    """Return a shell with a face for each flat piece of a mesh."""
     from OCP.BRep import BRep_Builder
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeShapeOnMesh
     from OCP.ShapeUpgrade import ShapeUpgrade_UnifySameDomain

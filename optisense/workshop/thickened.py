@@ -13,24 +13,26 @@ from optisense.geometry.common_space import as_manifold
 FloatArray = NDArray[np.float64]
 
 LONGEST_MITRE = 3.0
-"""Times the thickness that a corner of the far face may lie off the near one; the mitre of two
-faces that stand at 40 degrees to one another is 2.9 times as long."""
+"""Largest distance of a corner of the far face from the near one, in thicknesses; the mitre of two
+faces at 40 degrees to one another is 2.9 times as long.
+"""
 
 SAME_NORMAL = 1e-9
-"""Squared share of the largest singular value below which normals count as dependent: two faces at
-less than 0.002 degrees to one another are one plane."""
+"""Squared ratio to the largest singular value below which normals count as dependent: two faces at
+less than 0.002 degrees to one another are one plane.
+"""
 
 
 def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh | None:
-    """The plate behind a sheet; None where no closed plate comes of it.
+    """Return the plate behind a sheet, or None if the plate is not closed.
 
     The sheet stays the plate's near face, to which its normals point. The far face is parallel to
     it, mitred at edges. Pieces that meet in an edge of more than two faces are made one by one and
     joined.
 
     Args:
-        mesh: open, with corners that coincide as one vertex.
-        thickness: mm.
+        mesh: open mesh, with coincident corners as one vertex.
+        thickness: thickness, mm.
     """
     plates = [_plate(mesh.with_faces(mesh.faces[piece]).compacted(), thickness)
               for piece in _pieces(mesh)]  # fmt: skip
@@ -50,7 +52,9 @@ def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh | None:
 
 
 def _pieces(mesh: TriangleMesh) -> list[NDArray[np.int64]]:
-    """The faces of each piece: joined where exactly two faces, wound alike, share an edge."""
+    """Return the faces of each piece; pieces are joined where exactly two faces with the same
+    winding share an edge.
+    """
     ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     owner = np.tile(np.arange(len(mesh.faces)), 3)
     _, inverse, counts = np.unique(
@@ -60,7 +64,7 @@ def _pieces(mesh: TriangleMesh) -> list[NDArray[np.int64]]:
     order = np.argsort(inverse, kind="stable")
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])[counts == 2]
     one, other = order[starts], order[starts + 1]
-    alike = ends[one, 0] == ends[other, 1]  # each runs along the edge the other way
+    alike = ends[one, 0] == ends[other, 1]  # each runs along the edge in the opposite direction
     pairs = owner[one[alike]], owner[other[alike]]
     shape = (len(mesh.faces), len(mesh.faces))
     matrix = coo_matrix((np.ones(int(alike.sum())), pairs), shape)
@@ -69,7 +73,7 @@ def _pieces(mesh: TriangleMesh) -> list[NDArray[np.int64]]:
 
 
 def _plate(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
-    """The closed plate of one piece."""
+    """Return the closed plate of one piece."""
     count = len(mesh.vertices)
     far = mesh.vertices + _offsets(mesh, thickness)
     ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
@@ -83,8 +87,9 @@ def _plate(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
 
 
 def _offsets(mesh: TriangleMesh, thickness: float) -> FloatArray:
-    """(n, 3) mm from each vertex to the far face, which is `thickness` behind the plane of each of
-    its faces, as nearly as that can be."""
+    """Return the displacement from each vertex to the far face, (n, 3) mm, which is `thickness`
+    behind the plane of each of its faces, in the least-squares sense.
+    """
     result = np.empty_like(mesh.vertices)
     normals = mesh.face_normals
     corners = mesh.faces.reshape(-1)

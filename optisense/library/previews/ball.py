@@ -1,7 +1,7 @@
-"""A ball of a material on a chequered floor, by a small ray tracer of its own.
+"""Ball of a material on a chequered floor, drawn by a small ray tracer.
 
 It follows the laws of the simulation (Fresnel, GGX facets, the blend of a coating), but draws in
-about a second and without the renderer. Light that is reflected within a clear ball is left out.
+about a second and without the renderer. Light that is reflected within a clear ball is ignored.
 """
 
 from __future__ import annotations
@@ -27,19 +27,21 @@ SMOOTH = 1e-3
 """GGX alpha below which a face is drawn as a plain mirror; its lobe is narrower than a pixel."""
 
 SHARP = 0.25
-"""Below this roughness lamps are found by sampled rays, above it they are points."""
+"""Roughness below which lamps are found by sampled rays; above it they are points."""
 
 SAMPLES_SMOOTH, SAMPLES_ROUGH = 6, 20
 """Number of rays per pixel at smooth and at rough faces, where they scatter more."""
 
 STEPS = np.array([0.7548776662466927, 0.5698402909980532])
-"""Added again and again, modulo 1, these fill the unit square evenly (Roberts, R2 sequence)."""
+"""Steps of a sequence that, added repeatedly modulo 1, fills the unit square evenly (Roberts, R2
+sequence).
+"""
 
 
 def picture_of_ball(
     material: Material | CoatingModel, size: int = 280, seed: int = 0
 ) -> NDArray[np.uint8]:
-    """(size, size, 3) sRGB picture of a ball of the material."""
+    """Return a picture (size, size, 3) in sRGB of a ball of the material."""
     offsets = np.random.default_rng(seed).random((size * size, 4))
     medium, surface = medium_of(material), material.reflection()
     studio = white_studio(1.0 if medium is None else 0.3)
@@ -69,14 +71,18 @@ def picture_of_ball(
 
 
 def _even(offset: FloatArray, number: int) -> FloatArray:
-    """(n, 2) the points of a sample's number in the unit square, shifted by (n, 2) offsets."""
+    """Return the points of a sample's number in the unit square, (n, 2), shifted by offsets
+    (n, 2).
+    """
     return np.asarray((offset + number * STEPS) % 1.0)
 
 
 def _camera_rays(
     pixels: NDArray[np.intp], size: int, within: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Starts and unit directions of a ray through each pixel, (n, 3) each; `within` is where."""
+    """Return starts and unit directions of a ray through each pixel, (n, 3) each; `within` is the
+    position in the pixel.
+    """
     start = np.array([0.0, -6.0, 1.6])
     forward = -start / np.linalg.norm(start)
     right = np.array([1.0, 0.0, 0.0])
@@ -90,18 +96,18 @@ def _camera_rays(
 
 
 def _passing(start: FloatArray, towards: FloatArray) -> FloatArray:
-    """(n,) squared distance at which rays pass the middle of the ball."""
+    """Return the squared distances (n,) at which rays pass the middle of the ball."""
     along = np.einsum("ij,ij->i", start, towards)
     return np.asarray(np.einsum("ij,ij->i", start, start) - along**2)
 
 
 def medium_of(material: Material | CoatingModel) -> Medium | None:
-    """The medium inside a ball of the material; None where it is opaque."""
+    """Return the medium inside a ball of the material; None if it is opaque."""
     return material.medium() if isinstance(material, Material) else None
 
 
 def _samples(medium: Medium | None, surface: Reflection) -> int:
-    """How many rays a pixel needs: more where rays are scattered and lamps found by chance."""
+    """Return the number of rays per pixel: more if rays are scattered and lamps found by chance."""
     alpha = surface.roughness if medium is None else medium.roughness
     by_chance = alpha < SHARP or medium is not None
     return SAMPLES_ROUGH if alpha >= SMOOTH and by_chance else SAMPLES_SMOOTH
@@ -115,7 +121,7 @@ def _from_ball(
     studio: Studio,
     u: FloatArray,
 ) -> FloatArray:
-    """(n, 3) radiance that leaves the ball's surface towards the camera."""
+    """Return the radiance (n, 3) that leaves the ball's surface towards the camera."""
     if medium is not None:
         return _through(place, towards, medium, studio, u)
     if surface.is_black:
@@ -140,7 +146,9 @@ def _metal(
     studio: Studio,
     u: FloatArray,
 ) -> FloatArray:
-    """Reflected by metal facets; the lamps by their angle where the facets are rough."""
+    """Return the radiance reflected by metal facets; for rough facets that of lamps by their
+    angle.
+    """
     view = _to_local(-towards, place)
     facet = _facets(view, alpha, u)
     cosine = np.einsum("ij,ij->i", view, facet)
@@ -164,7 +172,7 @@ def _metal(
 def _through(
     place: FloatArray, towards: FloatArray, glass: Medium, studio: Studio, u: FloatArray
 ) -> FloatArray:
-    """Mirrored by the front of a clear ball, and refracted through it."""
+    """Return the radiance reflected by the front of a clear ball, and refracted through it."""
     alpha = glass.roughness
     view = _to_local(-towards, place)
     facet = _facets(view, alpha, u)
@@ -185,7 +193,7 @@ def _through(
 
 
 def _refracted(view: FloatArray, facet: FloatArray, cosine: FloatArray, eta: float) -> FloatArray:
-    """(n, 3) directions behind facets, by Snell's law; grazing where there is none."""
+    """Return the directions (n, 3) behind facets by Snell's law; grazing if there is none."""
     sine2 = np.minimum((1.0 - cosine**2) / eta**2, 1.0)
     bent: FloatArray = (cosine / eta - np.sqrt(1.0 - sine2))[:, None] * facet - view / eta
     return bent / np.linalg.norm(bent, axis=1, keepdims=True)
@@ -198,7 +206,7 @@ def _facets(view: FloatArray, alpha: float, u: FloatArray) -> FloatArray:
 
 
 def _axes(normal: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit directions along the surface (Duff et al., JCGT 6, 2017)."""
+    """Return two unit directions along the surface (Duff et al., JCGT 6, 2017)."""
     x, y, z = normal.T
     sign = np.where(z < 0.0, -1.0, 1.0)
     a = -1.0 / (sign + z)

@@ -1,4 +1,4 @@
-"""The picture of a camera: the angles it sees, and what it covers of a plane at a distance."""
+"""Preview of a camera: its angles of view, and the area that it covers of a plane at a distance."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 DISTANCES = (40.0, 20.0, 10.0)
-"""Distances in mm in front of the pupil at which the preview draws the camera's field."""
+"""Distances in front of the pupil at which the preview draws the camera's field, mm."""
 
 STEEPEST = 80.0
-"""Degrees from the axis up to which a footprint is drawn."""
+"""Largest angle from the axis up to which a footprint is drawn, degrees."""
 
 
 def border_directions(camera: CameraModel, points: int = 64) -> FloatArray:
-    """(4 points, 3) unit directions of the image's border: x right, y up, z ahead.
+    """Return unit directions (4 points, 3) of the image's border: x right, y up, z ahead.
 
-    An equidistant camera's angle from the axis is proportional to the distance from the
-    picture's middle; both projections see `fov` across the width.
+    An equidistant camera's angle from the axis is proportional to the distance from the picture's
+    middle; both projections see `fov` across the width.
     """
     width, height = camera.resolution
     t = np.linspace(-1.0, 1.0, points, endpoint=False)
@@ -45,9 +45,10 @@ def border_directions(camera: CameraModel, points: int = 64) -> FloatArray:
 
 
 def footprint(camera: CameraModel, distance: float) -> FloatArray:
-    """(n, 2) mm: the border of what is seen of a plane across the axis, no refraction.
+    """Return the border of the visible area of a plane across the axis, without refraction, (n, 2)
+    mm.
 
-    Beyond `STEEPEST` degrees from the axis the border is cut, as it runs away to infinity.
+    Beyond `STEEPEST` degrees from the axis the border is cut, as it extends to infinity.
     """
     directions = border_directions(camera)
     side = np.hypot(directions[:, 0], directions[:, 1])
@@ -56,7 +57,9 @@ def footprint(camera: CameraModel, distance: float) -> FloatArray:
 
 
 def footprint_size(camera: CameraModel, distance: float) -> tuple[float, float]:
-    """mm: width and height of what is seen of a plane across the axis, through its middle."""
+    """Return width and height of the visible area of a plane across the axis, through its middle,
+    mm.
+    """
     wide, high, _ = camera.angles()
     angles = np.minimum(np.array([wide, high]) / 2.0, STEEPEST)
     width, height = 2.0 * distance * np.tan(np.radians(angles))
@@ -70,7 +73,7 @@ def draw_camera(figure: Figure, camera: CameraModel) -> None:
 
 
 def _angles(axes: Axes, camera: CameraModel) -> None:
-    """Wedges of the angles across, from above: the diagonal, the width and the height."""
+    """Draw wedges of the angles across, from above: the diagonal, the width and the height."""
     from matplotlib.patches import Wedge
 
     wide, high, diagonal = camera.angles()

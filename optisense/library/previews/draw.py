@@ -1,4 +1,4 @@
-"""One picture for each kind of entry."""
+"""Preview picture of an entry, by its kind."""
 
 from __future__ import annotations
 
@@ -16,14 +16,16 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 110
-"""Resolution of the pictures, at which their letters are easy to read on a usual screen."""
+"""Resolution of the pictures in dots per inch, at which letters are easy to read on a usual
+screen.
+"""
 
 LONGEST = 130
 """Number of characters of a description that fit across the picture."""
 
 
 def draw(name: str, entry: AnyEntry) -> Figure:
-    """The preview picture of an entry: 990 x 450 pixels when saved by `save`.
+    """Return the preview picture of an entry: 990 x 450 pixels when saved by `save`.
 
     Raises:
         LibraryError: the IES file of a light is missing or malformed.
@@ -49,7 +51,7 @@ def save(figure: Figure, path: Path) -> None:
     """Write a figure as PNG, whole or not at all.
 
     Raises:
-        OutputError: it can't be written.
+        OutputError: the file can't be written.
     """
     with written_whole(path, "the picture", "Choose another file after --out") as temporary:
         figure.savefig(temporary, format="png", dpi=DOTS_PER_INCH)

@@ -1,4 +1,4 @@
-"""The picture of a light: its intensity by angle, and its package and window to scale."""
+"""Preview of a light: its intensity by angle, and its package and window to scale."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LEGEND_COLOURS = 4
 
 
 def equivalent_solid_angle(emitter: LightModel) -> float:
-    """Steradians: the flux of a light divided by its largest intensity."""
+    """Return the flux of a light divided by its largest intensity, steradians."""
     edges = np.linspace(0.0, 180.0, 3601)
     middle = 0.5 * (edges[1:] + edges[:-1])
     turns = np.arange(72) * 5.0
@@ -40,7 +40,7 @@ def draw_light(figure: Figure, entry: LightEntry) -> None:
 
 
 def _intensity(axes: Any, entry: LightEntry) -> str:
-    """Draw intensity by angle, and return the text above it."""
+    """Draw the intensity by angle, and return the text above it."""
     emitter: LightModel = entry.value
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
@@ -68,7 +68,7 @@ def _intensity(axes: Any, entry: LightEntry) -> str:
 
 
 def colour_facts(entry: LightEntry) -> list[str]:
-    """A line for each colour: wavelength, flux at its current, and its peak intensity."""
+    """Return a line for each colour: wavelength, flux at its current, and its peak intensity."""
     solid_angle = equivalent_solid_angle(entry.value)
     return [
         ", ".join(_facts(name, colour, solid_angle))
@@ -85,7 +85,7 @@ def _facts(name: str, colour: TypicalLight, solid_angle: float) -> list[str]:
 
 
 def _front(axes: Axes, entry: LightEntry) -> None:
-    """The package and its window seen from the front, in mm."""
+    """Draw the package and its window seen from the front, in mm."""
     from matplotlib.patches import Ellipse, Rectangle
 
     emitter: LightModel = entry.value

@@ -1,4 +1,4 @@
-"""The picture of a material or coating: a ball of it, and what it does to light by angle."""
+"""Preview of a material or coating: a ball of it, and its reflectance or scattering by angle."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 
 RGB = (("red", "#d62728"), ("green", "#2ca02c"), ("blue", "#1f5fd0"))
 INCIDENCE = 45.0
-"""Degrees from the normal at which the light comes in the picture of a lobe."""
+"""Angle of incidence in the picture of a lobe, degrees from the normal."""
 
 
 def draw_material(figure: Figure, material: Material | CoatingModel) -> None:
@@ -87,11 +87,13 @@ def _reflectance_of_metal(axes: Axes, metal: Reflection) -> None:
 
 
 def lobes(surface: Reflection, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Light scattered in the plane of incidence, per steradian: reflectance times cosine.
+    """Return the light scattered in the plane of incidence, per steradian: reflectance times
+    cosine.
 
     Args:
-        surface: as seen in the medium before it.
-        angle: (n,) degrees from the normal, positive beyond it from where the light comes.
+        surface: reflection in the medium before the surface.
+        angle: angles (n,) from the normal, degrees, positive on the side away from the incident
+            light.
 
     Returns:
         The diffuse part and the metallic part, (n, 3) each, for R, G, B.
@@ -111,7 +113,7 @@ def lobes(surface: Reflection, angle: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def _lobes(axes: Any, material: Material | CoatingModel) -> str:
-    """Draw where light goes, and return the text above it."""
+    """Draw the scattering lobes, and return the text above them."""
     axes.set_theta_zero_location("N")
     axes.set_theta_direction(-1)
     axes.set(thetamin=-90, thetamax=90)

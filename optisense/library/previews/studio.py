@@ -1,4 +1,4 @@
-"""The surroundings of the preview ball: a chequered floor, an even sky and soft lamps."""
+"""Surroundings of the preview ball: a chequered floor, a uniform sky and soft lamps."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ FloatArray = NDArray[np.float64]
 FLOOR = -1.0
 """Height of the chequered floor, in radii of the ball, whose middle is at 0."""
 SQUARE = 0.6
-"""Side of a square of the floor in radii of the ball; about three squares are seen below it."""
+"""Side of a square of the floor, in radii of the ball; about three squares are visible below it."""
 DARK, BRIGHT = 0.16, 0.62
 """Reflectance of the dark and of the bright squares of the floor."""
 
 
 @dataclass(frozen=True)
 class DistantLamp:
-    """A round, far lamp.
+    """Round, distant lamp.
 
     Attributes:
-        direction: (3,) unit vector towards it.
-        radiance: (3,) of R, G, B.
-        radius: degrees, where it has faded to half.
+        direction: unit vector (3,) towards it.
+        radiance: radiance (3,) at R, G, B.
+        radius: angular radius at which it has faded to half, degrees.
     """
 
     direction: FloatArray
@@ -33,11 +33,11 @@ class DistantLamp:
 
     @property
     def solid_angle(self) -> float:
-        """Steradians."""
+        """Solid angle, steradians."""
         return float(2.0 * np.pi * (1.0 - np.cos(np.radians(self.radius))))
 
     def seen(self, towards: FloatArray) -> FloatArray:
-        """(n, 3) radiance along (n, 3) unit directions."""
+        """Return the radiance (n, 3) along unit directions (n, 3)."""
         angle = np.degrees(np.arccos(np.clip(towards @ self.direction, -1.0, 1.0)))
         t = np.clip((1.15 * self.radius - angle) / (0.3 * self.radius), 0.0, 1.0)
         return np.asarray((t * t * (3.0 - 2.0 * t))[:, None] * self.radiance)
@@ -45,13 +45,13 @@ class DistantLamp:
 
 @dataclass(frozen=True)
 class Studio:
-    """The surroundings of the ball, which has radius 1 and sits at the origin.
+    """Surroundings of the ball, which has radius 1 and is at the origin.
 
     Attributes:
-        lamps: the lamps.
-        sky: radiance straight up; half of it on the horizon.
-        floor: how much the floor is dimmed.
-        solid: how dark the ball's shadow is, 0 to 1.
+        lamps: lamps.
+        sky: radiance of the zenith; half of it on the horizon.
+        floor: factor on the radiance of the floor.
+        solid: darkness of the ball's shadow, 0 to 1.
     """
 
     lamps: list[DistantLamp]
@@ -60,7 +60,7 @@ class Studio:
     solid: float
 
     def radiance(self, start: FloatArray, towards: FloatArray, lamps: bool = True) -> FloatArray:
-        """(n, 3) radiance that arrives at (n, 3) points from (n, 3) unit directions."""
+        """Return the radiance (n, 3) that arrives at points (n, 3) from unit directions (n, 3)."""
         height = towards[:, 2]
         light = np.repeat((self.sky * (0.5 + 0.5 * np.clip(height, 0, 1)))[:, None], 3, axis=1)
         if lamps:
@@ -78,7 +78,9 @@ class Studio:
         return light
 
     def irradiance(self, normal: FloatArray) -> FloatArray:
-        """(n, 3) light on a face of each (n, 3) unit normal; lamps as points of their size."""
+        """Return the irradiance (n, 3) on a face for each unit normal (n, 3); lamps count as points
+        of their solid angle.
+        """
         up = 0.5 * (1.0 + normal[:, 2])  # the share of the sky that the face sees
         floor = 0.5 * (DARK + BRIGHT) * self.floor * (1.0 - 0.5 * self.solid)
         even = np.pi * (up * 0.8 * self.sky + (1.0 - up) * floor)
@@ -97,12 +99,14 @@ def _lamp(
 
 
 def white_studio(solid: float) -> Studio:
-    """One white lamp, for materials."""
+    """Return a studio with one white lamp, for materials."""
     return Studio([_lamp((-0.5, -0.6, 0.62), [3.2] * 3, 17.0)], sky=0.62, floor=1.0, solid=solid)
 
 
 def coloured_studio() -> Studio:
-    """A red, a green and a blue lamp around the view, for coatings: as in a sensor."""
+    """Return a studio with a red, a green and a blue lamp around the view, for coatings, as in a
+    sensor.
+    """
     lamps = [
         _lamp((-0.86, -0.45, 0.20), [5.0, 0.1, 0.1], 19.0),
         _lamp((0.86, -0.45, 0.20), [0.1, 4.0, 0.1], 19.0),
