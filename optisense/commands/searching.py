@@ -88,7 +88,7 @@ class SearchOptions(CommandOptions):
 
         rules = [UserRule(text) for text in self.rules]
         for rule in rules:
-            rule.load()  # a missing file is an error now, and not in trials
+            rule.loaded  # noqa: B018  a missing file is an error now, and not in trials
         space = SearchSpace(parse_space(self.vary), rules)
         errors = parse_errors(self.errors) if self.errors else None
         names = ("method", "options", "budget", "seed", "settings", "samples")

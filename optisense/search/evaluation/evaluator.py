@@ -7,6 +7,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -35,6 +36,7 @@ from optisense.search.space.buildable import (
     StaysInSize,
 )
 from optisense.search.space.constraints import Constraint, PartsApart, Unfolded, why_forbidden
+from optisense.search.space.pickling import PickledWithoutCaches
 from optisense.search.space.rigid_moves import PartShift, PartTurn
 from optisense.search.space.search_space import BoundSpace
 
@@ -77,7 +79,7 @@ class Evaluator(Protocol):
         """
 
 
-class DesignEvaluator:
+class DesignEvaluator(PickledWithoutCaches):
     """Scores points by objectives: the evaluator of all methods that bring none of their own.
 
     Attributes:
@@ -142,8 +144,6 @@ class DesignEvaluator:
         if any(name.startswith("cages.") for name in space.names):
             self.constraints.append(Unfolded(space.design))
         self.keeper = ModelKeeper(variant)
-        self._resolved: list[Objective] | None = None
-        self._needed: list[Objective] | None = None
         self.renders = bool(self._objectives or self.requirements)
         self.kept: list[Constraint] = []
         if keeps:
@@ -152,7 +152,6 @@ class DesignEvaluator:
         self._least_skin: float | None = None
         self._watches = keeps and self.renders and may_change_view(space.names)
         self.variant = variant
-        self._progress: ProgressCallback | None = None
         self._check_settings()
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
@@ -206,8 +205,8 @@ class DesignEvaluator:
         """
         if not self.renders:
             return None
-        shared, _ = split_settings(self.settings, self._ready())
-        names = [each.name for each in self._ready()]
+        shared, _ = split_settings(self.settings, self._ready)
+        names = [each.name for each in self._ready]
         return usual_score(self.space.design, names, Settings(**shared))
 
     def usual_trials(self) -> UsualTrials | None:
@@ -243,10 +242,10 @@ class DesignEvaluator:
                 self._least_skin = least_skin(self.space.design, self.keeper)
             settings["least_skin"] = self._least_skin
         model = self.keeper.model(design)
-        wanted = self._ready()
+        wanted = self._ready
         if only is not None:
             wanted = [each for each in wanted if each.name in only]
-            shared, own = split_settings(settings, self._ready())
+            shared, own = split_settings(settings, self._ready)
             settings = {**shared, **{k: v for each in wanted for k, v in own[each.name].items()}}
         return evaluate(model, wanted, progress=self._progress, seed=seed, **settings)
 
@@ -264,7 +263,7 @@ class DesignEvaluator:
             scores[name] = value
         if self.renders:
             found = self.objective_scores(design, seed)
-            needed = {each.name for each in self._wanted()}
+            needed = {each.name for each in self._wanted}
             for name, score in found.items():
                 if name in scores:
                     scores[name], parts[name] = score.value, score.to_dict()["parts"]
@@ -298,26 +297,25 @@ class DesignEvaluator:
         if self.renders and may_change_view(names) and design.parts_of(Role.MIRROR):
             self.kept.append(SameMirrors(design, self.keeper))
 
+    @cached_property
     def _ready(self) -> list[Objective]:
         """Return the objectives of goals and conditions, and those of `WATCHES`, each once.
 
         A user's file is run once per process and not once per trial.
         """
-        if self._resolved is None:
-            watched = [find(name) for name in WATCHES] if self._watches else []
-            every = [*self._wanted(), *watched]
-            self._resolved = list({each.name: each for each in every}.values())
-        return self._resolved
+        watched = [find(name) for name in WATCHES] if self._watches else []
+        return list({each.name: each for each in [*self._wanted, *watched]}.values())
 
+    @cached_property
     def _wanted(self) -> list[Objective]:
         """Return the objectives of goals and conditions."""
-        if self._needed is None:
-            goals = [goal_of(each) for each in self._objectives]
-            self._needed = [*goals, *(each.objective() for each in self.requirements)]
-        return self._needed
+        goals = [goal_of(each) for each in self._objectives]
+        return [*goals, *(each.objective() for each in self.requirements)]
 
-    def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_resolved": None, "_needed": None, "_progress": None}
+    @cached_property
+    def _progress(self) -> ProgressCallback | None:
+        """Function that is called with the progress of a score in this process."""
+        return None
 
     def _check_settings(self) -> None:
         if not self.renders:
@@ -326,7 +324,7 @@ class DesignEvaluator:
             return
         if "seed" in self.settings:
             raise SearchError("the seed belongs to the study", hint="Give it as --seed")
-        shared, _ = split_settings(self.settings, self._ready())
+        shared, _ = split_settings(self.settings, self._ready)
         Settings(**shared)
 
 

@@ -6,15 +6,17 @@ same scores when it is resumed or shared among workers.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 from optisense.design import SensorDesign
+from optisense.search.space.pickling import PickledWithoutCaches
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 
-class ModelKeeper:
+class ModelKeeper(PickledWithoutCaches):
     """Keeper of the optical model for designs that are variations of one design."""
 
     def __init__(self, variant: str = "auto") -> None:
@@ -24,7 +26,6 @@ class ModelKeeper:
             variant: variant of the renderer.
         """
         self.variant = variant
-        self._model: OpticalModel | None = None
 
     def model(self, design: SensorDesign) -> OpticalModel:
         """Return the model of a design. It replaces the model returned before, which must no longer
@@ -41,5 +42,7 @@ class ModelKeeper:
             self._model.set_design(design)
         return self._model
 
-    def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_model": None}
+    @cached_property
+    def _model(self) -> OpticalModel | None:
+        """Model that was built last; None before the first one."""
+        return None

@@ -14,6 +14,7 @@ import time
 import zlib
 from collections.abc import Iterator, Sequence
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray
 from optisense.search.methods.jacobian import Jacobian, holds, jacobian
 from optisense.search.methods.smooth_scores import SmoothScore
+from optisense.search.space.pickling import PickledWithoutCaches
 from optisense.search.space.search_space import BoundSpace
 
 if TYPE_CHECKING:
@@ -113,7 +115,7 @@ class _Check(NamedTuple):
     typical: float
 
 
-class SlopeEvaluator:
+class SlopeEvaluator(PickledWithoutCaches):
     """Evaluator that scores a point as usual, and adds the smoothed values and gradients of the
     score and of the quantities that conditions limit.
     """
@@ -144,7 +146,6 @@ class SlopeEvaluator:
         limited = [each.objective().name for each in usual.requirements]
         self.wanted = [objective, *limited]
         self._smooth = [None if layers else SmoothScore.of(name) for name in self.wanted]
-        self._jacobian: Jacobian | None = None
         self._contradicted: bool | None = None
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
@@ -254,8 +255,6 @@ class SlopeEvaluator:
         rays = self._rays(design, self.parts)
         # The Jacobian of the start serves all points where shapes move linearly. It may not be
         # that of whichever point came first: a study that is resumed would differ in rounding.
-        if self._jacobian is None:
-            self._jacobian = jacobian(space, space.start, self.parts)
         moves = self._jacobian
         if not holds(moves, space, design, vector):
             moves = jacobian(space, np.array(vector, dtype=np.float64), self.parts)
@@ -399,8 +398,11 @@ class SlopeEvaluator:
         size = self.resolution, max(1, round(self.resolution * height / width))
         return self.usual.keeper.model(design).differentiable_rays(moving, size)
 
-    def __getstate__(self) -> dict[str, object]:
-        return {**self.__dict__, "_jacobian": None}
+    @cached_property
+    def _jacobian(self) -> Jacobian:
+        """Jacobian of the starting point."""
+        space = self.usual.space
+        return jacobian(space, space.start, self.parts)
 
 
 class _ContradictedError(Exception):

@@ -12,6 +12,7 @@ import re
 from collections import OrderedDict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from optisense.design import SensorDesign
@@ -91,7 +92,6 @@ class RelitEvaluator(DesignEvaluator):
             requirements=[str(each) for each in usual.requirements],
             variant=usual.variant,
         )
-        self._lit: OrderedDict[int, _Lit] = OrderedDict()
 
     def objective_scores(
         self, design: SensorDesign, seed: int, only: Collection[str] | None = None
@@ -101,7 +101,7 @@ class RelitEvaluator(DesignEvaluator):
             while len(self._lit) >= KEPT_SEEDS:
                 self._lit.popitem(last=False)
             model = self.keeper.model(self.space.prepared)
-            self._lit[seed] = _Lit(model, self._ready(), self.settings, seed, self._progress)
+            self._lit[seed] = _Lit(model, self._ready, self.settings, seed, self._progress)
         self._lit.move_to_end(seed)
         return self._lit[seed].scores(design, only)
 
@@ -115,8 +115,10 @@ class RelitEvaluator(DesignEvaluator):
         trial = RELIGHTING_SHARE * (usual.images + usual.judging)
         return UsualTrials.of(usual, trial, trial)
 
-    def __getstate__(self) -> dict[str, object]:
-        return {**super().__getstate__(), "_lit": OrderedDict()}
+    @cached_property
+    def _lit(self) -> OrderedDict[int, _Lit]:
+        """Images and objectives of the last seeds, by the seed."""
+        return OrderedDict()
 
 
 class _Lit:

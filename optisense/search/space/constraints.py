@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.errors import SearchError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.crossings import crossings
+from optisense.search.space.pickling import PickledWithoutCaches
 
 Constraint = Callable[[SensorDesign], bool | str | None]
 """Function that forbids designs: it returns False, or a text with the reason, for a forbidden
@@ -102,7 +104,7 @@ class Unfolded:
         return new[0].message if new else None
 
 
-class UserRule:
+class UserRule(PickledWithoutCaches):
     """Function in a user's Python file, loaded when it is first called."""
 
     def __init__(self, text: str) -> None:
@@ -115,34 +117,28 @@ class UserRule:
         if not colon or not file.endswith(".py") or not self.function:
             raise SearchError(f"'{text}' names no rule", hint="Write FILE.py:FUNCTION")
         self.path = Path(os.path.realpath(file))
-        self._loaded: Constraint | None = None
 
     def __call__(self, design: SensorDesign) -> bool | str | None:
         """Return the result of the user's function for a design."""
-        return self.load()(design)
-
-    def __getstate__(self) -> dict[str, object]:
-        return {"path": self.path, "function": self.function, "_loaded": None}
+        return self.loaded(design)
 
     def __str__(self) -> str:
         return f"{self.path}:{self.function}"
 
-    def load(self) -> Constraint:
-        """Run the file, once, and return the function.
+    @cached_property
+    def loaded(self) -> Constraint:
+        """Function in the file, which is run once.
 
         Raises:
             SearchError, ObjectiveError: the file or the function is missing, or the file fails.
         """
-        if self._loaded is not None:
-            return self._loaded
         from optisense.objectives.files import run_file
 
         content = run_file(self.path)
         found = content.get(self.function)
         if not callable(found):
             raise SearchError(f"the file has no function '{self.function}'", where=str(self.path))
-        self._loaded = found
-        return self._loaded
+        return found
 
 
 def why_forbidden(design: SensorDesign, constraints: Sequence[Constraint]) -> str | None:
