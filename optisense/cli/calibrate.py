@@ -14,7 +14,7 @@ from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CalibrateOptions, read_range
 from optisense.time_left import TimedStep
-from optisense.writing import write_json, written_together
+from optisense.writing import write_json, write_text, written_together
 
 if TYPE_CHECKING:
     from optisense.calibration.realism import Realism
@@ -50,7 +50,7 @@ def calibrate(
         from optisense.calibration.families import FAMILIES, chosen_families
         from optisense.calibration.kept_renderings import KeptRenderings
         from optisense.calibration.settings import CalibrationSettings
-        from optisense.report.calibration import write_calibration
+        from optisense.report.calibration import render_calibration
         from optisense.sensors import load, save_design
 
         for option, names in (("--keep", options.keep), ("--also", options.also)):
@@ -92,7 +92,7 @@ def calibrate(
             messages.print("interrupted: the same command goes on with what is rendered")
             raise typer.Exit(EXIT_INTERRUPTED) from None
         with written_together("the calibration") as stage:
-            write_calibration(stage(out / PAGE_FILE), found)
+            write_text(stage(out / PAGE_FILE), render_calibration(found))
             write_json(stage(out / JSON_FILE), found.as_data())
             save_design(found.design, out)
         kept.remove()

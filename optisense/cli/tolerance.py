@@ -140,11 +140,11 @@ def _waits(last: list[tuple[int, float]]) -> str:
 
 
 def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
-    from optisense.report.tolerance import write_tolerance_report
+    from optisense.report.tolerance import render_tolerance
 
     write_text(folder / JSON_FILE, text + "\n")
     if report:
-        write_tolerance_report(folder / REPORT_FILE, found)
+        write_text(folder / REPORT_FILE, render_tolerance(found))
     else:  # a page of earlier figures would contradict these
         remove_own_page(folder / REPORT_FILE, "tolerance")
 

@@ -134,12 +134,13 @@ def compare(
         found = compared_by_objects((models[0], models[1]), settings, names, show)
         compared = Compared(found, conditions_of(first, trial) if second is None else [])
         if out is not None:
-            from optisense.report.verification import write_verification_report
+            from optisense.report.verification import render_verification
 
             text = json.dumps(compared.to_dict(), indent=2, allow_nan=False)
             write_text(out / JSON_FILE, text + "\n")
             first_axes, second_axes = (design.camera.axes() for design in designs)
-            write_verification_report(out / REPORT_FILE, found, (first_axes, second_axes))
+            page = render_verification(found, (first_axes, second_axes))
+            write_text(out / REPORT_FILE, page)
     return compared
 
 

@@ -15,7 +15,7 @@ from optisense.engine.rendering import OfDesign, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 from optisense.folders import hold
-from optisense.writing import write_json
+from optisense.writing import write_json, write_text
 
 
 class Calibrate(OfDesign, CalibrateOptions):
@@ -41,7 +41,7 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
     from optisense.calibration import read_photographs
     from optisense.calibration.calibrating import calibrate as fit_design
     from optisense.calibration.settings import CalibrationSettings
-    from optisense.report.calibration import write_calibration
+    from optisense.report.calibration import render_calibration
     from optisense.sensors import save_design
 
     for where, names in (("keep", fields.keep), ("also", fields.also)):
@@ -79,7 +79,7 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
         save_design(found.design, folder)
         write_json(folder / "calibration.json", found.as_data())
         page = folder / "calibration.html"
-        write_calibration(page, found)
+        write_text(page, render_calibration(found))
     finally:
         give_back()
     held = bool(found.held_out)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from optisense.calibration.realism import PATCH, Realism
 from optisense.calibration.result import Calibration
@@ -15,7 +14,6 @@ from optisense.report.comparison import (
     press_section,
 )
 from optisense.report.files import page
-from optisense.writing import write_text
 
 FIGURES = {
     "unexplained": "unexplained, patch of 1.35 radii",
@@ -35,18 +33,8 @@ READINGS = {
 """Figures of readings whose medians the page shows, with their labels."""
 
 
-def write_calibration(path: str | Path, found: Calibration) -> Path:
-    """Write a calibration as one self-contained HTML page.
-
-    Raises:
-        OutputError: the file can't be written.
-    """
-    write_text(Path(path), render_calibration(found))
-    return Path(path)
-
-
 def render_calibration(found: Calibration) -> str:
-    """Return the page of `write_calibration` as text."""
+    """Return a calibration as one self-contained HTML page."""
     before, after = found.before, found.after
     count = len(after.realism.presses)
     return page(

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,24 +23,13 @@ from optisense.report.files import page
 from optisense.search.space.manufacturing import unit_of
 from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
 from optisense.search.tolerance.sensitivity import Estimate
-from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-def write_tolerance_report(path: str | Path, tolerance: Tolerance) -> Path:
-    """Write a tolerance analysis as one self-contained HTML page.
-
-    Raises:
-        OutputError: the file can't be written.
-    """
-    write_text(Path(path), render_tolerance(tolerance))
-    return Path(path)
-
-
 def render_tolerance(tolerance: Tolerance) -> str:
-    """Return the page of `write_tolerance_report` as text."""
+    """Return a tolerance analysis as one self-contained HTML page."""
     design = tolerance.design
     return page(
         "tolerance",

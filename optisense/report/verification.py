@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from optisense.report.pictures import data_uri, normal_colours
 from optisense.tasks.paired_bootstrap import BETTER, UNKNOWN, WORSE, ErrorChange
 from optisense.tasks.press_readings import PressPictures
 from optisense.tasks.verification import Verification
-from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,28 +32,13 @@ SMALLEST_CROP = 40
 FloatArray = NDArray[np.float64]
 
 
-def write_verification_report(
-    path: str | Path, found: Verification, axes: tuple[FloatArray, FloatArray]
-) -> Path:
-    """Write a verification as one self-contained HTML page.
+def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]) -> str:
+    """Return a verification as one self-contained HTML page.
 
     Args:
-        path: path of the file, which is written whole or not at all.
         found: verification.
         axes: rows (3, 3) of each sensor's camera: image right, image up and viewing direction.
-
-    Returns:
-        The path.
-
-    Raises:
-        OutputError: the file can't be written.
     """
-    write_text(Path(path), render_verification(found, axes))
-    return Path(path)
-
-
-def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]) -> str:
-    """Return the page of `write_verification_report` as text."""
     settings = found.settings
     reading = settings.reading
     return page(

@@ -21,14 +21,14 @@ from optisense.objectives import Evaluation, Objective, Score, Settings
 from optisense.objectives.scored import Scored
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
-from optisense.report.calibration import write_calibration
+from optisense.report.calibration import render_calibration
 from optisense.report.camera_rays import CameraRays
 from optisense.report.comparison import write_comparison
 from optisense.report.light_section import LightSection, ledger_page
 from optisense.report.scores import write_score_report
 from optisense.report.study import write_study_report
-from optisense.report.tolerance import write_tolerance_report
-from optisense.report.verification import write_verification_report
+from optisense.report.tolerance import render_tolerance
+from optisense.report.verification import render_verification
 from optisense.search import ToleranceDistribution, search
 from optisense.search.tolerance.analysis import tolerance
 from optisense.sensors import gelsight_mini
@@ -87,8 +87,10 @@ def write_pages(folder: Path) -> dict[str, Path]:
     write_study_report(pages["study"], found.study)
 
     errors = {"coating.reflectance.r": ToleranceDistribution(0.3, "uniform")}
-    write_tolerance_report(pages["errors"], tolerance(design, red, errors, sensors=60))
-    write_verification_report(pages["verify"], verified(), (np.eye(3), np.eye(3)))
+    page = render_tolerance(tolerance(design, red, errors, sensors=60))
+    pages["errors"].write_text(page, encoding="utf-8")
+    page = render_verification(verified(), (np.eye(3), np.eye(3)))
+    pages["verify"].write_text(page, encoding="utf-8")
     return {**pages, **write_photograph_pages(folder, design)}
 
 
@@ -108,7 +110,7 @@ def write_photograph_pages(folder: Path, design: SensorDesign) -> dict[str, Path
     )
     pages = {name: folder / f"{name}.html" for name in ("comparison", "calibration")}
     write_comparison(pages["comparison"], design, after)
-    write_calibration(pages["calibration"], found)
+    pages["calibration"].write_text(render_calibration(found), encoding="utf-8")
     return pages
 
 
