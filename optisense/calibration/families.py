@@ -245,7 +245,8 @@ def _gel(design: SensorDesign) -> list[FitQuantity]:
                 body_changes.with_gel_thickness, f"parts.{name}",
             )
         )  # fmt: skip
-    for name in sorted({design.parts[part].material or "" for part in _gels(design)}):
+    gels = design.parts_of(Role.ELASTOMER)
+    for name in sorted({design.parts[part].material or "" for part in gels}):
         material = design.materials.get(name)
         if isinstance(material, Dielectric) and material.elasticity is not None:
             path = f"materials.{name}.elasticity.poisson_ratio"
@@ -256,10 +257,6 @@ def _gel(design: SensorDesign) -> list[FitQuantity]:
                 )
             )  # fmt: skip
     return found
-
-
-def _gels(design: SensorDesign) -> list[str]:
-    return design.parts_of(Role.ELASTOMER)
 
 
 def _coating(design: SensorDesign) -> list[FitQuantity]:

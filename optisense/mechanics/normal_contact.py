@@ -26,12 +26,10 @@ class NormalContact(NamedTuple):
     Attributes:
         pressure: (rows, columns) pressure (MPa), 0 outside the contact.
         displacement: (rows, columns) displacement into the layer, mm.
-        iterations: number of iterations used.
     """
 
     pressure: FloatArray
     displacement: FloatArray
-    iterations: int
 
 
 def solve_normal_contact(
@@ -61,7 +59,7 @@ def solve_normal_contact(
     deepest = float(overlap.max())
     if deepest <= 0.0:
         nothing = np.zeros_like(overlap)
-        return NormalContact(nothing, nothing, 0)
+        return NormalContact(nothing, nothing)
     pressure = np.where(overlap > 0.0, overlap, 0.0) if start is None else start.copy()
     displacement = response.normal(pressure)
     if start is None:  # scaled to the minimum of the energy
@@ -79,7 +77,7 @@ def solve_normal_contact(
             and np.abs(residual).max() <= tolerance * deepest
             and gap.min() >= -tolerance * deepest
         ):
-            return NormalContact(pressure, displacement, iteration - 1)
+            return NormalContact(pressure, displacement)
         way = np.where(touching, residual + (square / before if goes_on else 0.0) * way, 0.0)
         before = square
         yielded = response.normal(way)

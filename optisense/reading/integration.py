@@ -60,15 +60,6 @@ class GridIntegrator:
         pins[held] = 1.0
         return factorized((self._steps.T @ self._steps + sparse.diags(pins)).tocsc())
 
-    def integrate(self, slope_x: FloatArray, slope_y: FloatArray) -> FloatArray:
-        """Values (h, w) from slopes (h, w) a pixel, along columns and along rows; NaN off the mask.
-
-        Slopes off the mask are not read.
-        """
-        return self.from_steps(
-            0.5 * (slope_x[:, :-1] + slope_x[:, 1:]), 0.5 * (slope_y[:-1] + slope_y[1:])
-        )
-
     def from_steps(self, across: FloatArray, down: FloatArray) -> FloatArray:
         """Values (h, w) from their steps to the next pixel: (h, w - 1) along rows, and (h - 1, w)
         along columns; NaN off the mask.

@@ -7,7 +7,7 @@ import pytest
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.joining import closest_on_triangles, join, touching_area
-from optisense.optics.scene.media import Solid, resolve_media
+from optisense.optics.scene.media import Media, Solid
 from optisense.sensors.shapes import arc, revolve
 
 GEL = TriangleMesh.box((-10, -8, -4), (10, 8, 0), (4, 4, 2))
@@ -28,9 +28,9 @@ def plate(name: str, top: float) -> TriangleMesh:
 
 def contact_area(gel: TriangleMesh, support: TriangleMesh) -> float:
     """mm^2 of the interface between both that the media have."""
-    faces = resolve_media(
+    faces = Media(
         [Solid("gel", gel, "gel", 1.41, priority=0), Solid("plate", support, "plate", 1.49, 0.0, 1)]
-    )
+    ).interfaces
     return sum(face.mesh.area for face in faces if len(face.names) == 2)
 
 

@@ -7,11 +7,11 @@ from media_chain import ACRYLIC, GEL, area, ball, box, check_chain, in_box, pair
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
-from optisense.optics.scene.media import Solid, resolve_media
+from optisense.optics.scene.media import Media, Solid
 
 
 def test_a_single_solid_lies_in_air() -> None:
-    interfaces = resolve_media([Solid("gel", ball(3), "silicone", GEL)])
+    interfaces = Media([Solid("gel", ball(3), "silicone", GEL)]).interfaces
     assert pairs(interfaces) == {("silicone", "air")}
     facets = ball(3)
     check_chain(
@@ -27,7 +27,7 @@ def test_gel_on_acrylic_with_other_triangles_on_their_common_face(
 ) -> None:
     gel = Solid("gel", box((-3, -2, 0), (3, 2, 2), divisions), "silicone", GEL, roughness=0.1)
     guide = Solid("guide", box((-3, -2, -2), (3, 2, 0), (4, 3, 1)), "acrylic", ACRYLIC)
-    interfaces = resolve_media([gel, guide])
+    interfaces = Media([gel, guide]).interfaces
     assert pairs(interfaces) == {("silicone", "acrylic"), ("silicone", "air"), ("acrylic", "air")}
     assert area(interfaces, "gel", "guide") == pytest.approx(24)
     assert area(interfaces, "gel") == pytest.approx(24 + 40)
@@ -46,7 +46,7 @@ def test_gel_on_acrylic_with_other_triangles_on_their_common_face(
 def test_faces_that_overlap_in_part_are_cut_at_the_rim() -> None:
     gel = Solid("gel", box((-1, -3, 0), (4, 1.5, 2), (9, 8, 2)), "silicone", GEL)
     guide = Solid("guide", box((-3, -2, -2), (3, 2, 0), (4, 3, 2)), "acrylic", ACRYLIC)
-    interfaces = resolve_media([gel, guide])
+    interfaces = Media([gel, guide]).interfaces
     common = 4 * 3.5
     assert area(interfaces, "gel", "guide") == pytest.approx(common)
     assert area(interfaces, "guide") == pytest.approx(2 * (24 + 12 + 8) - common)
@@ -66,13 +66,13 @@ def test_turned_faces_and_a_corner_that_touches_two_parts() -> None:
     turn[:2, :2] = [[np.cos(0.5236), -np.sin(0.5236)], [np.sin(0.5236), np.cos(0.5236)]]
     block = box((-2, -1.5, 0), (2, 1.5, 1.5), (5, 4, 1)).transformed(turn)
     left, right = box((-4, -3, -1), (0, 3, 0), (3, 3, 1)), box((0, -3, -1), (4, 3, 0))
-    interfaces = resolve_media(
+    interfaces = Media(
         [
             Solid("left", left, "acrylic", ACRYLIC),
             Solid("right", right, "epoxy", 1.54),
             Solid("block", block, "silicone", GEL),
         ]
-    )
+    ).interfaces
     assert area(interfaces, "left", "block") + area(interfaces, "right", "block") == (
         pytest.approx(12)
     )
@@ -93,7 +93,7 @@ def test_inner_faces_of_three_blocks_of_equal_index_vanish() -> None:
         Solid(f"block {k}", box((-3 + 2 * k, -2, -2), (-1 + 2 * k, 2, 2), (2, k + 1, 3)), m, 1.5)
         for k, m in enumerate(["acrylic", "acrylic", "glue"])
     ]
-    interfaces = resolve_media(blocks)
+    interfaces = Media(blocks).interfaces
     assert sum(face.mesh.area for face in interfaces) == pytest.approx(2 * (24 + 24 + 16))
     check_chain(interfaces, lambda p: 1.5 if in_box(p, (-3, -2, -2), (3, 2, 2)) else 1.0)
 
@@ -102,7 +102,7 @@ def test_nested_solids_go_by_priority() -> None:
     outer = Solid("gel", ball(4), "silicone", GEL, priority=0)
     inner = Solid("bead", box((-1, -1, -1), (1, 1, 1)), "glass", 1.52, priority=1)
     hidden = Solid("lost", box((-0.5, -0.5, -0.5), (0.5, 0.5, 0.5)), "acrylic", ACRYLIC)
-    interfaces = resolve_media([outer, inner, hidden])
+    interfaces = Media([outer, inner, hidden]).interfaces
     assert area(interfaces, "bead", "gel") == pytest.approx(24)
     assert all("lost" not in face.names for face in interfaces)
     shell = ball(4)
@@ -121,7 +121,7 @@ def test_where_solids_overlap_the_larger_priority_keeps_the_place(
 ) -> None:
     first = Solid("a", box((-3, -2, -2), (1, 2, 2), (3, 2, 2)), "silicone", GEL, 0.0, priorities[0])
     second = Solid("b", box((-1, -1, -2), (3, 3, 1)), "acrylic", ACRYLIC, 0.0, priorities[1])
-    interfaces = resolve_media([first, second])
+    interfaces = Media([first, second]).interfaces
 
     def truth(p: np.ndarray) -> float:
         in_first = in_box(p, (-3, -2, -2), (1, 2, 2))
@@ -137,7 +137,7 @@ def test_overlap_without_priority_names_both_parts_and_the_place() -> None:
     first = Solid("gel", box((-3, -2, -2), (1, 2, 2)), "silicone", GEL)
     second = Solid("guide", box((-1, -1, -2), (3, 3, 1)), "acrylic", ACRYLIC)
     with pytest.raises(DesignError) as caught:
-        resolve_media([first, second])
+        Media([first, second])
     for word in ("'gel'", "'guide'", "(0.000, 0.500, -0.500) mm"):
         assert word in str(caught.value)
 
@@ -150,7 +150,7 @@ def test_overlap_of_equal_media_needs_no_priority() -> None:
         inside = in_box(p, (-3, -2, -2), (1, 2, 2)) or in_box(p, (-1, -1, -2), (3, 3, 1))
         return ACRYLIC if inside else 1.0
 
-    check_chain(resolve_media([first, second]), truth)
+    check_chain(Media([first, second]).interfaces, truth)
 
 
 @pytest.mark.parametrize("as_solid", [False, True])
@@ -162,7 +162,7 @@ def test_a_thin_film_of_air_is_kept(as_solid: bool) -> None:
     ]
     if as_solid:
         solids.append(Solid("film", box((-3, -3, 0), (3, 3, film)), "air", 1.0))
-    interfaces = resolve_media(solids)
+    interfaces = Media(solids).interfaces
     assert {(f.ior_inside, f.ior_outside) for f in interfaces} == {(GEL, 1.0), (ACRYLIC, 1.0)}
     assert sum(f.mesh.area for f in interfaces) == pytest.approx(4 * 36 + 24 * (4 - film))
 
@@ -178,7 +178,7 @@ def test_a_thin_film_of_air_is_kept(as_solid: bool) -> None:
 def test_a_gap_or_overlap_within_the_tolerance_is_a_contact(gap: float) -> None:
     gel = Solid("gel", box((-3, -3, gap), (3, 3, 2), (4, 4, 1)), "silicone", GEL)
     guide = Solid("guide", box((-4, -4, -2), (4, 4, 0), (3, 3, 1)), "acrylic", ACRYLIC)
-    interfaces = resolve_media([gel, guide])
+    interfaces = Media([gel, guide]).interfaces
     assert area(interfaces, "gel", "guide") == pytest.approx(36)
     assert area(interfaces, "guide") == pytest.approx(2 * 64 + 64 - 36)
 
@@ -186,7 +186,7 @@ def test_a_gap_or_overlap_within_the_tolerance_is_a_contact(gap: float) -> None:
 def test_a_leaky_solid_is_refused_by_name() -> None:
     mesh = box((-1, -1, -1), (1, 1, 1))
     with pytest.raises(MeshError, match="part gel"):
-        resolve_media([Solid("gel", TriangleMesh(mesh.vertices, mesh.faces[1:]), "m", GEL)])
+        Media([Solid("gel", TriangleMesh(mesh.vertices, mesh.faces[1:]), "m", GEL)])
 
 
 @pytest.mark.parametrize("seed", [9, 17, 28, 33, 39])
@@ -212,4 +212,4 @@ def test_random_blocks_on_a_lattice(seed: int, turned: bool) -> None:
         return here[-1] if here else 1.0
 
     solids = [blocks[k][2] for k in rng.permutation(6)]
-    check_chain(resolve_media(solids), truth, count=300)
+    check_chain(Media(solids).interfaces, truth, count=300)

@@ -8,7 +8,7 @@ from media_chain import ACRYLIC, GEL, area, box, check_chain, in_box
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
-from optisense.optics.scene.media import Media, Sheet, Solid, resolve_media
+from optisense.optics.scene.media import Media, Sheet, Solid
 
 
 def dome(radius: float, rings: int, sectors: int, floor: float) -> TriangleMesh:
@@ -40,7 +40,7 @@ def test_a_curved_shell_shares_its_inner_surface_with_the_core() -> None:
     core = dome(2.0, 12, 40, -1.0)
     outer = dome(3.0, 16, 52, -1.0)
     shell = Solid("shell", outer, "silicone", GEL, priority=0)
-    interfaces = resolve_media([shell, Solid("core", core, "epoxy", 1.54, priority=1)])
+    interfaces = Media([shell, Solid("core", core, "epoxy", 1.54, priority=1)]).interfaces
     assert area(interfaces, "core", "shell") == pytest.approx(
         core.area - core.face_areas[core.face_normals[:, 2] < -0.99].sum()
     )
@@ -66,9 +66,9 @@ def test_solids_of_one_curved_surface_in_two_tessellations_touch() -> None:
         return mesh.with_vertices(mesh.vertices + lift[:, None] * [0, 0, 1])
 
     lower, upper = bent(floor), bent(ceiling)
-    interfaces = resolve_media(
+    interfaces = Media(
         [Solid("guide", lower, "acrylic", ACRYLIC), Solid("gel", upper, "silicone", GEL)]
-    )
+    ).interfaces
     top = lower.face_areas[(lower.face_normals[:, 2] > 0.5)].sum()
     assert area(interfaces, "guide", "gel") == pytest.approx(top, rel=1e-6)
     assert sum(f.mesh.area for f in interfaces if f.names == ("gel",)) == pytest.approx(
@@ -89,9 +89,9 @@ def test_a_coating_replaces_the_gel_faces_under_it() -> None:
         return ACRYLIC if in_box(p, (-4, -4, -1), (4, 4, 0)) else 1.0
 
     for coating in (skin, other_skin):
-        interfaces = resolve_media(
+        interfaces = Media(
             [Solid("gel", mesh, "silicone", GEL), guide], [Sheet("skin", coating)]
-        )
+        ).interfaces
         assert area(interfaces, "gel") == pytest.approx(4 * 12)
         check_chain(interfaces, truth, stop=skin)
 
@@ -100,7 +100,7 @@ def test_a_mirror_between_two_solids_hides_the_faces_of_both() -> None:
     gel = Solid("gel", box((-3, -3, 0), (3, 3, 2)), "silicone", GEL)
     guide = Solid("guide", box((-3, -3, -2), (3, 3, 0)), "acrylic", ACRYLIC)
     mirror = Sheet("mirror", TriangleMesh.grid((2, 2)), "mirror")
-    interfaces = resolve_media([gel, guide], [mirror])
+    interfaces = Media([gel, guide], [mirror]).interfaces
     assert area(interfaces, "gel", "guide") == pytest.approx(36 - 4)
     assert area(interfaces, "gel") == area(interfaces, "guide") == pytest.approx(36 + 48)
 
@@ -124,9 +124,9 @@ def test_boundaries_are_known_to_hold_only_while_moving_sheets_touch_no_solid() 
 def test_shading_normals_live_on_in_cut_faces() -> None:
     core = dome(2.0, 12, 40, -1.0).vertex_normals()
     band = box((0, -3, -1), (3, 3, 0.5))
-    interfaces = resolve_media(
+    interfaces = Media(
         [Solid("core", core, "epoxy", 1.54, priority=1), Solid("band", band, "silicone", GEL)]
-    )
+    ).interfaces
     for face in interfaces:
         if face.names[0] == "core":
             assert face.mesh.normals is not None

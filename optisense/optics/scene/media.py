@@ -44,29 +44,6 @@ BENT_TOLERANCE = 0.02
 tessellations of one shape differ by less."""
 
 
-def resolve_media(
-    solids: Sequence[Solid],
-    sheets: Sequence[Sheet] = (),
-    tolerance: float = COINCIDENCE_TOLERANCE,
-) -> list[Interface]:
-    """Find every refracting boundary of a set of solids in air.
-
-    Args:
-        solids: closed parts; they may touch with any tessellation, nest and overlap.
-        sheets: opaque surfaces; solid faces that lie on one are left out.
-        tolerance: distance (mm) below which faces touch.
-
-    Returns:
-        One interface for each pair of touching solids, and one for the part of each solid that
-        borders on air; none between equal refractive indices.
-
-    Raises:
-        MeshError: a mesh is not closed or cuts through itself.
-        DesignError: solids of different index overlap and have the same priority.
-    """
-    return Media(solids, sheets, tolerance).interfaces
-
-
 class Bending:
     """The positions of interfaces and sheets relative to the solids that they lie on."""
 
@@ -129,7 +106,8 @@ class Media:
     """The resolved boundaries of solids and sheets.
 
     Attributes:
-        interfaces: the interfaces, as `resolve_media` returns them.
+        interfaces: one interface for each pair of touching solids, and one for the part of each
+            solid that borders on air; none between equal refractive indices.
         bent: whether the interfaces were moved along with solids that bend; see `bend`.
     """
 
@@ -139,7 +117,17 @@ class Media:
         sheets: Sequence[Sheet] = (),
         tolerance: float = COINCIDENCE_TOLERANCE,
     ) -> None:
-        """Resolve the boundaries; arguments and errors are those of `resolve_media`."""
+        """Find every refracting boundary of a set of solids in air.
+
+        Args:
+            solids: closed parts; they may touch with any tessellation, nest and overlap.
+            sheets: opaque surfaces; solid faces that lie on one are left out.
+            tolerance: distance (mm) below which faces touch.
+
+        Raises:
+            MeshError: a mesh is not closed or cuts through itself.
+            DesignError: solids of different index overlap and have the same priority.
+        """
         self._solids = list(solids)
         self._tolerance = tolerance
         closed = [replace(s, mesh=s.mesh.validate(s.name, closed=True)) for s in solids]

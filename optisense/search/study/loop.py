@@ -186,7 +186,7 @@ class StudyRun:
             asked = self.method.ask()
             rows = self.study.store.rows(generation) if generation <= known else []
             self._compare(asked, rows)
-            room = self.limit - self._proposed(generation)
+            room = self.limit - self.study.store.proposed_before(generation)
             missing = asked[len(rows) :][: max(0, room - len(rows))]
             if len(missing):
                 self.study.store.propose(generation, missing, len(rows))
@@ -200,10 +200,6 @@ class StudyRun:
             outcomes = [row.outcome for row in whole if row.outcome is not None]
             self.method.tell(np.array([row.vector for row in whole]), outcomes)
             generation += 1
-
-    def _proposed(self, generation: int) -> int:
-        """Return the number of trials in the generations before this one."""
-        return self.study.store.proposed_before(generation)
 
     def _score_start(self, runner: Runner) -> None:
         store = self.study.store
