@@ -17,12 +17,12 @@ from scipy import ndimage
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.film import Film
+from optisense.optics.imaging.contact_light import beside_layers, thrown_layers
+from optisense.optics.imaging.film import REFERENCE_WIDTH, Film, repeated
 from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.shading import beside_contacts, shade
-from optisense.optics.radiance_cache.thrown_back import thrown_back
+from optisense.optics.radiance_cache.shading import shade
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.scene.surfaces import Region
@@ -31,10 +31,6 @@ from optisense.optics.transport.chief_rays import ChiefRays
 
 if TYPE_CHECKING:
     from optisense.optics.imaging.sppm import SppmResult
-    from optisense.optics.transport.camera_paths import VisiblePoints
-
-    PointLight = tuple[VisiblePoints, list[mi.Color3f]]
-    """Points and their radiance, one colour for each light group."""
 
 CONTACT_SAMPLES = 12
 """Camera samples per pixel inside contacts, where tilt and shadow vary within a pixel, in an image
@@ -51,8 +47,6 @@ DRAFT_SAMPLES = 3, 1
 """Camera samples per pixel of a draft, in contacts and around them."""
 MIN_PIXEL_SAMPLES = 2
 """Camera samples of a contact pixel of importance 0, which is only averaged with others."""
-REFERENCE_WIDTH = 320
-"""Image width (pixels) for which the numbers of samples per pixel are stated."""
 RIM_WIDTH = 8.0 / 320.0
 """Width of the rim around a contact that gets `RIM_SAMPLES`, as a fraction of the image width."""
 
@@ -76,26 +70,14 @@ GRAIN_WINDOW = 9
 THROWN_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which metallic coatings are
 shaded with the light that the contact reflects through the interfaces: 2 mm on GelSight Mini."""
-THROWN_RAYS = 8
-"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
-more. Few of the rays end where a contact mirrors a lamp."""
-BROAD_THROWN_RAYS = 1
-"""Rays per pixel for lobes that are not narrower than most lamps; one suffices, as they receive
-little such light, and evenly from all directions."""
 LEAST_LEFT = 0.5
 """Lower bound on the share of a pixel's light that remains after the light of the skin hidden by
 contacts is subtracted; a larger loss is the noise of a few bright rays."""
-THROWN_REACH = 1.0 / 40.0
-"""Width of the averaging of that light over the skin, as a fraction of the image width: half a
-millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
 
 BESIDE_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which the skin is shaded with
 light that the contact reflects to it: 2 mm on GelSight Mini. This is half a per cent of a diffuse
 coating's light there; with narrow lobes, single rays would be bright blotches."""
-BESIDE_DIRECTIONS = 2
-"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
-more. The light is averaged over `THROWN_REACH`, which leaves noise of some tenths of a per cent."""
 
 PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
 """A function of the chief rays that gives the importance (h, w) of each contact pixel to a score,
@@ -142,18 +124,6 @@ class ImageLayers:
         )
 
 
-def _repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]:
-    """Return the index of each pixel of a non-empty mask ``times`` times, and the sample's number,
-    from 1.
-    """
-    # The arrays are made on the device, as NumPy arrays differ in alignment, which is part of
-    # kernels.
-    chosen = dr.compress(mi.Bool(mask.ravel()))
-    lane = dr.arange(mi.UInt32, dr.width(chosen) * times)
-    count = dr.opaque(mi.UInt32, dr.width(chosen))
-    return dr.gather(mi.UInt32, chosen, lane % count), lane // count + 1
-
-
 def _grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return a mask (h, w) of the pixels of ``where`` that lie in grainy places.
 
@@ -175,82 +145,6 @@ def _grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.
 def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Return values (h, w, 3) with NaN outside a mask."""
     return np.where(where[..., None], values, np.nan).astype(np.float32)
-
-
-def _thrown_layers(
-    field: RadianceCache,
-    scenes: ContactScenes,
-    camera: RayCamera,
-    where: NDArray[np.bool_],
-    skin: NDArray[np.bool_],
-    seed: int,
-) -> NDArray[np.float32] | None:
-    """Return the radiance (groups, h, w, 3) due to light that contacts reflect through the
-    interfaces to the pixels ``where``, averaged over ``skin``; None if there is none.
-    """
-    least = THROWN_RAYS if field.narrow_lobes else BROAD_THROWN_RAYS
-    rays = max(least, round(least * (REFERENCE_WIDTH / camera.width) ** 2))
-
-    def light(points: VisiblePoints) -> PointLight | None:
-        return thrown_back(field, scenes, points, rays)
-
-    return _averaged_layers(field.groups, scenes, camera, (where, skin), (seed, 9), light)
-
-
-def _beside_layers(
-    field: RadianceCache,
-    scenes: ContactScenes,
-    camera: RayCamera,
-    where: NDArray[np.bool_],
-    seed: int,
-) -> NDArray[np.float32] | None:
-    """Return the radiance (groups, h, w, 3) due to light that contacts reflect to the skin
-    ``where`` beside them, averaged over it; None if there is none.
-    """
-    more = (REFERENCE_WIDTH / camera.width) ** 2
-    directions = max(BESIDE_DIRECTIONS, round(BESIDE_DIRECTIONS * more))
-
-    def light(points: VisiblePoints) -> PointLight:
-        return points, beside_contacts(field, scenes, points, directions)
-
-    return _averaged_layers(field.groups, scenes, camera, (where, where), (seed, 10), light)
-
-
-def _averaged_layers(
-    groups: int,
-    scenes: ContactScenes,
-    camera: RayCamera,
-    places: tuple[NDArray[np.bool_], NDArray[np.bool_]],
-    seeds: tuple[int, int],
-    light: Callable[[VisiblePoints], PointLight | None],
-) -> NDArray[np.float32] | None:
-    """(groups, h, w, 3) ``light`` of what one ray through each pixel sees; None where there is
-    none.
-
-    Args:
-        groups: of the lights.
-        scenes: the sensor with its contacts.
-        camera: its pixels.
-        places: (h, w), the pixels that are looked through, and those that it is averaged over.
-        seeds: of the image, and of these rays.
-        light: the points whose light counts, and its radiance for each group.
-    """
-    where, over = places
-    if scenes.indenters is None or np.count_nonzero(where) < 2:
-        return None
-    width, height = camera.width, camera.height
-    film = Film(width * height, groups)
-    pixel, _ = _repeated(where, 1)
-    first = dr.zeros(mi.UInt32, dr.width(pixel))
-    film.count(pixel)
-    for channel in scenes.full.channels:
-        spots = film_samples(pixel, width, first, seed_of(seeds[0], 3))
-        own = seed_of(*seeds)
-        main, _ = find_visible_points(scenes.full, camera, pixel, first, spots, own, True, channel)
-        found = light(main)
-        if found is not None:
-            film.add(*found)
-    return film.spread_layers(width, height, over, max(2, round(THROWN_REACH * width)))
 
 
 def render_cached(
@@ -331,7 +225,7 @@ def render_cached(
             wanted = [(mask & (counts == times), int(times)) for times in np.unique(counts[mask])]
         else:
             wanted = [(distance <= 1.0, inner), (near & (distance > 1.0), outer)]
-        tiers = [_repeated(pixels, times) for pixels, times in wanted if pixels.any()]
+        tiers = [repeated(pixels, times) for pixels, times in wanted if pixels.any()]
         pixel, number = (dr.concat(each) for each in zip(*tiers, strict=True))
         dr.eval(pixel, number)
         sample(pixel, number, True)
@@ -339,10 +233,10 @@ def render_cached(
         if not (draft or only_contacts or field.narrow_lobes):
             skin = region_image == Region.SENSING
             ring = skin & ~near & (distance <= BESIDE_RANGE * width)
-            beside = _beside_layers(field, scenes, camera, ring, seed)
+            beside = beside_layers(field, scenes, camera, ring, seed)
         if field.metallic and not draft:
             lit = mask if only_contacts else rays.hit & (distance <= THROWN_RANGE * width)
-            thrown = _thrown_layers(field, scenes, camera, lit, lit & ~mask, seed)
+            thrown = thrown_layers(field, scenes, camera, lit, lit & ~mask, seed)
     far = ~near
     layers = reflections = None
     if far.any() and not only_contacts:
@@ -366,7 +260,7 @@ def render_cached(
         )
         if grainy.any():
             affordable = int(first.sum()) // (2 * int(grainy.sum()))
-            pixel, number = _repeated(grainy, min(GRAIN_SAMPLES, max(1, affordable)))
+            pixel, number = repeated(grainy, min(GRAIN_SAMPLES, max(1, affordable)))
             dr.eval(pixel, number)
             sample(pixel, number, False, again=True)
             layers = None
@@ -378,7 +272,7 @@ def render_cached(
                 # These pixels get a sample in their middle like the others, and a further one where
                 # their neighbours were resampled.
                 again = apart & np.kron(grainy[::2, ::2], np.ones((2, 2), bool))[:height, :width]
-                tiers = [_repeated(each, 1) for each in (apart, again) if each.any()]
+                tiers = [repeated(each, 1) for each in (apart, again) if each.any()]
                 tiers[0] = tiers[0][0], dr.zeros(mi.UInt32, dr.width(tiers[0][0]))
                 pixel, number = (dr.concat(each) for each in zip(*tiers, strict=True))
                 dr.eval(pixel, number)

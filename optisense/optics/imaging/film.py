@@ -11,6 +11,9 @@ from scipy import ndimage
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.transport.camera_paths import VisiblePoints
 
+REFERENCE_WIDTH = 320
+"""Image width (pixels) for which the numbers of samples per pixel are stated."""
+
 LONE_WINDOW, LONE_RANK = 5, 4
 """Side (pixels) of the square around a bright pixel, and the number of its pixels, itself included,
 that must be bright for the pixel to count as real: the visible reflection of a lamp has more."""
@@ -22,6 +25,18 @@ the excess is spread."""
 SPECK_REACH = 1.0 / 8.0
 """Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the
 light around it then adds 3 % to its middle."""
+
+
+def repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]:
+    """Return the index of each pixel of a non-empty mask ``times`` times, and the sample's number,
+    from 1.
+    """
+    # The arrays are made on the device, as NumPy arrays differ in alignment, which is part of
+    # kernels.
+    chosen = dr.compress(mi.Bool(mask.ravel()))
+    lane = dr.arange(mi.UInt32, dr.width(chosen) * times)
+    count = dr.opaque(mi.UInt32, dr.width(chosen))
+    return dr.gather(mi.UInt32, chosen, lane % count), lane // count + 1
 
 
 class Film:

@@ -1,0 +1,117 @@
+"""Light that contacts reflect to the skin, which is smooth: few rays, averaged over pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.backend.sequences import seed_of
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.imaging.film import REFERENCE_WIDTH, Film, repeated
+from optisense.optics.radiance_cache.cache import RadianceCache
+from optisense.optics.radiance_cache.shading import beside_contacts
+from optisense.optics.radiance_cache.thrown_back import thrown_back
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.transport.camera_paths import film_samples, find_visible_points
+
+if TYPE_CHECKING:
+    from optisense.optics.transport.camera_paths import VisiblePoints
+
+    PointLight = tuple[VisiblePoints, list[mi.Color3f]]
+    """Points and their radiance, one colour for each light group."""
+
+THROWN_RAYS = 8
+"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
+more. Few of the rays end where a contact mirrors a lamp."""
+BROAD_THROWN_RAYS = 1
+"""Rays per pixel for lobes that are not narrower than most lamps; one suffices, as they receive
+little such light, and evenly from all directions."""
+THROWN_REACH = 1.0 / 40.0
+"""Width of the averaging of that light over the skin, as a fraction of the image width: half a
+millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
+BESIDE_DIRECTIONS = 2
+"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
+more. The light is averaged over `THROWN_REACH`, which leaves noise of some tenths of a per cent."""
+
+
+def thrown_layers(
+    field: RadianceCache,
+    scenes: ContactScenes,
+    camera: RayCamera,
+    where: NDArray[np.bool_],
+    skin: NDArray[np.bool_],
+    seed: int,
+) -> NDArray[np.float32] | None:
+    """Return the radiance (groups, h, w, 3) due to light that contacts reflect through the
+    interfaces to the pixels ``where``, averaged over ``skin``; None if there is none.
+    """
+    least = THROWN_RAYS if field.narrow_lobes else BROAD_THROWN_RAYS
+    rays = max(least, round(least * (REFERENCE_WIDTH / camera.width) ** 2))
+
+    def light(points: VisiblePoints) -> PointLight | None:
+        return thrown_back(field, scenes, points, rays)
+
+    return _averaged_layers(field.groups, scenes, camera, (where, skin), (seed, 9), light)
+
+
+def beside_layers(
+    field: RadianceCache,
+    scenes: ContactScenes,
+    camera: RayCamera,
+    where: NDArray[np.bool_],
+    seed: int,
+) -> NDArray[np.float32] | None:
+    """Return the radiance (groups, h, w, 3) due to light that contacts reflect to the skin
+    ``where`` beside them, averaged over it; None if there is none.
+    """
+    more = (REFERENCE_WIDTH / camera.width) ** 2
+    directions = max(BESIDE_DIRECTIONS, round(BESIDE_DIRECTIONS * more))
+
+    def light(points: VisiblePoints) -> PointLight:
+        return points, beside_contacts(field, scenes, points, directions)
+
+    return _averaged_layers(field.groups, scenes, camera, (where, where), (seed, 10), light)
+
+
+def _averaged_layers(
+    groups: int,
+    scenes: ContactScenes,
+    camera: RayCamera,
+    places: tuple[NDArray[np.bool_], NDArray[np.bool_]],
+    seeds: tuple[int, int],
+    light: Callable[[VisiblePoints], PointLight | None],
+) -> NDArray[np.float32] | None:
+    """Return the radiance (groups, h, w, 3) of what one camera ray through each pixel sees,
+    averaged over the skin; None if there is none.
+
+    Args:
+        groups: number of light groups.
+        scenes: scenes of the sensor with its contacts.
+        camera: camera of the image.
+        places: pixels (h, w) that the rays go through, and pixels that the radiance is averaged
+            over.
+        seeds: seed of the image, and number of these rays in it.
+        light: function of the points seen that returns the points whose light counts, and their
+            radiance; None if there are none.
+    """
+    where, over = places
+    if scenes.indenters is None or np.count_nonzero(where) < 2:
+        return None
+    width, height = camera.width, camera.height
+    film = Film(width * height, groups)
+    pixel, _ = repeated(where, 1)
+    first = dr.zeros(mi.UInt32, dr.width(pixel))
+    film.count(pixel)
+    for channel in scenes.full.channels:
+        spots = film_samples(pixel, width, first, seed_of(seeds[0], 3))
+        own = seed_of(*seeds)
+        main, _ = find_visible_points(scenes.full, camera, pixel, first, spots, own, True, channel)
+        found = light(main)
+        if found is not None:
+            film.add(*found)
+    return film.spread_layers(width, height, over, max(2, round(THROWN_REACH * width)))
