@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from optisense.errors import SearchError
+from optisense.search.space.design_variables import DesignVariable
 
 MOST_STEPS = 1_000_000
 """Largest number of steps of one parameter in a grid; a larger number is a typing error."""
@@ -249,3 +250,41 @@ def _label(option: object) -> str:
     if isinstance(option, tuple):
         return ",".join(_label(item) for item in option)
     return f"{option:g}" if isinstance(option, float) else str(option)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Value that follows a parameter: `scale` times the parameter plus `offset` (choices: as they
+    are).
+    """
+
+    path: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """Single number or name that a search may change.
+
+    Attributes:
+        name: dotted path of the parameter; unique in a space.
+        kind: bounds or options.
+        start: value in the design, as a coordinate (see `BoundSpace`), within the bounds.
+        targets: values of the design that follow the parameter; empty if it has a variable.
+        variable: design variable that it changes, if it changes more than values.
+        asked: path as the user gave it.
+    """
+
+    name: str
+    kind: Single
+    start: float
+    targets: tuple[Target, ...] = ()
+    variable: DesignVariable | None = None
+    asked: str = ""
+
+
+def within(value: float, kind: Single) -> float:
+    """Return the number nearest to a value within the bounds of a kind."""
+    assert not isinstance(kind, Choice)
+    return min(max(value, float(kind.low)), float(kind.high))

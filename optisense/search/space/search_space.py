@@ -15,11 +15,12 @@ from optisense.errors import OptiSenseError, SearchError
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.design_variables import LightType, with_light_types
 from optisense.search.space.edit import Edit
-from optisense.search.space.expansion import Parameter, expand
+from optisense.search.space.expansion import expand
 from optisense.search.space.parameters import (
     Choice,
     Continuous,
     Integer,
+    Parameter,
     Specification,
     as_specification,
     from_plain,
