@@ -29,10 +29,10 @@ from optisense.search.methods.base import Problem
 from optisense.search.methods.checked_slopes import (
     GRADIENT_BY,
     GRADIENT_HOLDS,
-    STEP,
     SlopeEvaluator,
 )
 from optisense.search.methods.gradient import Gradient
+from optisense.search.methods.score_differences import STEP
 from optisense.search.space.search_space import BoundSpace
 
 if TYPE_CHECKING:

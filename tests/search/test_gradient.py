@@ -93,7 +93,7 @@ def test_a_camera_that_blockers_hem_in_has_the_slope_of_the_true_score() -> None
     for number, step in enumerate((0.2, 2.0)):
         way = np.zeros(2)
         way[number] = 1.0
-        differences = evaluator._difference(point, way, step, 0)
+        differences = evaluator.difference(point, way, step, 0)
         assert differences is not None
         # Without edges the sign by fov is another one; differences step by some per cent.
         assert gradient[number] == pytest.approx(differences, rel=0.05)
@@ -158,7 +158,7 @@ def test_a_gradient_that_is_said_to_hold_is_within_five_per_cent() -> None:
     for _ in range(3):
         way = random.normal(size=bound.size)
         way *= span / np.linalg.norm(way)
-        true = evaluator._difference(bound.start, way, 0.01, 0)
+        true = evaluator.difference(bound.start, way, 0.01, 0)
         assert true is not None
         assert outcome.gradient @ way == pytest.approx(true, rel=0.05, abs=0.05 * typical)
 

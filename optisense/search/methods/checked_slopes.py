@@ -20,24 +20,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from optisense.design import SensorDesign
-from optisense.errors import NoDerivativeError, ObjectiveError, OptiSenseError
+from optisense.errors import NoDerivativeError, OptiSenseError
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray
 from optisense.search.methods.jacobian import Jacobian, holds, jacobian
+from optisense.search.methods.score_differences import STEP, ScoreDifferences
 from optisense.search.methods.smooth_scores import SmoothScore
 from optisense.search.space.pickling import PickledWithoutCaches
-from optisense.search.space.search_space import BoundSpace
 
 if TYPE_CHECKING:
     from optisense.optics.transport.ray_gradient import DifferentiableRays
-
-STEP = 0.05
-"""Step of central differences of the true score to each side, as a share of the parameters' ranges.
-A true score is a sum over pixels and triangles, which jumps where a row of pixels comes into view
-and has small hills where an edge passes the picture's corner: over shorter steps a difference says
-little about the direction of ascent. Checks also use half of this step.
-"""
 
 FEW = 8
 """Largest number of parameters for which central differences by each parameter need no more scores
@@ -146,6 +139,7 @@ class SlopeEvaluator(PickledWithoutCaches):
         limited = [each.objective().name for each in usual.requirements]
         self.wanted = [objective, *limited]
         self._smooth = [None if layers else SmoothScore.of(name) for name in self.wanted]
+        self._differences = ScoreDifferences(usual)
         self._contradicted: bool | None = None
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
@@ -184,14 +178,14 @@ class SlopeEvaluator(PickledWithoutCaches):
             OptiSenseError: the design can't be built, or no ray arrives.
         """
         if self.layers:
-            gradients = self._all_differences(vector, seed, self.wanted)
+            gradients = self._differences.gradients(vector, seed, self.wanted)
             return CheckedSlope(self._values(vector, seed), gradients, LAYERS, None)
         if self.usual.space.size > FEW:
             try:
                 return self._by_rays(vector, seed)
             except (NoDerivativeError, _ContradictedError):
                 pass
-        gradients = self._all_differences(vector, seed, self.wanted)
+        gradients = self._differences.gradients(vector, seed, self.wanted)
         steady = self.steady(vector, gradients[0], seed)
         return CheckedSlope(self._values(vector, seed), gradients, DIFFERENCES, steady)
 
@@ -217,8 +211,8 @@ class SlopeEvaluator(PickledWithoutCaches):
         rough = [k for k, smooth in enumerate(self._smooth) if smooth is None]
         if rough:
             names = [self.wanted[k] for k in rough]
-            gradients[rough] = self._all_differences(vector, seed, names)
-            values[rough] = self._exact(self.usual.space.apply(vector), seed, names)
+            gradients[rough] = self._differences.gradients(vector, seed, names)
+            values[rough] = self._differences.exact(self.usual.space.apply(vector), seed, names)
         return CheckedSlope(values, gradients, RAYS, holds)
 
     def _contradicted_at_start(self, seed: int) -> bool:
@@ -277,7 +271,7 @@ class SlopeEvaluator(PickledWithoutCaches):
         """
         found = Agreement.HOLDS
         for check in self._checks(vector, gradient):
-            far, near = (self._difference(vector, check.way, h, seed) for h in (STEP, STEP / 2))
+            far, near = (self.difference(vector, check.way, h, seed) for h in (STEP, STEP / 2))
             if far is None or near is None:
                 continue
             allowed = TOLERANCE * max(abs(near), check.typical)
@@ -292,7 +286,7 @@ class SlopeEvaluator(PickledWithoutCaches):
         it.
         """
         for check in self._checks(vector, gradient):
-            near = self._difference(vector, check.way, STEP / 2, seed)
+            near = self.difference(vector, check.way, STEP / 2, seed)
             if near is None:
                 continue
             if abs(check.slope - near) > TOLERANCE * max(abs(near), check.typical):
@@ -324,58 +318,14 @@ class SlopeEvaluator(PickledWithoutCaches):
         """Return the gradient (n,) of the true score at a point (n,) by central differences over
         `STEP`; 0 for coordinates with no score on one of the sides.
         """
-        return self._all_differences(vector, seed, self.wanted[:1])[0]
+        return self._differences.gradients(vector, seed, self.wanted[:1])[0]
 
-    def _all_differences(self, vector: FloatArray, seed: int, names: Sequence[str]) -> FloatArray:
-        """Return the gradients (k, n) of several objectives, as `differences` does for one."""
-        space = self.usual.space
-        gradients = np.zeros((len(names), space.size))
-        for number, span in enumerate(space.upper - space.lower):
-            way = np.zeros(space.size)
-            way[number] = span
-            found = self._changes(vector, way, STEP, seed, names)
-            gradients[:, number] = 0.0 if found is None else found / span
-        return gradients
-
-    def _difference(
+    def difference(
         self, vector: FloatArray, way: FloatArray, step: float, seed: int
     ) -> float | None:
-        """Return the derivative of the true score along `way`; see `_changes`."""
-        found = self._changes(vector, way, step, seed, self.wanted[:1])
+        """Return the derivative of the true score along `way`; see `ScoreDifferences.along`."""
+        found = self._differences.along(vector, way, step, seed, self.wanted[:1])
         return None if found is None else float(found[0])
-
-    def _changes(
-        self, vector: FloatArray, way: FloatArray, step: float, seed: int, names: Sequence[str]
-    ) -> FloatArray | None:
-        """Return the derivatives (k,) of objectives along `way` (n,), per length of `way`, by
-        differences over `step` to both sides, or as far as the bounds allow; None if that is less
-        than half a step in all, or if there is no score on one of the sides.
-        """
-        space = self.usual.space
-        room = [_room(space, vector, side * way, step) for side in (1.0, -1.0)]
-        if sum(room) < step / 2:
-            return None
-        found = []
-        for side in (room[0], -room[1]):
-            point = np.clip(vector + side * way, space.lower, space.upper)
-            try:
-                found.append(self._exact(space.apply(point), seed, names))
-            except OptiSenseError:
-                return None
-        return np.asarray((found[0] - found[1]) / sum(room))
-
-    def _exact(self, design: SensorDesign, seed: int, names: Sequence[str]) -> FloatArray:
-        """Return the values of objectives, (k,).
-
-        Raises:
-            OptiSenseError: the design can't be built, or has no value for one of them.
-        """
-        scores = self.usual.objective_scores(design, seed, names)
-        for name in names:
-            failure = scores[name].failure
-            if failure is not None:
-                raise ObjectiveError(failure)
-        return np.array([scores[name].value for name in names])
 
     def _values(self, vector: FloatArray, seed: int) -> FloatArray:
         """Return the smoothed values (1 + m,) at a point; exact ones for quantities without a
@@ -390,7 +340,7 @@ class SlopeEvaluator(PickledWithoutCaches):
                     values[number] = smooth.slopes(rays, self.usual.settings).value
         rough = [k for k, smooth in enumerate(self._smooth) if smooth is None]
         if rough:
-            values[rough] = self._exact(design, seed, [self.wanted[k] for k in rough])
+            values[rough] = self._differences.exact(design, seed, [self.wanted[k] for k in rough])
         return values
 
     def _rays(self, design: SensorDesign, moving: Sequence[str]) -> DifferentiableRays:
@@ -407,12 +357,3 @@ class SlopeEvaluator(PickledWithoutCaches):
 
 class _ContradictedError(Exception):
     """Error: differences of the true score agree with each other and contradict ray derivatives."""
-
-
-def _room(space: BoundSpace, vector: FloatArray, way: FloatArray, most: float) -> float:
-    """Return the largest multiple of `way` (n,), at most `most`, that fits between a point (n,) and
-    the bounds.
-    """
-    ahead = np.where(way > 0, space.upper - vector, vector - space.lower)
-    moving = way != 0
-    return float(np.min(ahead[moving] / np.abs(way[moving]), initial=most).clip(0.0))

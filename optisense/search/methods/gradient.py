@@ -50,7 +50,6 @@ from optisense.search.methods.checked_slopes import (
     LIMITED,
     RAYS,
     SMOOTHED,
-    STEP,
     TOLERANCE,
     SlopeEvaluator,
 )
@@ -64,6 +63,7 @@ from optisense.search.methods.gradient_sources import (
 )
 from optisense.search.methods.jacobian import moving_parts
 from optisense.search.methods.light_colours import RelitEvaluator
+from optisense.search.methods.score_differences import STEP
 from optisense.search.space.search_space import BoundSpace
 
 USUAL_STEPS = 12

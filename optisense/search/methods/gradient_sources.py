@@ -14,8 +14,8 @@ from optisense.search.evaluation.evaluator import RELIT
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import Requirement
 from optisense.search.methods.base import FloatArray, Problem
-from optisense.search.methods.checked_slopes import STEP
 from optisense.search.methods.jacobian import moving_parts
+from optisense.search.methods.score_differences import STEP
 from optisense.search.methods.smooth_scores import SmoothScore
 
 
