@@ -13,7 +13,7 @@ from optisense.design.cage_checks import cage_problems, half_caged
 from optisense.design.camera_checks import lens_problems, place_problems, view_problems
 from optisense.design.focus_checks import focus_problems
 from optisense.design.lens_checks import fold_problems
-from optisense.design.limits import unit_slips
+from optisense.design.limits import placed_things, unit_slips
 from optisense.design.material_checks import index_problems
 from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
@@ -186,13 +186,7 @@ def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[
     }
     if not opaque:
         return []
-    poses: list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]] = [
-        ("the camera", design.camera.position, ("camera", "position"))
-    ]
-    for name, group in design.lights.items():
-        for index, light in enumerate(group.lights):
-            path: tuple[str | int, ...] = ("lights", name, "lights", index, "position")
-            poses.append((f"light {index} of group '{name}'", light.position, path))
+    poses = placed_things(design)
     points = np.array([position for _, position, _ in poses])
     problems = []
     for part, mesh in opaque.items():

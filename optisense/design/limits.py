@@ -52,14 +52,7 @@ def unit_slips(design: SensorDesign) -> list[Diagnostic]:
                     "Give control points in millimetres",
                 )
             )
-    places: list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]] = [
-        ("the camera", design.camera.position, ("camera", "position"))
-    ]
-    for name, group in design.lights.items():
-        for index, light in enumerate(group.lights):
-            path: tuple[str | int, ...] = ("lights", name, "lights", index, "position")
-            places.append((f"light {index} of '{name}'", light.position, path))
-    for label, position, path in places:
+    for label, position, path in placed_things(design):
         distance = float(np.linalg.norm(position))
         if distance > LARGEST:
             problems.append(
@@ -70,3 +63,17 @@ def unit_slips(design: SensorDesign) -> list[Diagnostic]:
                 )
             )
     return problems
+
+
+def placed_things(
+    design: SensorDesign,
+) -> list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]]:
+    """Return the camera and all lights: name in words, position (mm) and its path in the design."""
+    found: list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]] = [
+        ("the camera", design.camera.position, ("camera", "position"))
+    ]
+    for name, group in design.lights.items():
+        for index, light in enumerate(group.lights):
+            label = f"light {index} of group '{name}'"
+            found.append((label, light.position, ("lights", name, "lights", index, "position")))
+    return found
