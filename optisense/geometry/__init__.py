@@ -1,4 +1,4 @@
-"""Meshes, cages, indenters, and where and how deep a contact sits."""
+"""Geometry: meshes, cages, indenters, and the places and depths of contacts."""
 
 from optisense.geometry.cage import cage_points, cage_weights, deform
 from optisense.geometry.contact import Contact, available_depth, locate, place

@@ -1,4 +1,4 @@
-"""Points on a mesh that go along when it bends."""
+"""Points on a mesh that move with it when it bends."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from scipy.spatial import cKDTree
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 _SAME = 1e-9
-"""Distance in mm within which a point is the vertex itself; a margin for rounding."""
+"""Distance (mm) within which a point coincides with a vertex; a margin for rounding."""
 _NEAREST, _LARGEST = 64, 256
-"""Faces that are looked at for each point: those with the nearest middles, and the largest of all,
-whose middles may be far from points on them."""
+"""Numbers of faces that are tested for each point: those with the nearest centres, and the largest
+of all, whose centres may be far from points on them."""
 _SLACK = 1e-4
 """Barycentric weight below which a corner of a face may be left out; a margin for rounding."""
 
 
 @dataclass(frozen=True)
 class Anchors:
-    """Points as means of a mesh's vertices.
+    """Points as weighted means of a mesh's vertices.
 
     Attributes:
         corners: (n, 3) numbers of vertices.
-        weights: (n, 3), adding up to 1.
+        weights: (n, 3) weights, which add up to 1.
     """
 
     corners: NDArray[np.int64]
     weights: FloatArray
 
     def on(self, vertices: FloatArray) -> FloatArray:
-        """(n, 3) mm: where the points are when the vertices (v, 3) are there."""
+        """Return the points (n, 3), mm, for positions (v, 3) of the vertices."""
         moved: FloatArray = np.einsum("nk,nkc->nc", self.weights, vertices[self.corners])
         return moved
 
@@ -43,12 +43,13 @@ def anchored(
     """Find points (n, 3) on a mesh.
 
     Args:
-        points: mm.
-        mesh: mm.
-        tolerance: mm; how far off it a point may be.
+        points: (n, 3) points, mm.
+        mesh: the mesh, mm.
+        tolerance: largest distance of a point from the mesh, mm.
 
     Returns:
-        The points, and (n,) which of them were found; the others are anchored anywhere.
+        The anchors, and a mask (n,) of the points that were found; the anchors of others are
+        arbitrary.
     """
     distance, vertex = cKDTree(mesh.vertices).query(points)
     corners = np.repeat(vertex[:, None], 3, axis=1).astype(np.int64)

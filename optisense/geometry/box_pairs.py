@@ -10,31 +10,32 @@ from numpy.typing import NDArray
 from optisense.geometry.mesh import FloatArray
 
 _GROUP = 4
-"""Boxes of one level that get a box around them on the next."""
+"""Number of boxes of one level that a box of the next level encloses."""
 
 _FEW = 64
-"""A level of so few boxes has no next one."""
+"""Number of boxes up to which a level is the last one."""
 
 _AT_ONCE = 100_000
-"""Number of pairs of boxes that are looked into together, which bounds the memory of the arrays."""
+"""Number of pairs of boxes that are processed together, which bounds the memory of the arrays."""
 
 _DENSE = 1_000_000
-"""Up to so many pairs are compared one by one at once; to group them takes longer."""
+"""Number of pairs up to which all are compared directly, which is faster than grouping them."""
 
 _BLOCK = 64
-"""Boxes that follow one another and are looked at together first: they mostly lie together."""
+"""Number of consecutive boxes that are first tested together, as they mostly lie close to one
+another."""
 
 _SPREADING = (
     (32, 0x001F00000000FFFF), (16, 0x001F0000FF0000FF), (8, 0x100F00F00F00F00F),
     (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
 )  # fmt: skip
-"""Steps that move the bits of a number apart, two free places between any two."""
+"""Shifts and masks that spread the bits of a number, with two free places between any two."""
 
 IntArray = NDArray[np.int64]
 
 
 class _Boxes(NamedTuple):
-    """Boxes ordered so that neighbours lie together, and boxes around groups of them.
+    """Boxes in an order in which neighbours are close, and boxes around groups of them.
 
     Attributes:
         order: (n,) the given number of each box of the lowest level.
@@ -48,14 +49,14 @@ class _Boxes(NamedTuple):
 def meeting_boxes(
     low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
 ) -> tuple[IntArray, IntArray]:
-    """Pairs of boxes that meet or touch, in no order.
+    """Return the pairs of boxes of two sets that overlap or touch, in no particular order.
 
     Args:
-        low_1, high_1: (n, 3) corners.
-        low_2, high_2: (k, 3) corners of the others.
+        low_1, high_1: (n, 3) lower and upper corners of the first set.
+        low_2, high_2: (k, 3) lower and upper corners of the second set.
 
     Returns:
-        (p,) numbers of the first and (p,) of the second lot.
+        The numbers (p,) in the first set and (p,) in the second set.
     """
     kept_1, kept_2 = _in_reach(low_1, high_1, low_2, high_2)
     low_1, high_1, low_2, high_2 = low_1[kept_1], high_1[kept_1], low_2[kept_2], high_2[kept_2]
@@ -67,7 +68,9 @@ def meeting_boxes(
 
 
 def meeting_each_other(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
-    """Pairs of boxes of one lot that meet or touch; each pair once, the smaller number first."""
+    """Return the pairs of boxes of one set that overlap or touch; each pair once, the smaller
+    number first.
+    """
     if len(low) ** 2 <= _DENSE:
         one, other = np.nonzero(np.triu(_all_meeting(low, high, low, high), k=1))
         return one.astype(np.int64), other.astype(np.int64)
@@ -79,9 +82,9 @@ def meeting_each_other(low: FloatArray, high: FloatArray) -> tuple[IntArray, Int
 def _in_reach(
     low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
 ) -> tuple[IntArray, IntArray]:
-    """Boxes of either lot that may meet one of the other: mostly few, and soon told.
+    """Return the boxes of each set that may overlap one of the other, which are usually few.
 
-    They meet the box around all blocks of the other lot that meet a block of their own.
+    They overlap the box around all blocks of the other set that overlap a block of their own set.
     """
     if len(low_1) * len(low_2) == 0:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -107,7 +110,7 @@ def _blocks(low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _all_meeting(
     low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
 ) -> NDArray[np.bool_]:
-    """(n, k): which of n boxes meet which of k others."""
+    """Return a mask (n, k) of the overlaps between n boxes and k others."""
     meet = np.ones((len(low_1), len(low_2)), dtype=bool)
     for axis in range(3):
         meet &= low_1[:, None, axis] <= high_2[:, axis]
@@ -128,7 +131,9 @@ def _grouped(low: FloatArray, high: FloatArray) -> _Boxes:
 
 
 def _along_a_curve(points: FloatArray) -> NDArray[np.uint64]:
-    """(n,) each point's place along a Z-order curve (Morton, 1966), 16 bits an axis."""
+    """Return each point's position (n,) on a Z-order curve (Morton, 1966), with 16 bits per
+    axis.
+    """
     start, size = points.min(axis=0), np.ptp(points, axis=0).max()
     cells = ((points - start) * (65535.0 / max(size, 1e-300))).astype(np.uint64)
     key = np.zeros(len(points), dtype=np.uint64)
@@ -141,10 +146,12 @@ def _along_a_curve(points: FloatArray) -> NDArray[np.uint64]:
 
 
 def _descend(first: _Boxes, second: _Boxes, same: bool) -> tuple[IntArray, IntArray]:
-    """Descend from the outermost boxes, only into pairs that meet.
+    """Descend from the outermost boxes into pairs that overlap.
 
     Args:
-        same: both are one lot: each pair is wanted once, and none of a box with itself.
+        first, second: the boxes of both sets.
+        same: whether both are the same set; each pair is then returned once, and no box with
+            itself.
     """
     level_1, level_2 = len(first.levels) - 1, len(second.levels) - 1
     count_1, count_2 = len(first.levels[-1][0]), len(second.levels[-1][0])
@@ -171,7 +178,9 @@ def _descend(first: _Boxes, second: _Boxes, same: bool) -> tuple[IntArray, IntAr
 def _children(
     first: _Boxes, second: _Boxes, level_1: int, level_2: int, a: IntArray, b: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """All pairs of what lies in the pairs of boxes; a box of the lowest level stays itself."""
+    """Return all pairs of the children of pairs of boxes; a box of the lowest level is its own
+    child.
+    """
     inner = np.arange(_GROUP, dtype=np.int64)
     below_1 = _GROUP * a[:, None] + inner if level_1 else a[:, None]
     below_2 = _GROUP * b[:, None] + inner if level_2 else b[:, None]
@@ -192,7 +201,9 @@ def _those_that_meet(
     b: IntArray,
     same: bool,
 ) -> tuple[IntArray, IntArray]:
-    """The pairs of boxes a of one level and b of another that meet, and are wanted."""
+    """Return the pairs of boxes ``a`` of one level and ``b`` of another that overlap, each once if
+    ``same``.
+    """
     if same:
         wanted = a < b if level_1 == 0 else a <= b
         a, b = a[wanted], b[wanted]

@@ -3,9 +3,9 @@
 Free-form deformation with a tensor product of Bernstein polynomials (Sederberg and Parry,
 "Free-form deformation of solid geometric models", SIGGRAPH 1986). A lattice of n points along an
 axis gives polynomials of degree n - 1: the shape is smooth everywhere, the corner points are
-interpolated, and the lattice at rest leaves every point where it is (linear precision). A point
-in the middle of a side moves the surface by less than its own way: of three points in a row, the
-middle one has weight 1/2 over itself.
+interpolated, and the lattice at rest leaves every point where it is (linear precision). A point in
+the middle of a side moves the surface by less than its own displacement: of three points in a row,
+the middle one has weight 1/2 at its own place.
 """
 
 from __future__ import annotations
@@ -26,16 +26,17 @@ FloatArray = NDArray[np.float64]
 Resolution = tuple[int, int, int]
 
 OUTSIDE_TOLERANCE = 1e-6
-"""A vertex may lie this far (mm) outside of the box: rounding in a mesh file."""
+"""Largest distance (mm) of a vertex outside the box, which allows for rounding in a mesh file."""
 
 MOST_KEPT_WEIGHTS = 4_000_000
-"""Weights of more vertices times control points are not kept but worked out anew (32 MB)."""
+"""Number of weights (vertices times control points) above which they are computed again instead of
+being kept (32 MB)."""
 
 KEPT_WEIGHTS = 32_000_000
-"""Number of weights that are kept in all (256 MB); the ones not used for longest go first."""
+"""Total number of weights that are kept (256 MB); the least recently used are dropped first."""
 
 _VALUES_AT_ONCE = 4_000_000
-"""Number of products of basis functions that are made together, which bounds the memory of the
+"""Number of products of basis functions that are computed together, which bounds the memory of the
 arrays to 32 MB."""
 
 _digests: weakref.WeakKeyDictionary[TriangleMesh, bytes] = weakref.WeakKeyDictionary()
@@ -46,14 +47,14 @@ _lock = threading.Lock()
 
 
 def cage_points(box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """The control points of a cage at rest.
+    """Return the control points of a cage at rest.
 
     Args:
-        box: (2, 3) mm, lower and upper corner.
+        box: (2, 3) lower and upper corner, mm.
         resolution: number of points along x, y, z, at least 2 each.
 
     Returns:
-        (nx * ny * nz, 3) float64, mm; x slowest, z fastest.
+        The points (nx * ny * nz, 3) float64, mm; x varies slowest, z fastest.
     """
     lower, upper = np.asarray(box, dtype=np.float64)
     axes = [np.linspace(lower[k], upper[k], resolution[k]) for k in range(3)]
@@ -61,18 +62,18 @@ def cage_points(box: ArrayLike, resolution: Resolution) -> FloatArray:
 
 
 def cage_weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """How much each control point moves each vertex.
+    """Return the weight of each control point in the displacement of each vertex.
 
     Args:
-        vertices: (n, 3) mm, undeformed; all inside the box.
+        vertices: (n, 3) undeformed vertices, mm, all inside the box.
         box: (2, 3) mm, lower and upper corner.
         resolution: number of points along x, y, z, at least 2 each.
 
     Returns:
-        (n, nx * ny * nz) float64; each row adds up to 1.
+        The weights (n, nx * ny * nz) float64; each row adds up to 1.
 
     Raises:
-        DesignError: a vertex lies outside the box, where the polynomials would run away.
+        DesignError: a vertex lies outside the box, where the polynomials grow without bound.
     """
     along = [
         bernstein(t, n) for t, n in zip(shares(vertices, box).T, resolution, strict=True)
@@ -82,7 +83,9 @@ def cage_weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) ->
 
 
 def deform(weights: FloatArray, points: ArrayLike) -> FloatArray:
-    """The deformed vertices (n, 3) mm for `weights` (n, N) and control points (N, 3) mm."""
+    """Return the deformed vertices (n, 3), mm, for `weights` (n, N) and control points (N, 3),
+    mm.
+    """
     moved: FloatArray = weights @ np.asarray(points, dtype=np.float64).reshape(-1, 3)
     return moved
 
@@ -90,17 +93,17 @@ def deform(weights: FloatArray, points: ArrayLike) -> FloatArray:
 def deformed(
     mesh: TriangleMesh, box: ArrayLike, resolution: Resolution, points: ArrayLike
 ) -> TriangleMesh:
-    """A mesh as its cage bends it; shading normals are dropped.
+    """Return a mesh bent by its cage; shading normals are dropped.
 
-    The same mesh bent in the same way twice running is the same object, so that what was worked
-    out about it serves again.
+    Two successive calls with the same arguments return the same object, so that its cached
+    properties are reused.
 
-    The weights are kept for the next call with a mesh of the same vertices, whichever object
-    that is; of a fine cage around a large mesh they would be too many, and each call works
-    them out. Not for use with `mesh.vertices` changed in place.
+    The weights are kept for the next call with a mesh of the same vertices, even if it is another
+    object. For a fine cage around a large mesh there are too many weights, and each call computes
+    them. `mesh.vertices` must not be changed in place.
 
     Args:
-        mesh: at rest, mm; all of it inside the box.
+        mesh: the mesh at rest, mm, all inside the box.
         box: (2, 3) mm, lower and upper corner.
         resolution: number of points along x, y, z, at least 2 each.
         points: (nx * ny * nz, 3) mm.
@@ -131,7 +134,7 @@ def _bent(
 
 
 def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """`cage_weights` of a mesh's vertices, read-only, found again by their content."""
+    """Return the read-only `cage_weights` of a mesh's vertices, cached by their content."""
     with _lock:
         digest = _digests.get(mesh)
     if digest is None:
@@ -153,7 +156,8 @@ def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> 
 
 
 def shares(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
-    """(n, 3) where vertices (n, 3) mm lie in the box (2, 3) mm, 0 to 1 along each axis.
+    """Return the relative positions (n, 3) of vertices (n, 3), mm, in the box (2, 3), mm, 0 to 1
+    along each axis.
 
     Raises:
         DesignError: a vertex lies outside the box.
@@ -176,7 +180,9 @@ def shares(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
 
 
 def bernstein(t: FloatArray, count: int) -> FloatArray:
-    """The `count` Bernstein polynomials of degree `count` - 1 at t (n,): (n, count)."""
+    """Return the values (n, count) of the `count` Bernstein polynomials of degree `count` - 1 at t
+    (n,).
+    """
     i = np.arange(count)
     degree = count - 1
     binomial = np.array([math.comb(degree, k) for k in range(count)], dtype=np.float64)
@@ -184,11 +190,11 @@ def bernstein(t: FloatArray, count: int) -> FloatArray:
 
 
 def contract(bases: list[FloatArray], points: FloatArray, resolution: Resolution) -> FloatArray:
-    """Sums over a lattice without the product of its bases: (n, 3).
+    """Return the sums (n, 3) over a lattice, without forming the product of its bases.
 
     Args:
-        bases: (n, nx), (n, ny), (n, nz), of any kind.
-        points: (nx * ny * nz, 3).
+        bases: (n, nx), (n, ny) and (n, nz) values of any basis functions.
+        points: (nx * ny * nz, 3) coefficients.
         resolution: nx, ny, nz.
     """
     nx, ny, nz = resolution

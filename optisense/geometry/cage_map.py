@@ -10,23 +10,24 @@ from numpy.typing import ArrayLike
 from optisense.geometry.cage import FloatArray, Resolution, bernstein, contract, shares
 
 MOST_COMBINATIONS = 100_000
-"""More combinations of slopes than these are not tried: the answer is then "not known"."""
+"""Largest number of combinations of differences that are tested; with more, the result is
+unknown."""
 
 
 def jacobians(
     vertices: ArrayLike, box: ArrayLike, resolution: Resolution, points: ArrayLike
 ) -> FloatArray:
-    """How space is stretched around each vertex.
+    """Return the Jacobian matrix of the deformation at each vertex.
 
     Args:
-        vertices: (n, 3) mm, at rest, inside the box.
+        vertices: (n, 3) vertices at rest, mm, inside the box.
         box: (2, 3) mm.
         resolution: number of points along x, y, z.
         points: (nx * ny * nz, 3) mm.
 
     Returns:
-        (n, 3, 3): derivative of deformed coordinate (row) by coordinate at rest (column). Its
-        determinant is the local change of volume; negative where space is turned inside out.
+        The derivatives (n, 3, 3) of deformed coordinates (row) by coordinates at rest (column). The
+        determinant is the local change of volume; it is negative where space is turned inside out.
 
     Raises:
         DesignError: a vertex lies outside the box.
@@ -36,7 +37,7 @@ def jacobians(
     lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
     result = np.empty((len(share), 3, 3))
     for axis in range(3):
-        # The derivative of a Bernstein sum is one of a degree less over the differences.
+        # The derivative of a Bernstein sum is the sum of one degree less over the differences.
         size = upper[axis] - lower[axis]
         slopes = np.diff(lattice, axis=axis) * (resolution[axis] - 1) / size
         nx, ny, nz = slopes.shape[:3]
@@ -46,14 +47,15 @@ def jacobians(
 
 
 def is_one_to_one(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> bool:
-    """Whether it is certain that no two points of the box are sent to the same place.
+    """Return whether the map of the box by the cage is certainly one to one.
 
-    A sufficient condition, which bends of ordinary size meet: if the derivative has a positive
-    definite symmetric part all over a convex box, the map is one to one (the way from one image
-    to another never turns back on the way between the points). Each column of the derivative is
-    a mean of the differences of control points along its axis, and positive definite matrices
-    form a convex set, so that combinations of these differences are all that need trying; they
-    are taken relative to the mean derivative, which makes turning the whole lattice harmless.
+    The condition is sufficient and holds for bends of ordinary size: if the symmetric part of the
+    derivative is positive definite everywhere in a convex box, the map is one to one (the
+    difference of two images has a positive component along the difference of the points). Each
+    column of the derivative is a mean of the differences of control points along its axis, and
+    positive definite matrices form a convex set, so that only combinations of these differences
+    need to be tested. They are taken relative to the mean derivative, so that a rotation of the
+    whole lattice has no effect.
 
     Args:
         box: (2, 3) mm.
@@ -61,7 +63,7 @@ def is_one_to_one(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> 
         points: (nx * ny * nz, 3) mm.
 
     Returns:
-        True for certain; False when it may or may not be.
+        True if the map is certainly one to one; False if it is unknown.
     """
     lower, upper = np.asarray(box, dtype=np.float64)
     lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
@@ -91,18 +93,18 @@ def is_one_to_one(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> 
 
 
 def refined_points(points: ArrayLike, resolution: Resolution, finer: Resolution) -> FloatArray:
-    """Control points of a finer lattice that gives exactly the same deformation.
+    """Return control points of a finer lattice with exactly the same deformation.
 
-    Degree elevation of Bernstein polynomials (Farin, "Curves and Surfaces for CAGD", section
-    on degree elevation), axis by axis, one point at a time.
+    The method is degree elevation of Bernstein polynomials (Farin, "Curves and Surfaces for CAGD",
+    section on degree elevation), axis by axis, one point at a time.
 
     Args:
         points: (nx * ny * nz, 3) mm.
         resolution: nx, ny, nz.
-        finer: at least as many points along each axis.
+        finer: resolution of the finer lattice, at least as many points along each axis.
 
     Returns:
-        (fx * fy * fz, 3) float64, mm.
+        The control points (fx * fy * fz, 3) float64, mm.
 
     Raises:
         ValueError: `finer` has fewer points along an axis.

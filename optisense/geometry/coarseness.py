@@ -1,4 +1,4 @@
-"""Whether the triangles of a mesh are small enough to follow its cage."""
+"""The error of a bent mesh whose triangles are too large to follow its cage."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class ChordError(NamedTuple):
     """The largest distance of a bent mesh from the exact shape that its cage gives.
 
     Attributes:
-        distance: mm, at the middle of the worst edge.
-        place: (3,) mm, where, in the bent shape.
+        distance: distance at the middle of the worst edge, mm.
+        place: (3,) this place in the bent shape, mm.
     """
 
     distance: float
@@ -36,14 +36,14 @@ def chord_error(
     resolution: Resolution,
     points: ArrayLike,
 ) -> ChordError:
-    """How far the middles of long edges are from where the cage would put them.
+    """Return the largest distance of the middles of long edges from their exact deformed positions.
 
-    Only vertices are bent; between them a mesh stays straight.
+    The cage moves vertices only; between them a mesh stays straight.
 
     Args:
-        mesh: at rest, mm, with faces.
-        bent: the same faces, bent.
-        box, resolution, points: of the cage.
+        mesh: the mesh at rest, mm, with faces.
+        bent: the same mesh, bent.
+        box, resolution, points: box, resolution and control points of the cage.
     """
     edges = _longest.get(mesh)
     if edges is None:

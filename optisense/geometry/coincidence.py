@@ -19,13 +19,14 @@ from optisense.geometry.box_pairs import meeting_boxes
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))
-"""Faces of two tessellations of one curved surface differ by a few degrees at most."""
+"""Smallest cosine between the normals of coincident faces (10 degrees); faces of two tessellations
+of one curved surface differ by a few degrees at most."""
 
 _GRID = 1e-7
 """Grid in mm to which cut polygons are rounded, so that neighbouring cuts close; far below any
 dimension of a part."""
 _THINNEST = 1e-4
-"""Thickness in mm below which what is left over of a face is rounding and not shape."""
+"""Thickness (mm) below which the remainder of a face counts as rounding."""
 
 Pairs = NDArray[np.int64]
 
@@ -44,19 +45,20 @@ class Overlay:
     pairs: Pairs
 
     def reversed(self) -> Overlay:
-        """The same coincidences seen from the other mesh."""
+        """Return the same coincidences with the meshes exchanged."""
         return Overlay(self.second, self.first, self.pairs[:, ::-1])
 
 
 def find_coincident(
     first: TriangleMesh, second: TriangleMesh, tolerance: float, facing: bool
 ) -> Overlay:
-    """Pairs of faces that lie on one another to `tolerance` (mm).
+    """Find the pairs of faces that coincide within a tolerance.
 
     Args:
         first, second: any meshes.
-        tolerance: mm.
-        facing: only faces that look at each other (solids that touch); else either way.
+        tolerance: largest distance between coincident faces, mm.
+        facing: whether only faces with opposite normals count (solids that touch); otherwise
+            normals may also agree.
     """
     if not boxes_overlap(first, second, -tolerance):
         return Overlay(first, second, np.zeros((0, 2), dtype=np.int64))
@@ -84,10 +86,10 @@ def find_coincident(
 
 
 def _common(triangles: FloatArray, others: FloatArray) -> Any:
-    """(k,) polygons that triangles (k, 3, 2) have in common, pair by pair.
+    """Return the intersections (k,) of triangles (k, 3, 2), pair by pair.
 
-    Edges that run along each other up to rounding can make an exact overlay lose the polygon:
-    where none came out, it is done again on a grid, which is slower and sure.
+    Edges that coincide up to rounding can make an exact overlay lose the polygon. Where the result
+    is empty, the overlay is repeated on a grid, which is slower and reliable.
     """
     one, other = shapely.polygons(triangles), shapely.polygons(others)
     patches = shapely.intersection(one, other)
@@ -97,8 +99,8 @@ def _common(triangles: FloatArray, others: FloatArray) -> Any:
 
 
 def boxes_overlap(first: TriangleMesh, second: TriangleMesh, depth: float) -> bool:
-    """Whether the boxes around two meshes have more than `depth` (mm) in common each way;
-    a negative depth is a gap that still counts.
+    """Return whether the boxes around two meshes overlap by more than `depth` (mm) along each axis;
+    a negative depth allows a gap.
     """
     if len(first.faces) == 0 or len(second.faces) == 0:
         return False
@@ -108,15 +110,15 @@ def boxes_overlap(first: TriangleMesh, second: TriangleMesh, depth: float) -> bo
 
 
 def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:
-    """Divide a mesh by what lies on it.
+    """Divide a mesh into the patches that coincide with other meshes, and the rest.
 
     Args:
         mesh: the mesh that is `first` in each overlay.
-        overlays: what lies on the mesh; where several do, the first one counts.
+        overlays: the coincidences; where several overlap, the first one counts.
 
     Returns:
-        One mesh an overlay (the part that it covers) and last the part that nothing covers.
-        Together they are `mesh`; whole faces stay whole, others are cut up.
+        One mesh per overlay, the part that it covers, and last the part that nothing covers.
+        Together they form `mesh`; completely covered or free faces are kept, others are cut.
     """
     state = _Remainder(mesh)
     parts = []
@@ -185,7 +187,7 @@ class _Frames:
         return _Frames(frames.origin, axes, frames.flat(corners)[:, :, :2])
 
     def flat(self, points: FloatArray) -> FloatArray:
-        """(k, c, 3) points -> their (x, y, height) in the frame of each face."""
+        """Transform points (k, c, 3) to (x, y, height) in the frame of each face."""
         return (points - self.origin[:, None]) @ self.axes.transpose(0, 2, 1)
 
     def take(self, which: NDArray[Any]) -> _Frames:
@@ -193,7 +195,9 @@ class _Frames:
 
 
 def _twins(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> Pairs:
-    """Pairs of faces with the same corners: the common case, and far cheaper to find."""
+    """Return the pairs of faces with the same corners, the common case, which is much faster to
+    find.
+    """
     kept = np.flatnonzero(_in_reach(first, second, tolerance))
     if len(kept) == 0:
         return np.zeros((0, 2), dtype=np.int64)
@@ -208,7 +212,7 @@ def _twins(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> Pairs
 
 
 def _in_reach(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> NDArray[np.bool_]:
-    """(m,) which faces of `first` meet the bounding box of `second`."""
+    """Return a mask (m,) of the faces of `first` that overlap the bounding box of `second`."""
     low, high = second.bounds[0] - tolerance, second.bounds[1] + tolerance
     lowest, highest = first.face_bounds
     reach: NDArray[np.bool_] = ((lowest <= high) & (highest >= low)).all(axis=1)
@@ -218,7 +222,9 @@ def _in_reach(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> ND
 def _near_pairs(
     first: TriangleMesh, second: TriangleMesh, tolerance: float, without: Pairs
 ) -> Pairs:
-    """Pairs of faces whose boxes, grown by `tolerance`, meet; those in `without` are done with."""
+    """Return the pairs of faces whose boxes, grown by `tolerance`, overlap, except those in
+    `without`.
+    """
     reach_1, reach_2 = _in_reach(first, second, tolerance), _in_reach(second, first, tolerance)
     reach_1[without[:, 0]] = False
     reach_2[without[:, 1]] = False
@@ -232,20 +238,26 @@ def _near_pairs(
 
 
 def _contains(triangles: FloatArray, points: FloatArray, tolerance: float) -> NDArray[np.bool_]:
-    """(k,) whether all points (k, c, 2) lie in the triangle (k, 3, 2), of either winding."""
+    """Return a mask (k,) of the triangles (k, 3, 2), of either winding, that contain all their
+    points (k, c, 2).
+    """
     inside: NDArray[np.bool_] = np.all(_inward(triangles, points) >= -tolerance, axis=(1, 2))
     return inside
 
 
 def _apart(triangles: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
-    """(k,) whether some edge of the triangle (k, 3, 2) has all points (k, c, 2) beyond it."""
+    """Return a mask (k,) of the triangles (k, 3, 2) with an edge beyond which all their points
+    (k, c, 2) lie.
+    """
     beyond = _inward(triangles, points) <= _THINNEST
     apart: NDArray[np.bool_] = np.any(np.all(beyond, axis=2), axis=1)
     return apart
 
 
 def _inward(triangles: FloatArray, points: FloatArray) -> FloatArray:
-    """(k, 3, c) distance of points (k, c, 2) from each edge line, positive towards the inside."""
+    """Return the distance (k, 3, c) of points (k, c, 2) from each edge line, positive towards the
+    inside.
+    """
     edges = np.roll(triangles, -1, axis=1) - triangles
     length = np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
     turn = np.sign(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
@@ -256,9 +268,9 @@ def _inward(triangles: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def _united(faces: NDArray[np.int32], corners: FloatArray) -> Any:
-    """The union of flat triangles (g, 3, 2) whose vertices are numbered by `faces` (g, 3).
+    """Return the union of flat triangles (g, 3, 2) whose vertices are numbered by `faces` (g, 3).
 
-    Edges between two of the faces cancel; their outline is all that needs overlaying.
+    Edges between two of the faces cancel, so that only their outline needs an overlay.
     """
     size = int(faces.max()) + 1
     starts, ends = faces.reshape(-1).astype(np.int64), np.roll(faces, -1, axis=1).reshape(-1)
@@ -272,7 +284,9 @@ def _united(faces: NDArray[np.int32], corners: FloatArray) -> Any:
 
 
 def _heights(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """(k, c) absolute height, over points (k, c, 2), of the planes of triangles (k, 3, 3)."""
+    """Return the absolute height (k, c), over points (k, c, 2), of the planes of triangles
+    (k, 3, 3).
+    """
     a = triangles[:, 0]
     normal = np.cross(triangles[:, 1] - a, triangles[:, 2] - a)
     slope = -normal[:, :2] / np.where(normal[:, 2:] == 0.0, 1e-300, normal[:, 2:])
@@ -280,7 +294,7 @@ def _heights(points: FloatArray, triangles: FloatArray) -> FloatArray:
 
 
 def _is_shape(polygons: Any) -> NDArray[np.bool_]:
-    """Whether polygons are more than rounding."""
+    """Return a mask of the polygons that are larger than rounding."""
     shape: NDArray[np.bool_] = 2.0 * shapely.area(polygons) > _THINNEST * shapely.length(polygons)
     return shape
 
@@ -293,7 +307,7 @@ def _without_slivers(shape: Any) -> Any:
 def _assembled(
     mesh: TriangleMesh, whole: NDArray[np.int64], patches: dict[int, Any]
 ) -> TriangleMesh:
-    """Whole faces of a mesh, and patches of other faces (given in the faces' frames)."""
+    """Return a mesh of whole faces, and patches of other faces (given in the faces' frames)."""
     kept = TriangleMesh(mesh.vertices, mesh.faces[np.sort(whole)], mesh.normals)
     pieces = [kept.compacted()]
     faces = np.array(list(patches), dtype=np.int64)
@@ -317,7 +331,9 @@ def _assembled(
 
 
 def _interpolated(values: FloatArray, corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Unit vectors at points (n, 2), from `values` (3, 3) at the corners (3, 2) of a triangle."""
+    """Interpolate unit vectors at points (n, 2) from `values` (3, 3) at the corners (3, 2) of a
+    triangle.
+    """
     edges = (corners[1:] - corners[0]).T
     bary = np.linalg.solve(edges, (points - corners[0]).T).T
     mixed = values[0] + bary @ (values[1:] - values[0])

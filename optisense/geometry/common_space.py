@@ -16,17 +16,18 @@ _known: weakref.WeakKeyDictionary[TriangleMesh, Places] = weakref.WeakKeyDiction
 
 
 def common_space(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> FloatArray | None:
-    """The middle of a space that two solids share; kept for the next call with the same two.
+    """Return the middle of a space that two solids share; cached for the next call with the same
+    solids.
 
-    Facets of two parts that touch reach into each other by a little. A common space counts where
-    it is on average thicker than that: twice its volume over its surface.
+    Facets of two parts that touch overlap slightly. A common space counts if its mean thickness,
+    twice its volume over its surface, is larger than that.
 
     Args:
-        first, second: closed, mm.
-        thinnest: mm; thinner ones do not count.
+        first, second: closed meshes, mm.
+        thinnest: smallest mean thickness that counts, mm.
 
     Returns:
-        (3,) mm; None where they share none, or where a mesh is no clean volume.
+        The middle (3,), mm; None if they share no space, or if a mesh is not a valid volume.
     """
     beside = _known.setdefault(first, weakref.WeakKeyDictionary())
     if second not in beside:
@@ -41,14 +42,14 @@ def _found(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> FloatA
 
 
 def thick_place(common: Any, thinnest: float) -> FloatArray | None:
-    """The middle of a piece of a common space that is thicker than a contact.
+    """Return the middle of a piece of a common space that is thicker than a contact.
 
     Args:
-        common: of manifold3d.
-        thinnest: mm, twice the volume of a piece over its surface.
+        common: the common space, a manifold3d object.
+        thinnest: smallest mean thickness (twice the volume over the surface), mm.
 
     Returns:
-        (3,) mm; None where all pieces are thinner.
+        The middle (3,), mm; None if all pieces are thinner.
     """
     for piece in common.decompose():
         if 2.0 * piece.volume() > thinnest * piece.surface_area():
@@ -58,7 +59,9 @@ def thick_place(common: Any, thinnest: float) -> FloatArray | None:
 
 
 def as_manifold(mesh: TriangleMesh) -> Any:
-    """A mesh as manifold3d has it; empty, and its status says why, where it is no clean volume."""
+    """Convert a mesh to manifold3d; a mesh that is not a valid volume gives an empty object with a
+    status.
+    """
     import manifold3d
 
     welded = mesh.welded()

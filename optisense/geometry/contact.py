@@ -1,4 +1,4 @@
-"""A contact: what presses on the sensor, where, and how deep."""
+"""A contact: an indenter with its place and depth on the sensor."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
 
 REACH_MARGIN = 0.5
-"""An indenter is modelled to this height (mm) above what it can touch."""
+"""Height (mm) above the reach of the contact up to which an indenter is modelled."""
 
 LEAST_FORCE, MOST_FORCE = 1e-6, 1e6
-"""N: forces that can be given. The lower is the weight of a grain of sand, the upper that of a
-hundred tons; a gel takes some ten."""
+"""Smallest and largest force (N) that can be given. The lower is the weight of a grain of sand, the
+upper that of a hundred tons; a gel takes some ten."""
 
 ON_SURFACE = 0.5
-"""A contact point given as x, y, z may lie this far (mm) from the sensing surface."""
+"""Largest distance (mm) from the sensing surface of a contact point given as x, y, z."""
 
 
 @dataclass(frozen=True)
@@ -31,21 +31,22 @@ class Contact:
     """An indenter pressed into the sensing surface along its inward normal.
 
     Attributes:
-        indenter: what presses.
-        at: (u, v) mm, surface coordinates (see `SensingSurface`); (0, 0) if neither is given.
-        point: (x, y, z) mm in the design's frame, instead of `at`; its nearest surface point
-            counts.
-        depth: mm, from the undeformed surface to the indenter's lowest point.
-        rotation: degrees about the outward normal, counter-clockwise seen from outside, from
-            the position in which the indenter's x axis runs along u.
-        along: (3,) direction in the design's frame that the x axis runs along instead of u, as
-            far as the surface allows.
-        force: N, along the inward normal, in place of a depth: the elastic gel then decides how
-            deep the indenter goes.
-        shift: (2,) mm along u and v that the indenter has moved to this place since it was pressed
-            in; the elastic skin follows as far as friction holds it.
-        twist: degrees about the outward normal, counter-clockwise seen from outside, that it has
-            turned since.
+        indenter: the indenter.
+        at: surface coordinates (u, v), mm (see `SensingSurface`); (0, 0) if neither `at` nor
+            `point` is given.
+        point: (x, y, z) in the design's frame (mm), instead of `at`; the nearest point of the
+            surface is used.
+        depth: distance (mm) from the undeformed surface to the indenter's lowest point.
+        rotation: rotation (degrees) about the outward normal, counter-clockwise seen from outside;
+            at 0 the indenter's x axis is parallel to u.
+        along: (3,) direction in the design's frame whose projection on the surface replaces u as
+            the direction of the x axis.
+        force: force (N) along the inward normal, instead of a depth: the depth then follows from
+            the elasticity of the gel.
+        shift: (2,) displacement (mm) along u and v by which the indenter has moved to this place
+            after it was pressed in; the elastic skin follows as far as friction allows.
+        twist: rotation (degrees) about the outward normal, counter-clockwise seen from outside,
+            after the indenter was pressed in.
     """
 
     indenter: Indenter
@@ -92,10 +93,10 @@ class Contact:
 
 
 def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
-    """Where a contact sits on a sensing surface.
+    """Return the place of a contact on a sensing surface.
 
     Raises:
-        ContactError: it is off the surface.
+        ContactError: the contact is off the surface.
     """
     if contact.point is None:
         return surface.point_at(*(contact.at or (0.0, 0.0)))
@@ -116,20 +117,20 @@ def place(
     gel: TriangleMesh | None = None,
     facet_error: float = FACET_ERROR,
 ) -> TriangleMesh:
-    """The indenter's mesh in the design's frame, pressed in.
+    """Return the pressed-in mesh of an indenter in the design's frame.
 
-    The gel is not cut: where the indenter lies below the sensing surface it replaces it, so the
-    first of both surfaces that a ray inside the gel meets is the one that counts.
+    The gel is not cut: where the indenter lies below the sensing surface it replaces it, so that a
+    ray inside the gel sees the first of the two surfaces.
 
     Args:
         contact: the contact.
         surface: the sensing surface.
-        gel: the elastomer under it, closed; None leaves the depth unchecked.
-        facet_error: mm, largest distance of the mesh from the indenter's exact shape.
+        gel: the elastomer under it, a closed mesh; None to leave the depth unchecked.
+        facet_error: largest distance of the mesh from the indenter's exact shape, mm.
 
     Returns:
-        The part of the indenter that can reach the surface, mm; faces and shading normals point
-        out of the indenter, into the gel.
+        The part of the indenter (mm) that can reach the surface; face and shading normals point out
+        of the indenter, into the gel.
 
     Raises:
         ContactError: the contact is off the surface or as deep as the gel.
@@ -157,10 +158,10 @@ def place_on_gels(
     gels: Sequence[TriangleMesh],
     facet_error: float = FACET_ERROR,
 ) -> TriangleMesh:
-    """Place a contact as `place` does, on whichever of several elastomers lies under it.
+    """Place a contact, as in `place`, on the one of several elastomers that lies under it.
 
     Raises:
-        ContactError: as of `place`, for the first elastomer.
+        ContactError: the error of `place` for the first elastomer.
     """
     if not gels:
         return place(contact, surface, facet_error=facet_error)
@@ -174,12 +175,12 @@ def place_on_gels(
 
 
 def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> float:
-    """How thick (mm) the gel is from a point of its surface along the inward normal.
+    """Return the thickness (mm) of the gel at a point of its surface along the inward normal.
 
     Args:
-        point: (3,) mm, on the surface of the gel.
+        point: (3,) point on the surface of the gel, mm.
         inward: (3,) unit vector into the gel.
-        gel: closed mesh, mm, faces outward.
+        gel: closed mesh, mm, with outward face normals.
 
     Raises:
         ContactError: there is no gel behind the point.
@@ -201,7 +202,8 @@ def surface_axes(
     surface: SensingSurface,
     along: tuple[float, float, float] | None = None,
 ) -> NDArray[np.float64]:
-    """(3, 3): columns x, y, z at a place of a surface; z is outward and x runs along u.
+    """Return the axes (3, 3) as columns x, y, z at a place of a surface; z points outward and x
+    along u.
 
     Args:
         inward: (3,) unit normal there.
@@ -223,7 +225,9 @@ def surface_axes(
 def _axes(
     inward: NDArray[np.float64], surface: SensingSurface, contact: Contact
 ) -> NDArray[np.float64]:
-    """(3, 3): columns are the indenter's x, y, z; z is outward, x along u or as told, turned."""
+    """Return the indenter's axes (3, 3) as columns x, y, z; z points outward, and x along u or
+    `along`, rotated.
+    """
     z = -inward
     x, y, _ = surface_axes(inward, surface, contact.along).T
     a = math.radians(contact.rotation)

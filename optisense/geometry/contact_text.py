@@ -29,11 +29,11 @@ _FORM = "Write it as KIND:SIZE@U,V:DEPTH, for example sphere:1.5@0,0:0.8, in mm 
 
 
 def parse_contact(text: str) -> Contact:
-    """Read a contact such as `sphere:1.5@0,0:0.8`; the module says all it may be.
+    """Read a contact such as `sphere:1.5@0,0:0.8`; see the module for the syntax.
 
     Raises:
-        ContactError: the text is not a contact, or its numbers make no sense. (A mesh file is
-            read when the contact is placed.)
+        ContactError: the text is not a contact, or its numbers are invalid. (A mesh file is read
+            when the contact is placed.)
     """
     try:
         shape, separator, rest = text.strip().rpartition("@")
@@ -76,7 +76,7 @@ def parse_contact(text: str) -> Contact:
 
 
 def _motion(words: list[str]) -> tuple[tuple[float, float], float]:
-    """The shift and the twist of words such as `shift=0.2,0`."""
+    """Return the shift and the twist of words such as `shift=0.2,0`."""
     shift, twist = Contact.shift, Contact.twist
     for word in words:
         name, _, value = word.partition("=")
@@ -94,7 +94,7 @@ def _motion(words: list[str]) -> tuple[tuple[float, float], float]:
 
 
 def parse_place(text: str) -> tuple[float, float] | tuple[float, float, float]:
-    """Read a place such as `3,-2`, in mm; the module says what it may be.
+    """Read a place such as `3,-2`, in mm; see the module for the syntax.
 
     Raises:
         ContactError: the text is neither two nor three numbers.
@@ -114,7 +114,7 @@ def parse_indenter(text: str) -> Indenter:
     """Read an indenter, such as `sphere:1.5`.
 
     Raises:
-        ContactError: there is no such kind of indenter, or its numbers make no sense.
+        ContactError: there is no such kind of indenter, or its numbers are invalid.
     """
     kind, _, sizes = text.strip().partition(":")
     try:
@@ -125,7 +125,9 @@ def parse_indenter(text: str) -> Indenter:
 
 
 def _depth_or_force(text: str) -> tuple[float, float | None]:
-    """The depth of a number without a unit; the usual depth and the force of one in N."""
+    """Return the depth of a number without a unit, or the default depth and the force of one in
+    N.
+    """
     word = text.strip()
     if word[-1:] in ("N", "n") and word[:-1].strip()[-1:] in "0123456789.":
         return Contact.depth, _numbers(word[:-1], "the force", (1,))[0]

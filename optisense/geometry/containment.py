@@ -8,17 +8,19 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 WAY = np.array([0.3578, 0.2113, 0.9096])
-"""Rays go this way: along no axis, so that they meet few edges of a mesh that has symmetries."""
+"""Direction of the test rays: not parallel to an axis, so that they meet few edges of symmetric
+meshes."""
 
 NEAR_EDGE = 1e-9
-"""A ray that passes an edge of a face this closely, as part of the face's size, is not trusted."""
+"""Distance of a ray from an edge, as a share of the face's size, below which its result is not
+used."""
 
 
 def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
-    """(n,) bool: which of (n, 3) points (mm) are inside a closed mesh, however its faces wind.
+    """Return a mask (n,) of the points (n, 3), mm, inside a closed mesh of either winding.
 
-    A ray from the point is odd or even by the faces it leaves and enters through; where it
-    passes too near to an edge, the solid angle of the whole mesh decides.
+    The test counts the crossings of a ray from the point with the mesh; if the ray passes too close
+    to an edge, the solid angle of the whole mesh is used.
     """
     places = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     result = np.zeros(len(places), dtype=bool)
@@ -43,7 +45,9 @@ def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
 
 
 def _frame() -> FloatArray:
-    """(3, 3): rows are two axes square to the rays, and their way."""
+    """Return the axes (3, 3) as rows: two axes perpendicular to the rays, and the rays'
+    direction.
+    """
     way = WAY / np.linalg.norm(WAY)
     across = np.cross(way, (1.0, 0.0, 0.0))
     across /= np.linalg.norm(across)
@@ -51,7 +55,9 @@ def _frame() -> FloatArray:
 
 
 def _crossings(corners: FloatArray) -> int | None:
-    """How often a ray from the origin along +z leaves more than it enters, or None if unsure."""
+    """Return the number of exits minus entries of a ray from the origin along +z, or None if it is
+    uncertain.
+    """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     edges = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
     area = edges.sum(axis=1)
@@ -59,7 +65,7 @@ def _crossings(corners: FloatArray) -> int | None:
     with np.errstate(divide="ignore", invalid="ignore"):
         share = edges / area[:, None]
     unsure = (np.abs(edges) <= NEAR_EDGE * size[:, None]).any(axis=1)
-    # An edge that the ray's line passes nowhere near is no reason to doubt.
+    # Edges that are far from the ray's line do not make the result uncertain.
     unsure &= (edges >= -NEAR_EDGE * size[:, None]).all(axis=1) | (
         edges <= NEAR_EDGE * size[:, None]
     ).all(axis=1)
@@ -75,10 +81,10 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def _turns(mesh: TriangleMesh, point: FloatArray) -> int:
-    """How often a mesh goes around a point.
+    """Return the winding number of a mesh around a point.
 
-    From its solid angle, summed with Van Oosterom and Strackee, "The solid angle of a plane
-    triangle", IEEE Trans. Biomed. Eng. 30 (1983).
+    It is computed from the solid angle (Van Oosterom and Strackee, "The solid angle of a plane
+    triangle", IEEE Trans. Biomed. Eng. 30, 1983).
     """
     corners = mesh.triangles - point
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]

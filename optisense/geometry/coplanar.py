@@ -1,4 +1,4 @@
-"""Merge coplanar triangles: a flat face needs no fine tessellation to be ray traced."""
+"""Merging of coplanar triangles, as ray tracing needs no fine tessellation of flat faces."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from scipy.sparse.csgraph import connected_components
 from optisense.geometry.mesh import TriangleMesh
 
 SAME_DIRECTION = 1e-10
-"""Faces whose normals' cosine differs by less from 1 may be coplanar."""
+"""Largest difference from 1 of the cosine between the normals of coplanar faces; a margin for
+rounding."""
 SAME_PLANE = 1e-6
 """Distance in mm below which two parallel planes are one; a margin for rounding."""
 STRAIGHT = 1e-6
-"""A corner whose sides' directions differ by less (sine) is no corner."""
+"""Sine of the angle between the sides of a corner below which the outline is straight there."""
 
 Loop = list[int]
 
 
 def merge_coplanar(mesh: TriangleMesh) -> TriangleMesh:
-    """The same surface with every flat, connected patch of triangles triangulated anew from its
-    outline.
+    """Triangulate every flat, connected patch of triangles of a mesh again from its outline.
 
-    Patches keep their outlines, less the points along straight lines. Shading normals are
-    dropped, so this is for meshes with flat facets. A patch whose outline touches itself is
-    left as it is.
+    Patches keep their outlines, except for points along straight lines. Shading normals are
+    dropped, so this is for meshes with flat facets. A patch whose outline touches itself is not
+    changed.
     """
     mesh = mesh.welded()
     patches = _patches(mesh)
@@ -42,7 +42,7 @@ def merge_coplanar(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def _patches(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """(m,) number of the coplanar, connected patch that each face belongs to."""
+    """Return the number (m,) of the coplanar, connected patch that each face belongs to."""
     faces = np.asarray(mesh.faces, dtype=np.int64)
     normals = mesh.face_normals
     offsets = np.einsum("ij,ij->i", normals, mesh.vertices[faces[:, 0]])
@@ -62,7 +62,7 @@ def _patches(mesh: TriangleMesh) -> NDArray[np.int64]:
 
 
 def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """New faces for a patch, or None where its outline is not made of simple loops."""
+    """Return new faces for a patch, or None if its outline does not consist of simple loops."""
     loops = _outline(faces)
     if loops is None:
         return None
@@ -82,8 +82,8 @@ def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.in
 
 
 def _outline(faces: NDArray[np.int64]) -> list[Loop] | None:
-    """Closed loops of vertices around a patch, with its inside on the left; None if two loops
-    touch.
+    """Return the closed loops of vertices around a patch, with its inside on the left; None if two
+    loops touch.
     """
     directed = {
         (int(a), int(b)) for f in faces for a, b in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))
@@ -108,7 +108,7 @@ def _outline(faces: NDArray[np.int64]) -> list[Loop] | None:
 
 
 def _corners(vertices: NDArray[np.float64], loop: Loop) -> Loop:
-    """The loop without the vertices that lie on a straight line between their neighbours."""
+    """Return the loop without the vertices that lie on a straight line between their neighbours."""
     points = vertices[loop]
     before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
     sine = np.linalg.norm(np.cross(before, after), axis=1)

@@ -11,7 +11,7 @@ from optisense.geometry.box_pairs import meeting_boxes, meeting_each_other
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 TOUCH = 1e-4
-"""mm: faces that reach through one another by less only touch."""
+"""Depth (mm) up to which faces that reach through one another only touch."""
 
 _PAIRS_AT_ONCE = 500_000
 """Number of pairs of faces that are intersected together, which bounds the memory of the arrays."""
@@ -21,8 +21,8 @@ class Crossings(NamedTuple):
     """Pairs of faces that cut through one another.
 
     Attributes:
-        pairs: (k, 2) int64, a face of the first and one of the second mesh.
-        places: (k, 3) float64, mm, a point that both have in common.
+        pairs: (k, 2) int64, numbers of a face of the first and one of the second mesh.
+        places: (k, 3) float64, a common point of both, mm.
     """
 
     pairs: NDArray[np.int64]
@@ -30,11 +30,12 @@ class Crossings(NamedTuple):
 
 
 def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
-    """Faces of one mesh that cut through each other; welded neighbours that only meet do not.
+    """Find the faces of one mesh that cut through each other; neighbours that only meet do not
+    count.
 
     Args:
         mesh: a mesh whose neighbours share vertices (see `TriangleMesh.welded`).
-        limit: stop looking once this many are found; None finds all.
+        limit: number of crossings after which the search ends; None finds all.
     """
     one, other = meeting_each_other(*mesh.face_bounds)
     solid = (mesh.face_areas[one] > 0.0) & (mesh.face_areas[other] > 0.0)
@@ -42,10 +43,11 @@ def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
 
 
 def crossings(first: TriangleMesh, second: TriangleMesh, limit: int | None = None) -> Crossings:
-    """Faces of two meshes that cut through each other; faces that lie on one another do not.
+    """Find the faces of two meshes that cut through each other; coincident faces do not count.
 
     Args:
-        limit: stop looking once this many are found; None finds all.
+        first, second: the meshes.
+        limit: number of crossings after which the search ends; None finds all.
     """
     return _crossings(first, second, *near_pairs(first, second), limit)
 
@@ -53,7 +55,7 @@ def crossings(first: TriangleMesh, second: TriangleMesh, limit: int | None = Non
 def near_pairs(
     first: TriangleMesh, second: TriangleMesh
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Pairs of faces whose boxes meet; faces without area are left out."""
+    """Return the pairs of faces whose boxes overlap; faces without area are left out."""
     one, other = meeting_boxes(*first.face_bounds, *second.face_bounds)
     solid = (first.face_areas[one] > 0.0) & (second.face_areas[other] > 0.0)
     return one[solid], other[solid]
@@ -66,11 +68,11 @@ def _crossings(
     other: NDArray[np.int64],
     limit: int | None,
 ) -> Crossings:
-    """Which of the pairs cross.
+    """Return the pairs of faces that cross.
 
-    Each reaches through the plane of the other, and what they cut out of the line in which the
-    planes meet overlaps (Moeller, "A fast triangle-triangle intersection test", J. Graphics
-    Tools 2, 1997).
+    Each reaches through the plane of the other, and their sections of the line in which the planes
+    intersect overlap (Moeller, "A fast triangle-triangle intersection test", J. Graphics Tools 2,
+    1997).
     """
     pairs, places, count = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 3))], 0
     for start in range(0, len(one), _PAIRS_AT_ONCE):
@@ -99,7 +101,7 @@ def _crossings(
 def _heights(
     of: TriangleMesh, faces: NDArray[np.int64], planes: TriangleMesh, against: NDArray[np.int64]
 ) -> FloatArray:
-    """(k, 3) mm: how far the corners of faces lie above the planes of others."""
+    """Return the heights (k, 3), mm, of the corners of faces above the planes of others."""
     origin = planes.triangles[against, :1]
     heights: FloatArray = np.einsum(
         "kci,ki->kc", of.triangles[faces] - origin, planes.face_normals[against]
@@ -115,9 +117,11 @@ def _reach_through(heights: FloatArray) -> NDArray[np.bool_]:
 def _cut_out(
     triangles: FloatArray, heights: FloatArray, line: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """What a plane cuts out of triangles: from and to along the line (mm), and a point of it."""
+    """Return the sections of triangles by a plane: start and end along the line (mm), and a point
+    of it.
+    """
     rows = np.arange(len(triangles))
-    # The corner that is alone on its side of the plane: both its edges go through.
+    # Both edges of the corner that is alone on its side of the plane pass through the plane.
     above = heights > 0.0
     alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
     apex, height = triangles[rows, alone], heights[rows, alone]

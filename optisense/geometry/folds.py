@@ -1,4 +1,4 @@
-"""Whether bending has folded a mesh, turned it inside out or pushed it through itself."""
+"""Detection of bent meshes that are folded, turned inside out or pushed through themselves."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from optisense.geometry.crossings import self_crossings
 from optisense.geometry.mesh import TriangleMesh
 
 COLLAPSED = 1e-6
-"""A face with less than this part of its area at rest has collapsed."""
+"""Share of its area at rest below which a face has collapsed."""
 
 _outlines: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int64]] = weakref.WeakKeyDictionary()
 
@@ -26,9 +26,9 @@ class Fold(NamedTuple):
     Attributes:
         kind: "inside out" (the cage turns space over), "collapsed" (faces without area left) or
             "through itself" (faces that cut through each other).
-        place: (3,) mm, where, in the bent shape.
-        vertex: the nearest vertex.
-        affected: how many vertices or faces.
+        place: (3,) place in the bent shape, mm.
+        vertex: number of the nearest vertex.
+        affected: number of affected vertices or faces.
     """
 
     kind: Literal["inside out", "collapsed", "through itself"]
@@ -44,18 +44,18 @@ def find_fold(
     resolution: Resolution,
     points: ArrayLike,
 ) -> Fold | None:
-    """What is wrong with a mesh as its cage bends it, or None if it is still a fair shape.
+    """Return the defect of a mesh bent by its cage, or None if it has none.
 
-    The cheap answers come first. A cage that is certainly one to one (`is_one_to_one`) can't
-    fold anything; a sheet that is still in full view from one side (`is_in_full_view`) is not
-    folded, whatever the cage does to the space beside it. Otherwise a closed mesh must have
-    positive Jacobians at its vertices, a sheet must not be mirrored so that it looks to its other
-    side, and no mesh may cut through itself.
+    The fast tests come first. A cage that is certainly one to one (`is_one_to_one`) cannot fold
+    anything; a sheet that is in full view from one side (`is_in_full_view`) is not folded,
+    regardless of the cage's effect on the space beside it. Otherwise a closed mesh must have
+    positive Jacobian determinants at its vertices, a sheet must not be mirrored so that it faces
+    its other side, and no mesh may cut through itself.
 
     Args:
-        mesh: at rest, mm.
-        bent: the same faces, bent.
-        box, resolution, points: of the cage.
+        mesh: the mesh at rest, mm.
+        bent: the same mesh, bent.
+        box, resolution, points: box, resolution and control points of the cage.
     """
     vanished = bent.face_areas <= COLLAPSED * mesh.face_areas
     vanished &= mesh.face_areas > 0.0
@@ -73,7 +73,7 @@ def find_fold(
     elif is_in_full_view(mesh, bent):
         return _turned_over(mesh, bent, box, resolution, points)
     crossed = self_crossings(bent.welded())
-    # A part may have been modelled of shells that cut through each other.
+    # A part at rest may consist of shells that cut through each other.
     if len(crossed.pairs) and len(self_crossings(mesh.welded(), limit=1).pairs) == 0:
         place = crossed.places[0]
         vertex = int(np.argmin(np.linalg.norm(bent.vertices - place, axis=1)))
@@ -88,9 +88,10 @@ def _turned_over(
     resolution: Resolution,
     points: ArrayLike,
 ) -> Fold | None:
-    """Whether a fair sheet has become its mirror image and so looks to the wrong side.
+    """Return the defect of a sheet that has become its mirror image and so faces the wrong side.
 
-    A turn in space makes it look elsewhere too; then the Jacobians stay positive.
+    A rotation in space also changes the direction that a sheet faces, but keeps the Jacobian
+    determinants positive.
     """
     before, after = mesh.face_vectors.sum(axis=0), bent.face_vectors.sum(axis=0)
     if before @ after >= 0.0:
@@ -103,11 +104,12 @@ def _turned_over(
 
 
 def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:
-    """Whether every point of an open sheet without holes can be seen at once from far away.
+    """Return whether every point of an open sheet without holes is visible from one distant
+    viewpoint.
 
-    Looked at against its mean normal, all faces show the same side and the outline does not
-    cross itself: a flat map with these two properties covers each point once. So the sheet has
-    no folds and does not touch itself. False only means that it can't be told this way.
+    Seen against its mean normal, all faces show the same side and the outline does not cross
+    itself; a flat map with these two properties covers each point once. The sheet therefore has no
+    folds and does not touch itself. False means that this test is not conclusive.
 
     Args:
         mesh: the sheet at rest; its outline is kept for the next call.
@@ -129,7 +131,9 @@ def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:
 
 
 def _single_outline(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """The vertices around a sheet that is one disc, in order; empty for any other shape."""
+    """Return the boundary vertices, in order, of a sheet that is a disc; empty for any other
+    shape.
+    """
     none = np.zeros(0, dtype=np.int64)
     faces = mesh.faces.astype(np.int64)
     size = len(mesh.vertices)

@@ -1,4 +1,4 @@
-"""Vertices of a mesh that round to the same place of a fine grid, taken together."""
+"""Merging of the vertices of a mesh that round to the same place of a fine grid."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 WELD_DISTANCE = 1e-6
-"""Vertices closer than this (mm) count as one when edges are compared."""
+"""Distance (mm) below which vertices count as one when edges are compared."""
 
 
 def welded(
@@ -15,15 +15,15 @@ def welded(
     """Merge vertices that agree to a distance, and drop faces that collapse.
 
     Args:
-        vertices: (n, 3) mm.
+        vertices: (n, 3) vertices, mm.
         faces: (m, 3) rows of `vertices`.
-        distance: mm.
+        distance: side of the grid's cells, mm.
 
     Returns:
-        The vertices that are left, in their old order, and the faces that are left.
+        The remaining vertices, in their old order, and the remaining faces.
     """
     cells = np.round(vertices / distance).astype(np.int64)
-    order = np.lexsort(cells.T)  # several times faster than to sort whole rows
+    order = np.lexsort(cells.T)  # several times faster than sorting whole rows
     begins = np.ones(len(cells), dtype=bool)
     begins[1:] = (np.diff(cells[order], axis=0) != 0).any(axis=1)
     first = order[begins]

@@ -1,9 +1,10 @@
-"""Kinds of indenters: what contacts in text, requests of front ends and the studio can name.
+"""Kinds of indenters that can be named in the text of contacts, in requests of front ends and in
+the studio.
 
 A kind is one class. Its numbers are the fields of a dataclass, each made by `quantity`, which holds
 their units, limits and help; from them follow the text form (`cylinder:2,10`), the form of requests
-(`{"kind": "cylinder", "radius": 2}`) and what front ends show. The kinds of this package
-are in `optisense/geometry/indenters.py`; docs/extending.md adds one.
+(`{"kind": "cylinder", "radius": 2}`) and the controls of front ends. The kinds of this package are
+in `optisense/geometry/indenters.py`; docs/extending.md adds one.
 """
 
 from __future__ import annotations
@@ -23,31 +24,31 @@ from optisense.near import suggestion
 from optisense.registry import Registry
 
 FACET_ERROR = 4e-4
-"""Facets stay this close (mm) to the exact shape: well below what a camera resolves."""
+"""Largest distance (mm) of facets from the exact shape, well below the resolution of a camera."""
 
 ABOVE_ZERO = 5e-324
 """The smallest number above 0, as a lower limit of factors."""
 
 SMALLEST = 1e-3
-"""mm, the least length of an indenter: no camera sees the contact of a ball of this radius."""
+"""Smallest length (mm) of an indenter: no camera sees the contact of a ball of this radius."""
 
 LARGEST = 1e4
-"""mm, the largest length of an indenter: to any sensor, a ball of this radius is flat."""
+"""Largest length (mm) of an indenter: for any sensor, a ball of this radius is flat."""
 
 
 class Indenter(Protocol):
     """Anything that can be pressed into a sensor.
 
-    One that can't shade itself, being convex, may say so by an attribute ``convex = True``: its
+    A convex indenter, which cannot shade itself, may have the attribute ``convex = True``; its
     images then take fewer shadow rays.
     """
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """The surface from its lowest point up to height `reach` (mm), or more of it.
+        """Return the surface from its lowest point up to height `reach`, or more of it.
 
         Args:
-            reach: mm; what lies higher can't touch the sensor and may be left out.
-            facet_error: mm, largest distance of the facets from the exact shape.
+            reach: height (mm) above which parts cannot touch the sensor and may be left out.
+            facet_error: largest distance of the facets from the exact shape, mm.
 
         Returns:
             A mesh with outward shading normals in the indenter's frame.
@@ -60,9 +61,9 @@ class Quantity:
     """One number of an indenter.
 
     Attributes:
-        unit: such as "mm"; empty for a plain number.
-        help: one sentence.
-        low, high: the limits, which are allowed values.
+        unit: unit, such as "mm"; empty for a plain number.
+        help: description, one sentence.
+        low, high: smallest and largest allowed value.
     """
 
     unit: str
@@ -74,7 +75,7 @@ class Quantity:
         """Check a value.
 
         Raises:
-            ContactError: it is no finite number or lies outside of the limits.
+            ContactError: the value is not a finite number or is outside the limits.
         """
         if math.isfinite(value) and self.low <= value <= self.high:
             return
@@ -96,7 +97,7 @@ def quantity(
     low: float = -math.inf,
     high: float = math.inf,
 ) -> Any:
-    """A field of an indenter's dataclass; required where it has no default."""
+    """Return a field of an indenter's dataclass; the field is required if it has no default."""
     metadata = {"quantity": Quantity(unit, help, low, high)}
     if default is None:
         return dataclasses.field(metadata=metadata)
@@ -108,10 +109,10 @@ class IndenterKind(ABC):
     """Base of indenters that have a name; a subclass is a frozen dataclass of quantities.
 
     Attributes:
-        kind: the name in text and requests, lower case.
-        title: how people write the name.
-        help: one sentence.
-        convex: whether no part of its surface can shade another part.
+        kind: the name in text and requests, in lower case.
+        title: display name.
+        help: description, one sentence.
+        convex: whether it is convex, so that no part of its surface can shade another.
     """
 
     kind: ClassVar[str]
@@ -123,30 +124,31 @@ class IndenterKind(ABC):
         """Check the numbers.
 
         Raises:
-            ContactError: one lies outside of its limits.
+            ContactError: a number is outside its limits.
         """
         for name, each in self.quantities().items():
             each.check(self.kind, name, getattr(self, name))
 
     @abstractmethod
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`."""
+        """Return the mesh; see `Indenter.mesh`."""
 
     def tilted(self, tilt_x: float, tilt_y: float) -> Indenter:
-        """The indenter turned by degrees about its x and then its y axis."""
+        """Return the indenter rotated by angles (degrees) about its x and then its y axis."""
         return Tilted(self, tilt_x, tilt_y)
 
     @classmethod
     def quantities(cls) -> dict[str, Quantity]:
-        """The numbers of this kind by name, in the order in which text gives them."""
+        """Return the numbers of this kind by name, in the order of the text form."""
         return {each.name: each.metadata["quantity"] for each in dataclasses.fields(cls)}
 
     @classmethod
     def from_text(cls, text: str) -> IndenterKind:
-        """Read what stands behind the colon in text: the numbers in their order.
+        """Read the text after the colon: the numbers in their order.
 
         Raises:
-            ContactError: they are too few or too many, no numbers, or outside of their limits.
+            ContactError: there are too few or too many numbers, or one is not a number or outside
+                its limits.
         """
         fields = dataclasses.fields(cls)
         needed = sum(each.default is MISSING for each in fields)
@@ -169,7 +171,7 @@ class IndenterKind(ABC):
         """Read the numbers of a request, by name.
 
         Raises:
-            ContactError: one is missing, unknown, no number, or outside of its limits.
+            ContactError: a value is missing, unknown, not a number, or outside its limits.
         """
         known = {each.name: each for each in dataclasses.fields(cls)}
         for name in values:
@@ -188,17 +190,18 @@ class IndenterKind(ABC):
         return cls(**numbers)
 
     def to_plain(self) -> dict[str, Any]:
-        """The indenter as `from_plain` reads it, with its kind."""
+        """Return the indenter in the form of `from_plain`, with its kind."""
         return {"kind": self.kind, **dataclasses.asdict(self)}
 
 
 @dataclass(frozen=True)
 class Tilted:
-    """An indenter turned about its x and then its y axis; its lowest point is at its origin again.
+    """An indenter rotated about its x and then its y axis, and moved so that its lowest point is at
+    its origin.
 
     Attributes:
-        indenter: what is turned.
-        tilt_x, tilt_y: degrees.
+        indenter: the indenter that is rotated.
+        tilt_x, tilt_y: angles of rotation, degrees.
     """
 
     indenter: Indenter
@@ -206,7 +209,7 @@ class Tilted:
     tilt_y: float
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`: the whole indenter, turned."""
+        """Return the mesh of the whole rotated indenter; see `Indenter.mesh`."""
         whole = self.indenter.mesh(np.inf, facet_error)
         turned = whole.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y))
         size = np.ptp(turned.bounds, axis=0).max()
@@ -216,7 +219,7 @@ class Tilted:
 
 
 def tilted(indenter: Indenter, tilt_x: float, tilt_y: float) -> Indenter:
-    """An indenter of any kind, or of none, turned by degrees about its x and then its y axis."""
+    """Return any indenter rotated by angles (degrees) about its x and then its y axis."""
     if isinstance(indenter, IndenterKind):
         return indenter.tilted(tilt_x, tilt_y)
     return Tilted(indenter, tilt_x, tilt_y)
@@ -240,7 +243,7 @@ INDENTERS: Registry[type[IndenterKind]] = Registry(
     },
     _check,
 )
-"""All kinds of indenters; other packages add theirs under the entry-point group
+"""Registry of the kinds of indenters; other packages add theirs under the entry-point group
 `optisense.indenters`."""
 
 
@@ -254,10 +257,10 @@ def register_indenter(kind: type[IndenterKind]) -> type[IndenterKind]:
 
 
 def indenter_from_plain(values: Mapping[str, Any]) -> IndenterKind:
-    """An indenter as a request gives it: its kind, and its numbers by name.
+    """Return the indenter of a request: its kind, and its numbers by name.
 
     Raises:
-        ContactError: there is no such kind, or its numbers make no sense.
+        ContactError: there is no such kind, or its numbers are invalid.
     """
     rest = dict(values)
     kind = rest.pop("kind", None)

@@ -34,7 +34,7 @@ class Sphere(IndenterKind):
     """A ball.
 
     Attributes:
-        radius: mm.
+        radius: radius, mm.
     """
 
     kind: ClassVar[str] = "sphere"
@@ -45,11 +45,11 @@ class Sphere(IndenterKind):
     radius: float = quantity("mm", "The radius of the ball.", low=SMALLEST, high=LARGEST)
 
     def tilted(self, tilt_x: float, tilt_y: float) -> Sphere:
-        """The same ball."""
+        """Return the same ball."""
         return self
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`: a cap of parallels, each cut into as many parts as it needs."""
+        """Return a cap of parallels, each divided as finely as needed; see `Indenter.mesh`."""
         end = _arc(self.radius, reach)
         side = self._side(facet_error)
         polar = np.linspace(0.0, end, max(3, math.ceil(self.radius * end / side) + 1))
@@ -76,10 +76,10 @@ class Sphere(IndenterKind):
         return TriangleMesh(vertices, faces, normals).wound_like_normals()
 
     def _side(self, facet_error: float) -> float:
-        """The side of square cells, with both triangles within the error.
+        """Return the side (mm) of square cells whose two triangles are within the error.
 
-        A flat triangle of circumradius c lies c^2 / (2 R) below a sphere of radius R at most;
-        a square cell of side s has c = s / sqrt(2).
+        A flat triangle of circumradius c lies c^2 / (2 R) below a sphere of radius R at most; a
+        square cell of side s has c = s / sqrt(2).
         """
         return math.sqrt(4.0 * self.radius * min(facet_error, 0.1 * self.radius))
 
@@ -89,9 +89,9 @@ class Cylinder(IndenterKind):
     """A cylinder that lies on its side, with flat ends.
 
     Attributes:
-        radius: mm.
-        length: mm, along its axis.
-        angle: degrees from the u axis of the sensing surface to the cylinder's axis.
+        radius: radius, mm.
+        length: length along its axis, mm.
+        angle: angle (degrees) from the u axis of the sensing surface to the cylinder's axis.
     """
 
     kind: ClassVar[str] = "cylinder"
@@ -104,7 +104,7 @@ class Cylinder(IndenterKind):
     angle: float = quantity("degrees", "From the surface's u axis to the cylinder's axis.", 0.0)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`: the lower part of the side and of both ends."""
+        """Return the lower part of the side and of both ends; see `Indenter.mesh`."""
         end = _arc(self.radius, reach)
         step = 2.0 * math.acos(1.0 - min(facet_error / self.radius, 0.1))
         count = 2 * max(2, math.ceil(end / step))  # even: the lowest line is a vertex line
@@ -134,11 +134,11 @@ class Cylinder(IndenterKind):
 class Plane(IndenterKind):
     """A square plate, pressed flat or tilted.
 
-    Its middle lies above the contact place; the depth counts to its lowest corner.
+    Its middle lies above the place of the contact; the depth is that of its lowest corner.
 
     Attributes:
-        tilt_x, tilt_y: degrees, turned about the u axis and then about the v axis.
-        size: mm, its side.
+        tilt_x, tilt_y: rotation (degrees) about the u axis and then about the v axis.
+        size: side, mm.
     """
 
     kind: ClassVar[str] = "plane"
@@ -151,11 +151,13 @@ class Plane(IndenterKind):
     size: float = quantity("mm", "The side of the plate.", 8.0, low=SMALLEST, high=LARGEST)
 
     def tilted(self, tilt_x: float, tilt_y: float) -> Plane:
-        """The plate tilted more; its middle stays above the contact place."""
+        """Return the plate with an additional tilt; its middle stays above the place of the
+        contact.
+        """
         return replace(self, tilt_x=self.tilt_x + tilt_x, tilt_y=self.tilt_y + tilt_y)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`: the whole plate, as thick as it is wide."""
+        """Return the whole plate, as thick as it is wide; see `Indenter.mesh`."""
         half = 0.5 * self.size
         block = TriangleMesh.box((-half, -half, 0.0), (half, half, self.size)).vertex_normals()
         return _lowest_at_zero(block.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y)))
@@ -163,9 +165,9 @@ class Plane(IndenterKind):
 
 @dataclass(frozen=True)
 class MeshIndenter(IndenterKind):
-    """Any shape: +z of its mesh points away from the sensor.
+    """An indenter of any shape; +z of its mesh points away from the sensor.
 
-    Its lowest point (the middle of them, where there are several) is put on the contact place.
+    Its lowest point (the middle of several) is put on the place of the contact.
 
     Attributes:
         source: a mesh (mm), or an OBJ, STL or PLY file.
@@ -181,12 +183,12 @@ class MeshIndenter(IndenterKind):
 
     @classmethod
     def quantities(cls) -> dict[str, Quantity]:
-        """See `IndenterKind.quantities`: the scale."""
+        """Return the scale; see `IndenterKind.quantities`."""
         return {"scale": cls.__dataclass_fields__["scale"].metadata["quantity"]}
 
     @classmethod
     def from_text(cls, text: str) -> MeshIndenter:
-        """See `IndenterKind.from_text`: PATH or PATH,SCALE; the path may have commas itself."""
+        """Read PATH or PATH,SCALE; the path may contain commas. See `IndenterKind.from_text`."""
         if not text:
             raise ContactError("no mesh file is named", hint="write mesh:PATH@U,V:DEPTH")
         path, separator, scale = text.rpartition(",")
@@ -199,7 +201,7 @@ class MeshIndenter(IndenterKind):
 
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> MeshIndenter:
-        """See `IndenterKind.from_plain`: `file`, and maybe `scale`."""
+        """Read `file` and optionally `scale`; see `IndenterKind.from_plain`."""
         rest = dict(values)
         file = rest.pop("file", None)
         if not isinstance(file, str):
@@ -214,7 +216,9 @@ class MeshIndenter(IndenterKind):
         return cls(file, **rest)
 
     def to_plain(self) -> dict[str, Any]:
-        """See `IndenterKind.to_plain`; the mesh must come from a file."""
+        """Return the values of `from_plain`; the mesh must come from a file. See
+        `IndenterKind.to_plain`.
+        """
         if isinstance(self.source, TriangleMesh):
             raise ContactError("an indenter that is a mesh in memory has no file to name")
         return {"kind": self.kind, "file": str(self.source), "scale": self.scale}
@@ -239,18 +243,19 @@ class MeshIndenter(IndenterKind):
         return _moved(mesh, (-x, -y, 0.0))
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`: all of it, in its own triangles."""
+        """Return the whole mesh with its own triangles; see `Indenter.mesh`."""
         return self._whole
 
 
 def _between_rings(inner: int, outer: int) -> NDArray[np.int64]:
-    """Triangles (n, 3) between two rings of so many points (one point is a ring, too), evenly
-    spaced from the same angle on and numbered one after the other.
+    """Return triangles (n, 3) between two rings of ``inner`` and ``outer`` evenly spaced points.
 
-    Each edge of one ring goes to the point of the other that its middle is nearest to.
+    The rings begin at the same angle, and their points are numbered consecutively; a ring may be a
+    single point. Each edge of one ring is connected to the point of the other that is nearest to
+    its middle.
     """
     i, j = np.arange(inner), np.arange(outer)
-    # How many edges of the other ring have their middles before an edge's own.
+    # The number of edges of the other ring whose middles lie before that of an edge.
     to_outer = -(-((2 * i + 1) * outer - inner) // (2 * inner))
     to_inner = ((2 * j + 1) * inner - outer) // (2 * outer) + 1
     of_outer = np.column_stack([inner + j, inner + (j + 1) % outer, to_inner % inner])
@@ -259,12 +264,12 @@ def _between_rings(inner: int, outer: int) -> NDArray[np.int64]:
 
 
 def _arc(radius: float, reach: float) -> float:
-    """The angle (radians) from the lowest point of a circle to height `reach`."""
+    """Return the angle (radians) from the lowest point of a circle to height `reach`."""
     return math.acos(max(-1.0, 1.0 - reach / radius))
 
 
 def _turn_z(angle: float) -> NDArray[np.float64]:
-    """(3, 3): by `angle` degrees about z."""
+    """Return the rotation matrix (3, 3) by an angle (degrees) about z."""
     a = math.radians(angle)
     return np.array([[math.cos(a), -math.sin(a), 0], [math.sin(a), math.cos(a), 0], [0, 0, 1]])
 

@@ -1,8 +1,8 @@
 """Closing the small gaps and overlaps that CAD files leave between solids that touch.
 
-A mesh approximates a curved face by chords, and two parts may be cut into triangles differently,
-or drawn a hundredth of a millimetre apart. A ray tracer would find a film of air in every gap.
-One of the two solids is moved onto, or a little into, the other here.
+A mesh approximates a curved face by chords, and two parts may be cut into triangles differently, or
+drawn a hundredth of a millimetre apart. A ray tracer would find a film of air in every gap. The
+functions move one of the two solids onto the other, or a little into it.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from optisense.geometry.mesh import FloatArray, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle, patches, smoothly_joined
 
 EXACT = 0.001
-"""Distance in mm below which two faces touch already and nothing is moved; the gaps that CAD
-programs leave by intent are wider."""
+"""Distance (mm) below which two faces count as touching and are not moved; intended gaps are
+wider."""
 
 FLAT = 0.05
-"""Angle in degrees by which neighbouring faces of a flat patch may bend, which leaves room for the
-rounding of mesh files."""
+"""Largest angle (degrees) between neighbouring faces of a flat patch, a margin for the rounding of
+mesh files."""
 
 IN_PLANE = 0.001
-"""mm: vertices of a flat patch lie in its plane to this."""
+"""Largest distance (mm) of the vertices of a flat patch from its plane."""
 
 _PARALLEL = float(np.cos(np.radians(0.1)))
 
@@ -37,10 +37,10 @@ class Join:
 
     Attributes:
         mesh: the moved solid.
-        gap: mm, the widest gap (positive) or overlap (negative) that there was; 0 if none.
-        kind: "none" (nothing to do), "flat" (faces moved into the same plane) or "curved" (moved
-            a little into the other solid, which has to keep the place).
-        place: (3,) mm, where the contact is.
+        gap: the widest gap (positive) or overlap (negative) before, mm; 0 if there was none.
+        kind: "none" (nothing to do), "flat" (faces moved into the same plane) or "curved" (faces
+            moved a little into the other solid, which must have the higher priority).
+        place: (3,) place of the contact, mm.
     """
 
     mesh: TriangleMesh
@@ -50,7 +50,9 @@ class Join:
 
 
 def touching_area(first: TriangleMesh, second: TriangleMesh, distance: float) -> float:
-    """Roughly how much of `first` lies against `second` within a distance (mm): mm^2."""
+    """Return the approximate area (mm^2) of `first` that lies within a distance (mm) of
+    `second`.
+    """
     pairs = find_coincident(first, second, distance, facing=True).pairs
     if len(pairs) == 0:
         return 0.0
@@ -64,14 +66,14 @@ def touching_area(first: TriangleMesh, second: TriangleMesh, distance: float) ->
 def join(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> Join:
     """Move faces of one closed solid onto those of another that lie against them.
 
-    Flat faces move along their normals into the other's plane. Curved faces, whose triangles
-    may differ from the other's, move to `distance` below its surface, so that cutting `fixed`
-    out of the mover leaves them without a gap.
+    Flat faces move along their normals into the other's plane. Curved faces, whose triangles may
+    differ from the other's, move to `distance` below its surface, so that cutting `fixed` out of
+    the mover leaves them without a gap.
 
     Args:
-        mover: closed, facing outward, welded.
-        fixed: closed, facing outward.
-        distance: mm; faces that are farther apart are left alone.
+        mover: the solid to move, closed and welded, with outward face normals.
+        fixed: the other solid, closed, with outward face normals.
+        distance: largest distance (mm) of faces that are joined.
     """
     wide = find_coincident(mover, fixed, distance, facing=True).pairs
     if len(wide) == 0:
@@ -93,7 +95,7 @@ def join(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> Join:
 def _flat_moves(
     mover: TriangleMesh, fixed: TriangleMesh, pairs: NDArray[np.int64]
 ) -> tuple[FloatArray, float, NDArray[np.int64]]:
-    """Move flat patches into the planes they lie against.
+    """Move flat patches into the planes that they lie against.
 
     Returns:
         The vertices, the widest gap closed (mm), and the pairs of faces that are not flat.
@@ -119,7 +121,9 @@ def _flat_moves(
 def _step_to_plane(
     mover: TriangleMesh, patch: Faces, fixed: TriangleMesh, against: Faces
 ) -> float | None:
-    """mm along the patch's normal to the plane of the other faces; None if there is no plane."""
+    """Return the distance (mm) along the patch's normal to the plane of the other faces; None if
+    they have no common plane.
+    """
     normal = mean_normal(mover, patch)
     normal = normal / np.linalg.norm(normal)
     own = mover.vertices[np.unique(mover.faces[patch])] @ normal
@@ -133,7 +137,9 @@ def _step_to_plane(
 def _curved_moves(
     mover: TriangleMesh, fixed: TriangleMesh, pairs: NDArray[np.int64], distance: float
 ) -> tuple[FloatArray, float]:
-    """Move vertices near the other surface to `distance` below it; also the widest gap, mm."""
+    """Move vertices near the other surface to `distance` below it; return them and the widest gap,
+    mm.
+    """
     vertex = mover.faces[pairs[:, 0]].astype(np.int64)
     size = len(fixed.faces)
     keys = np.unique(vertex.ravel() * size + np.repeat(pairs[:, 1], 3))
@@ -146,7 +152,7 @@ def _curved_moves(
     best = order[first]
     least = np.full(len(mover.vertices), np.inf)
     least[chosen] = apart[best]
-    # At an edge or a corner of the other mesh several faces are equally near.
+    # At an edge or a corner of the other mesh, several faces are equally near.
     equal = apart <= least[task[:, 0]] + 1e-9
     normals = np.zeros_like(mover.vertices)
     np.add.at(normals, task[equal, 0], fixed.face_normals[task[equal, 1]])
@@ -159,7 +165,9 @@ def _curved_moves(
 
 
 def closest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """(k, 3) mm: the point of each triangle (k, 3, 3) that is nearest to its point (k, 3)."""
+    """Return the point (k, 3), mm, of each triangle (k, 3, 3) that is nearest to its point (k,
+    3).
+    """
     edges = np.roll(triangles, -1, axis=1) - triangles
     squares = np.maximum(np.einsum("kei,kei->ke", edges, edges), 1e-300)
     way = points[:, None] - triangles

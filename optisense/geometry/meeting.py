@@ -1,4 +1,4 @@
-"""Whether two parts meet: where they cut into one another, and where they lie on one another."""
+"""Detection of parts that meet: that cut into one another, or lie on one another."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from optisense.geometry.crossings import crossings
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 CONTACT = 0.002
-"""mm: parts that reach into one another by less only touch; parts nearer than this touch."""
+"""Distance (mm) below which parts touch, and depth up to which parts that overlap only touch."""
 
 ROUNDS = 4
-"""Number of times that the faces that may meet are narrowed down by the box around those of the
-other part."""
+"""Number of rounds in which the faces that may meet are reduced to those in the box around the
+faces of the other part."""
 
 MOST_PROBED = 4000
-"""Number of vertices, spread over all, that are looked at for contact."""
+"""Largest number of vertices, spread over all, that are tested for contact."""
 
 _boxes: weakref.WeakKeyDictionary[TriangleMesh, tuple[FloatArray, FloatArray]]
 _boxes = weakref.WeakKeyDictionary()
@@ -35,7 +35,7 @@ class Meeting(NamedTuple):
     """A place where two parts share space.
 
     Attributes:
-        place: (3,) mm, a point of the first part that is on or in the second.
+        place: (3,) a point (mm) of the first part that is on or in the second.
         kind: "cuts into" (their surfaces cross) or "is inside".
     """
 
@@ -44,9 +44,11 @@ class Meeting(NamedTuple):
 
 
 def find_meeting(first: TriangleMesh, second: TriangleMesh) -> Meeting | None:
-    """Where two parts share space, or None; parts that only touch (to `CONTACT`) do not.
+    """Return a place where two parts share space, or None; parts that only touch (within `CONTACT`)
+    do not count.
 
-    Found are surfaces that cross, and a part that lies wholly inside another, closed one.
+    The search finds surfaces that cross, and a part that lies completely inside another, closed
+    one.
     """
     low = np.maximum(first.bounds[0], second.bounds[0])
     high = np.minimum(first.bounds[1], second.bounds[1])
@@ -69,8 +71,8 @@ def find_meeting(first: TriangleMesh, second: TriangleMesh) -> Meeting | None:
 
 
 def resting_on(mesh: TriangleMesh, other: TriangleMesh) -> NDArray[np.int64]:
-    """(k,) vertices of a mesh that touch another one, of some `MOST_PROBED` at most; kept for the
-    next call with the same two meshes.
+    """Return the vertices (k,) of a mesh that touch another one, among at most about `MOST_PROBED`;
+    cached for the next call with the same meshes.
     """
     beside = _contacts.setdefault(mesh, weakref.WeakKeyDictionary())
     rows = beside.get(other)
@@ -83,21 +85,23 @@ def resting_on(mesh: TriangleMesh, other: TriangleMesh) -> NDArray[np.int64]:
 
 
 def touching(mesh: TriangleMesh, vertices: NDArray[np.int64], other: TriangleMesh) -> FloatArray:
-    """How far vertices of a mesh are from another one, up to `CONTACT`.
+    """Return the distances of vertices of a mesh from another one, up to `CONTACT`.
 
     Args:
-        mesh: mm.
-        vertices: (k,) which of its vertices.
-        other: mm.
+        mesh: the mesh, mm.
+        vertices: (k,) numbers of its vertices.
+        other: the other mesh, mm.
 
     Returns:
-        (k,) mm; infinite where it is more than `CONTACT`.
+        The distances (k,), mm; infinite where they are larger than `CONTACT`.
     """
     return near_surface(mesh.vertices[vertices], other)
 
 
 def near_surface(points: FloatArray, other: TriangleMesh) -> FloatArray:
-    """(k,) mm, how far points (k, 3) are from a mesh; infinite where it is more than `CONTACT`."""
+    """Return the distances (k,), mm, of points (k, 3) from a mesh; infinite where they are larger
+    than `CONTACT`.
+    """
     result = np.full(len(points), np.inf)
     if len(points) == 0:
         return result
@@ -128,7 +132,7 @@ def _spread(rows: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _face_boxes(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
-    """(m, 3) mm, lower and upper corners of the boxes around the faces; kept."""
+    """Return the lower and upper corners (m, 3), mm, of the boxes around the faces; cached."""
     boxes = _boxes.get(mesh)
     if boxes is None:
         a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
@@ -140,7 +144,9 @@ def _face_boxes(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
 def _narrowed(
     first: TriangleMesh, second: TriangleMesh
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The faces of both that lie in the box around those of the other, narrowed down in turns."""
+    """Return the faces of both meshes that lie in the box around those of the other, reduced in
+    rounds.
+    """
     boxes = [_face_boxes(first), _face_boxes(second)]
     rows = [np.arange(len(first.faces)), np.arange(len(second.faces))]
     for turn in range(2 * ROUNDS):
@@ -154,7 +160,9 @@ def _narrowed(
 
 
 def _depths(first: TriangleMesh, second: TriangleMesh, pairs: NDArray[np.int64]) -> FloatArray:
-    """(k,) mm, how far the faces of each pair reach through each other's plane."""
+    """Return the depths (k,), mm, to which the faces of each pair reach through each other's
+    plane.
+    """
     depths = np.full(len(pairs), np.inf)
     for planes, others, this, that in ((first, second, 0, 1), (second, first, 1, 0)):
         height = np.einsum(
@@ -167,7 +175,9 @@ def _depths(first: TriangleMesh, second: TriangleMesh, pairs: NDArray[np.int64])
 
 
 def _distances(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """(k,) mm between points (k, 3) and triangles (k, 3, 3), pair by pair."""
+    """Return the distances (k,), mm, between points (k, 3) and triangles (k, 3, 3), pair by
+    pair.
+    """
     edges = np.roll(triangles, -1, axis=1) - triangles
     offset = points[:, None] - triangles
     squares = np.maximum(np.einsum("kei,kei->ke", edges, edges), 1e-300)

@@ -1,4 +1,4 @@
-"""Triangle meshes: the one shape type that every other package passes around."""
+"""Triangle meshes, the shape type of all other packages."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 CREASE = 40.0
-"""Degrees; sharper edges than this stay sharp in shading unless something else is asked."""
+"""Default angle (degrees) between faces above which an edge stays sharp in shading."""
 
 _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
     (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
 )  # fmt: skip
-"""The six sides of a box: the axis across the side, the two axes in it, and at which end of the
-axis it lies."""
+"""The six sides of a box: the axis across the side, the two axes in it, and the end of the axis at
+which it lies."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class TriangleMesh:
 
     @staticmethod
     def joined(meshes: list[TriangleMesh]) -> TriangleMesh:
-        """All meshes in one, without welding; keeps normals when every mesh has them."""
+        """Join all meshes in one, without welding; normals are kept if every mesh has them."""
         offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
         normals = [mesh.normals for mesh in meshes if mesh.normals is not None]
         return TriangleMesh(
@@ -138,7 +138,7 @@ class TriangleMesh:
 
     @cached_property
     def face_areas(self) -> FloatArray:
-        """(m,) float64, mm^2."""
+        """(m,) float64, face areas, mm^2."""
         areas: FloatArray = 0.5 * np.linalg.norm(self.face_vectors, axis=1)
         return areas
 
@@ -163,7 +163,7 @@ class TriangleMesh:
 
     @cached_property
     def is_closed(self) -> bool:
-        """Whether each edge is run through as often one way as the other."""
+        """Whether each edge is traversed equally often in both directions."""
         from optisense.geometry.mesh_checks import unmatched_edges
 
         return len(self.faces) > 0 and len(unmatched_edges(self)) == 0
@@ -195,22 +195,22 @@ class TriangleMesh:
         return TriangleMesh(self.vertices @ linear.T + full[:3, 3], faces, normals)
 
     def with_vertices(self, vertices: FloatArray) -> TriangleMesh:
-        """The same faces over moved vertices (n, 3); shading normals are dropped."""
+        """Return the same faces with moved vertices (n, 3), mm; shading normals are dropped."""
         return TriangleMesh(vertices, self.faces)
 
     def with_faces(self, faces: NDArray[Any]) -> TriangleMesh:
-        """Other faces (k, 3) over the same vertices and normals."""
+        """Return other faces (k, 3) with the same vertices and normals."""
         return replace(self, faces=faces)
 
     def compacted(self) -> TriangleMesh:
-        """The same faces without the vertices that no face uses."""
+        """Return the mesh without unused vertices."""
         used, inverse = np.unique(self.faces, return_inverse=True)
         faces = inverse.reshape(-1, 3).astype(np.int32)
         normals = None if self.normals is None else self.normals[used]
         return TriangleMesh(self.vertices[used], faces, normals)
 
     def flipped(self) -> TriangleMesh:
-        """The same surface facing the other way."""
+        """Return the same surface with opposite face normals."""
         normals = None if self.normals is None else -self.normals
         return replace(self, faces=self.faces[:, ::-1], normals=normals)
 
@@ -222,7 +222,7 @@ class TriangleMesh:
         return TriangleMesh(*welded(self.vertices, self.faces, distance))
 
     def wound_like_normals(self) -> TriangleMesh:
-        """Faces turned over where they look away from their shading normals."""
+        """Reverse the faces whose normals are opposite to their shading normals."""
         if self.normals is None:
             return self
         shading = self.normals[self.faces].sum(axis=1)
@@ -250,7 +250,7 @@ class TriangleMesh:
 
 
 def turn_about_x_and_y(angle_x: float, angle_y: float) -> NDArray[np.float64]:
-    """(3, 3): the rotation by degrees about x and then about y."""
+    """Return the rotation matrix (3, 3) by angles (degrees) about x and then about y."""
     x, y = np.radians([angle_x, angle_y])
     about_x = [[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]]
     about_y = [[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]]
@@ -258,9 +258,10 @@ def turn_about_x_and_y(angle_x: float, angle_y: float) -> NDArray[np.float64]:
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:
-    """Two triangles a cell for vertices numbered row by row; (2 (rows-1) (columns-1), 3) int32.
+    """Return two triangles per cell, (2 (rows-1) (columns-1), 3) int32, for vertices numbered row
+    by row.
 
-    Faces look along (row direction) x (column direction).
+    Face normals point along (row direction) x (column direction).
     """
     index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     a, b = index[:-1, :-1].ravel(), index[1:, :-1].ravel()

@@ -1,4 +1,4 @@
-"""Defects that make a mesh unfit for simulation, and their places."""
+"""Checks for defects that make a mesh unfit for simulation, and their places."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ if TYPE_CHECKING:
 
 
 LEAST_VOLUME = 1e-12
-"""The least volume of a solid, as a share of its largest dimension cubed: a 20 mm sheet of glass as
+"""Smallest volume of a solid, as a share of its largest dimension cubed: a 20 mm sheet of glass as
 thin as a wavelength of light has 1e-5."""
 
 
 def validate(mesh: TriangleMesh, name: str, closed: bool) -> TriangleMesh:
-    """See `TriangleMesh.validate`."""
+    """Check a mesh; see `TriangleMesh.validate`."""
     if len(mesh.faces) == 0:
         raise MeshError(
             "the mesh has no triangles", where=f"part {name}", hint="check the mesh file"
@@ -71,7 +71,9 @@ def _closed_and_outward(mesh: TriangleMesh, name: str) -> TriangleMesh:
 
 
 def unmatched_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Directed edges run through more often than their reverse: (k, 2) rows of the welded mesh."""
+    """Return the directed edges (k, 2), rows of the welded mesh, that occur more often than their
+    reverse.
+    """
     forward, size = _directed_edges(mesh)
     keys, counts = np.unique(forward, return_counts=True)
     backward = (keys % size) * size + keys // size
@@ -82,7 +84,7 @@ def unmatched_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
 
 
 def _leaky_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Edges with an odd number of faces, whichever way they wind: (k, 2)."""
+    """Return the edges (k, 2) with an odd number of faces of any winding."""
     forward, size = _directed_edges(mesh)
     first, second = forward // size, forward % size
     keys, counts = np.unique(
@@ -100,9 +102,10 @@ def _directed_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], int]:
 
 
 def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
-    """Turn single faces over until neighbours agree, and each shell with its first face.
+    """Reverse single faces until neighbours agree with each other, and each shell with its first
+    face.
 
-    A shell that can't be wound so (a Moebius strip) is left as it is.
+    A shell without a consistent winding (a Moebius strip) is not changed.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -117,8 +120,8 @@ def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
     if not disagree.any():
         return mesh
     one, other, count = one // 3, other // 3, len(mesh.faces)
-    # Each face stands there twice, as it is and turned over (its number + count), and is linked
-    # with what its neighbours would have to be.
+    # Each face is a node twice, unchanged and reversed (its number + count), and is linked to the
+    # states that its neighbours then need.
     turns = count * disagree
     starts = np.concatenate([one, one + count])
     ends = np.concatenate([other + turns, other + count - turns])

@@ -23,25 +23,25 @@ if TYPE_CHECKING:
 FORMATS = (".obj", ".stl", ".ply")
 
 FARTHEST = 1e9
-"""The largest coordinate in a file, in any unit: a kilometre in micrometres."""
+"""Largest coordinate in a file, in any unit: a kilometre in micrometres."""
 
 MOST_TRIANGLES = 1_000_000
-"""Triangles of one file; the built-in sensors have at most 25,000 in a part."""
+"""Largest number of triangles of one file; the built-in sensors have at most 25,000 in a part."""
 
 MOST_TWICE = 1000
-"""Faces that may be there more than once. Some programs write a few; rays meet each of them."""
+"""Largest number of duplicate faces. Some programs write a few; rays meet each of them."""
 
 MOST_CORNERS = 10_000
-"""Corners of one face; CAD programs write faces of a few hundred."""
+"""Largest number of corners of one face; CAD programs write faces of a few hundred."""
 
 
 class MeshArrays(NamedTuple):
-    """The content of a mesh file; `TriangleMesh.load` makes a mesh of it.
+    """The content of a mesh file, from which `TriangleMesh.load` makes a mesh.
 
     Attributes:
         vertices: (n, 3) float64, in the unit of the file.
         faces: (m, 3) rows of `vertices`.
-        normals: (n, 3) of the vertices, or None.
+        normals: (n, 3) normals of the vertices, or None.
     """
 
     vertices: NDArray[np.float64]
@@ -50,7 +50,7 @@ class MeshArrays(NamedTuple):
 
 
 def read_mesh(path: Path) -> MeshArrays:
-    """The arrays of a mesh file; raises as `TriangleMesh.load`."""
+    """Read the arrays of a mesh file; raises the errors of `TriangleMesh.load`."""
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise MeshError(
@@ -60,7 +60,7 @@ def read_mesh(path: Path) -> MeshArrays:
         )
     data = read_bytes(path, MOST_MESH, MeshError, "the mesh file")
     if suffix == ".obj":
-        _refuse_many(data.count(b"\nf "), path)  # each has at least one triangle
+        _refuse_many(data.count(b"\nf "), path)  # each face has at least one triangle
         mesh = _parse_plain_obj(data) or _parse_obj(data, path)
     else:
         if suffix == ".stl":
@@ -99,25 +99,25 @@ def _refuse_many(triangles: int, path: Path) -> None:
 
 
 def _faces_twice(mesh: MeshArrays) -> int:
-    """How many faces there are besides the first ones of the same corners, wound the same way."""
+    """Return the number of faces that repeat the corners and the winding of an earlier face."""
     if len(mesh.faces) <= MOST_TWICE:
         return 0
     corners = mesh.faces.astype(np.uint64)
-    first = np.argmin(corners, axis=1)  # a face may begin with any of its corners
+    first = np.argmin(corners, axis=1)  # a face may start at any of its corners
     a, b, c = (np.take_along_axis(corners, (first[:, None] + k) % 3, 1)[:, 0] for k in range(3))
-    # Sums of products with large odd numbers differ for different corners, but for a chance of
-    # 1e-6 among a million faces.
+    # Sums of products with large odd numbers differ for different corners, except with a
+    # probability of 1e-6 among a million faces.
     keys = a * np.uint64(0x9E3779B97F4A7C15) + b * np.uint64(0xC2B2AE3D27D4EB4F)
     keys += c * np.uint64(0x165667B19E3779F9)
     return len(keys) - len(np.unique(keys))
 
 
 def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:
-    """A mesh as the text of an OBJ file; every coordinate keeps all its digits.
+    """Return a mesh as the text of an OBJ file; every coordinate keeps all its digits.
 
     Args:
-        mesh: mm; its normals are written too, where it has any.
-        name: of the object.
+        mesh: the mesh, mm; its normals are written if it has any.
+        name: name of the object.
     """
     lines = ["# millimetres"] + ([] if name is None else [f"o {name}"])
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
@@ -131,8 +131,8 @@ def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:
 
 
 def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
-    """Refuse an STL file that is cut off: a binary one has 84 bytes and 50 for each triangle, and a
-    text ends in endsolid.
+    """Refuse a truncated STL file: a binary file has 84 bytes and 50 per triangle, and a text file
+    ends in endsolid.
     """
     ended = b"endsolid" in data.lower()
     text = data.lstrip()[:5].lower() == b"solid" and (ended or b"facet" in data[:2000].lower())
@@ -176,8 +176,10 @@ def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> MeshArrays:
 
 
 def _parse_plain_obj(data: bytes) -> MeshArrays | None:
-    """A file of triangles in the form that `obj_text` and most programs give it, read at once:
-    many times faster. None if anything is out of the ordinary; it is read line by line then.
+    """Read a file of triangles in the form that `obj_text` and most programs write, many times
+    faster than line by line.
+
+    The result is None for any other file, which is then read line by line.
     """
     lines = data.splitlines()
     kept: dict[bytes, list[bytes]] = {b"v ": [], b"vn": [], b"f ": []}
@@ -200,7 +202,7 @@ def _parse_plain_obj(data: bytes) -> MeshArrays | None:
         return None
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # what is no number is only warned of
+            warnings.simplefilter("error")  # text that is not a number only gives a warning
             vertices, directions = (
                 np.fromstring(b" ".join(rows).decode("ascii"), sep=" ").reshape(-1, 3)
                 for rows in (positions, normals)
@@ -257,7 +259,9 @@ def _parse_obj(data: bytes, path: Path) -> MeshArrays:
 
 
 def _corner(word: str, n_vertices: int, n_normals: int) -> tuple[int, int]:
-    """Zero-based (vertex, normal) of 'v', 'v/t', 'v//n' or 'v/t/n'; a missing normal is -1."""
+    """Return the zero-based (vertex, normal) of 'v', 'v/t', 'v//n' or 'v/t/n'; a missing normal is
+    -1.
+    """
     fields = word.split("/")
     vertex = _index(fields[0], n_vertices)
     normal = _index(fields[2], n_normals) if len(fields) > 2 and fields[2] else -1
@@ -288,7 +292,7 @@ def _triangulated(polygons: list[list[int]], vertices: NDArray[np.float64]) -> N
 
 
 def _triangulated_polygon(polygon: list[int], corners: NDArray[np.float64]) -> list[list[int]]:
-    """A fan where the polygon is convex, else manifold3d's triangulation in its plane."""
+    """Triangulate a polygon: a fan if it is convex, otherwise by manifold3d in its plane."""
     fan = [[0, i, i + 1] for i in range(1, len(polygon) - 1)]
     normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)  # Newell's method
     edges = np.roll(corners, -1, axis=0) - corners

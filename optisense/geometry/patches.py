@@ -1,4 +1,6 @@
-"""Picking faces of a mesh the way a CAD tool does: by where they look, and along smooth edges."""
+"""Selection of faces of a mesh as in CAD tools: by the direction of their normals, and along smooth
+edges.
+"""
 
 from __future__ import annotations
 
@@ -12,30 +14,30 @@ from optisense.geometry.mesh import FloatArray, TriangleMesh
 Faces = NDArray[np.int64]
 
 SHARP = 30.0
-"""Degrees: neighbouring faces that bend more meet in an edge, not in a curve."""
+"""Angle (degrees) between neighbouring faces above which they meet in a sharp edge."""
 
 
 def faces_towards(mesh: TriangleMesh, direction: ArrayLike, within: float) -> Faces:
-    """The faces whose normals are at most `within` degrees off a direction."""
+    """Return the faces whose normals are within an angle (degrees) of a direction."""
     way = np.asarray(direction, dtype=np.float64)
     cosine = mesh.face_normals @ (way / np.linalg.norm(way))
     return np.flatnonzero((cosine >= np.cos(np.radians(within)) - 1e-12) & (mesh.face_areas > 0))
 
 
 def angle_to_nearest(mesh: TriangleMesh, direction: ArrayLike) -> float:
-    """Degrees between a direction and the face normal that comes nearest to it."""
+    """Return the angle (degrees) between a direction and the face normal nearest to it."""
     way = np.asarray(direction, dtype=np.float64)
     cosine = (mesh.face_normals @ (way / np.linalg.norm(way)))[mesh.face_areas > 0]
     return float(np.degrees(np.arccos(np.clip(cosine.max(), -1.0, 1.0))))
 
 
 def smoothly_joined(mesh: TriangleMesh, start: Faces, sharp: float = SHARP) -> Faces:
-    """The faces `start` and all that go on from them without a sharp edge.
+    """Return the faces `start` and all that are connected to them without a sharp edge.
 
     Args:
-        mesh: welded, so that neighbours share vertices.
+        mesh: a welded mesh, so that neighbours share vertices.
         start: some of its faces.
-        sharp: degrees between the normals of neighbours across a sharp edge.
+        sharp: smallest angle (degrees) between the normals of neighbours across a sharp edge.
     """
     one, other = neighbours(mesh)
     cosine = np.einsum("ij,ij->i", mesh.face_normals[one], mesh.face_normals[other])
@@ -45,9 +47,9 @@ def smoothly_joined(mesh: TriangleMesh, start: Faces, sharp: float = SHARP) -> F
 
 
 def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
-    """Faces divided into patches that hang together by edges, the largest first.
+    """Divide faces into patches connected by edges, the largest first.
 
-    Patches of equal area come by where they lie, so that their order is always the same.
+    Patches of equal area are ordered by position, so that their order is reproducible.
     """
     one, other = neighbours(mesh)
     chosen = np.zeros(len(mesh.faces), dtype=bool)
@@ -64,7 +66,7 @@ def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
 
 
 def neighbours(mesh: TriangleMesh) -> tuple[Faces, Faces]:
-    """Pairs of faces that share an edge: two (k,) int64."""
+    """Return the pairs of faces that share an edge: two (k,) int64."""
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
     owner = np.repeat(np.arange(len(mesh.faces)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
@@ -74,7 +76,7 @@ def neighbours(mesh: TriangleMesh) -> tuple[Faces, Faces]:
 
 
 def middle(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
-    """(3,) mm: the centre of area of faces, or of all of them."""
+    """Return the centre of area (3,), mm, of the given or of all faces."""
     chosen = np.arange(len(mesh.faces)) if faces is None else faces
     areas = mesh.face_areas[chosen]
     centres = mesh.triangles[chosen].mean(axis=1)
@@ -82,7 +84,9 @@ def middle(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
 
 
 def mean_normal(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
-    """(3,): the mean of the face normals by area; shorter than 1 on a curved surface."""
+    """Return the area-weighted mean (3,) of the face normals; shorter than 1 on a curved
+    surface.
+    """
     chosen = np.arange(len(mesh.faces)) if faces is None else faces
     return np.asarray(mesh.face_vectors[chosen].sum(axis=0) / 2.0 / mesh.face_areas[chosen].sum())
 

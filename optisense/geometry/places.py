@@ -10,18 +10,17 @@ from optisense.errors import ContactError
 FloatArray = NDArray[np.float64]
 
 _ROUNDS = 200
-"""Largest number of rounds of the clustering, which usually comes to rest much sooner."""
+"""Largest number of rounds of the clustering, which usually converges much sooner."""
 _STILL = 1e-4
-"""Movement of the places in one round, relative to the size of the surface, below which they count
-as being at rest."""
+"""Movement of the places in one round, relative to the size of the surface, below which the
+clustering has converged."""
 
 
 def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[np.int64]:
     """Choose nine of many surface points so that each stands for an equal, compact patch.
 
-    Weighted k-means (Lloyd, "Least squares quantization in PCM", 1982) from a three by three
-    start along the main axes of the points; without chance, so the same points give the same
-    places.
+    The method is weighted k-means (Lloyd, "Least squares quantization in PCM", 1982), started from
+    a three by three grid along the principal axes of the points. It is deterministic.
 
     Args:
         points: (n, 3) mm, points of the visible sensing surface; at least nine.
@@ -57,21 +56,23 @@ def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[
 def _middles(
     points: FloatArray, share: FloatArray, patch: NDArray[np.int64], before: FloatArray
 ) -> FloatArray:
-    """(9, 3): the weighted middle of each patch; an empty patch keeps its place."""
+    """Return the weighted centre (9, 3) of each patch; an empty patch keeps its place."""
     mass = np.bincount(patch, share, 9)[:, None]
     total = np.stack([np.bincount(patch, share * column, 9) for column in points.T], axis=1)
     return np.where(mass > 0.0, total / np.maximum(mass, 1e-300), before)
 
 
 def _distances(points: FloatArray, centres: FloatArray) -> FloatArray:
-    """(n, 9): squared distances, mm^2."""
+    """Return the squared distances (n, 9), mm^2."""
     squares = (points**2).sum(axis=1)[:, None] + (centres**2).sum(axis=1)
     distances: FloatArray = squares - 2.0 * points @ centres.T
     return distances
 
 
 def _three_by_three(points: FloatArray, share: FloatArray) -> NDArray[np.int64]:
-    """Patch numbers 0..8: three strips of equal area, each in three parts of equal area."""
+    """Return the patch numbers 0 to 8 of points: three strips of equal area, each divided into
+    three parts of equal area.
+    """
     _, axes = np.linalg.eigh(np.cov(points.T, aweights=share))
     main = axes[:, :0:-1]  # the two axes along which the points spread most
     main = main * np.sign(main[np.abs(main).argmax(axis=0), [0, 1]])
@@ -85,7 +86,7 @@ def _three_by_three(points: FloatArray, share: FloatArray) -> NDArray[np.int64]:
 
 
 def _thirds(values: FloatArray, share: FloatArray) -> NDArray[np.int64]:
-    """0, 1 or 2: the third of the total share that each value falls in."""
+    """Return 0, 1 or 2 for each value: the third of the total share that it falls in."""
     order = np.argsort(values, kind="stable")
     below = np.cumsum(share[order]) - 0.5 * share[order]
     result = np.empty(len(values), dtype=np.int64)

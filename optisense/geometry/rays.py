@@ -15,7 +15,7 @@ arrays."""
 
 
 class RayHits(NamedTuple):
-    """All crossings, sorted by ray and then by distance.
+    """The intersections of rays with a mesh, sorted by ray and then by distance.
 
     Attributes:
         ray: (k,) int64, the ray's number.
@@ -29,15 +29,15 @@ class RayHits(NamedTuple):
 
 
 def ray_hits(mesh: TriangleMesh, origins: ArrayLike, directions: ArrayLike) -> RayHits:
-    """Every crossing, from either side, of rays with a mesh.
+    """Return every intersection, from either side, of rays with a mesh.
 
-    Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection", J. Graphics Tools 2
-    (1997); each ray is tried against each triangle.
+    The method is that of Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection",
+    J. Graphics Tools 2 (1997); each ray is tested against each triangle.
 
     Args:
-        mesh: any mesh.
-        origins: (r, 3) mm.
-        directions: (r, 3), of any length but zero.
+        mesh: any mesh, mm.
+        origins: (r, 3) origins, mm.
+        directions: (r, 3) directions of any length except zero.
     """
     start = np.asarray(origins, dtype=np.float64).reshape(-1, 3)
     way = np.asarray(directions, dtype=np.float64).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Smaller triangles where a mesh needs them, by bisection of the longest edges."""
+"""Refinement of meshes by bisection of the longest edges."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MAX_PASSES = 40
-"""Passes after which refinement ends; each halves the area of the triangles that it cuts."""
+"""Number of passes after which refinement ends; each pass halves the area of the triangles that it
+cuts."""
 
 
 def refine(
@@ -28,14 +29,14 @@ def refine(
     much smaller than they were.
 
     Args:
-        vertices: (n, 3) mm; a place has one vertex, whatever faces meet there.
+        vertices: (n, 3) vertices, mm; all faces that meet at a place share one vertex.
         faces: (m, 3) rows of ``vertices``.
         corner_normals: (m, 3, 3) shading normals of the corners of each face, not normalised again.
-        wanted: greatest edge length (k,) mm at places (k, 3).
-        max_faces: the refinement ends where the next pass could lead to more.
+        wanted: function that returns the greatest edge length (k,), mm, at places (k, 3).
+        max_faces: number of faces; refinement ends if the next pass could exceed it.
 
     Returns:
-        The same three of the finer mesh. Vertices are only added.
+        Vertices, faces and corner normals of the finer mesh. Vertices are only added.
     """
     for _ in range(MAX_PASSES):
         ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
@@ -45,7 +46,7 @@ def refine(
         middles = (vertices[first] + vertices[second]) / 2.0
         length = np.linalg.norm(vertices[first] - vertices[second], axis=1)
         cut = length > wanted(middles)
-        # Of edges of one length all triangles choose the same.
+        # All triangles choose the same one of several edges of equal length.
         rank = np.empty(len(key), dtype=np.int64)
         rank[np.lexsort((np.arange(len(key)), length))] = np.arange(len(key))
         longest = np.argmax(rank[edge], axis=1)
@@ -71,7 +72,7 @@ def _cut(
     cut: NDArray[np.bool_],
     added: IntArray,
 ) -> tuple[IntArray, FloatArray]:
-    """Faces with their marked edges cut, the longest first."""
+    """Return faces with their marked edges cut, the longest first."""
     touched = cut[edge].any(axis=1)
     order = (longest[touched, None] + np.arange(3)) % 3  # the longest edge leads from corner 0 to 1
     rows = np.arange(int(touched.sum()))[:, None]
@@ -92,7 +93,7 @@ def _cut(
 def _faces(
     chosen: NDArray[np.bool_], *corners: tuple[IntArray, FloatArray]
 ) -> tuple[IntArray, FloatArray]:
-    """Faces and corner normals of three corners, where ``chosen``."""
+    """Return the ``chosen`` faces and corner normals from three corners."""
     return (
         np.stack([vertex[chosen] for vertex, _ in corners], axis=1),
         np.stack([normal[chosen] for _, normal in corners], axis=1),

@@ -1,8 +1,8 @@
-"""Meshes from CAD files: what can be mended without guessing, and what to mend in the CAD tool.
+"""Repair of meshes from CAD files, as far as it needs no guessing.
 
-Mended: vertices that miss each other by a rounding, doubled faces, faces and whole shells that
-are turned inside out. Refused, with the place: holes, edges of more than two faces, faces that
-cut through each other.
+Repaired are vertices that differ by rounding, duplicate faces, and faces and whole shells that are
+turned inside out. Refused, with the place, are holes, edges of more than two faces, and faces that
+cut through each other; these must be corrected in the CAD tool.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from optisense.geometry.mesh_checks import with_consistent_winding
 from optisense.geometry.welding import merged_vertices
 
 WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
-"""mm: vertices this near each other are tried as one, the smallest first."""
+"""Distances (mm) below which vertices are merged, tried in ascending order."""
 
 
 def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh, list[str]]:
-    """Mend the mesh of part `name` where that is safe.
+    """Repair the mesh of a part if that is safe.
 
     Args:
-        mesh: as read from a file, mm.
-        name: of the part, for messages.
+        mesh: the mesh as read from a file, mm.
+        name: name of the part, for messages.
         closed: whether it must enclose a volume.
 
     Returns:
-        The mesh (closed ones look outward; shading normals are kept only by an open mesh that
-        needed nothing) and what was done to it, a sentence each.
+        The mesh (closed meshes have outward face normals; shading normals are kept only by an open
+        mesh that needed no repair) and a list of the changes, one sentence each.
 
     Raises:
-        MeshError: no faces, not finite, holes, edges of more than two faces, faces that cut
-            through each other, or no volume; says where and what to do in the CAD tool.
+        MeshError: no faces, not finite, holes, edges of more than two faces, faces that cut through
+            each other, or no volume; the message says where, and what to do in the CAD tool.
     """
     where = f"part {name}"
     if not np.isfinite(mesh.vertices).all():
@@ -67,7 +67,7 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
 
 
 def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
-    """Check an open mesh on which places are found by walking from face to face.
+    """Check an open mesh for defects that prevent walking from face to face.
 
     Raises:
         MeshError: an edge has more than two faces, or faces cut through each other.
@@ -77,7 +77,7 @@ def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
 
 
 def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """(m,) int64: the number of the connected shell that each face belongs to."""
+    """Return the number (m,) int64 of the connected shell that each face belongs to."""
     count = len(mesh.vertices)
     ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
     graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
@@ -87,10 +87,10 @@ def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
 
 
 def _without_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Faces with the same corners in the same turn once only, and how many were dropped."""
+    """Drop duplicate faces (same corners, same winding); return the mesh and their number."""
     start = mesh.faces.argmin(axis=1)
     turned = np.take_along_axis(mesh.faces, (start[:, None] + np.arange(3)) % 3, axis=1)
-    # Rows as single numbers: to sort these takes a tenth of the time.
+    # Rows are coded as single numbers, which sort ten times faster.
     count = len(mesh.vertices)
     _, ends = np.unique(turned[:, 0].astype(np.int64) * count + turned[:, 1], return_inverse=True)
     _, first = np.unique(ends * count + turned[:, 2], return_index=True)
@@ -115,7 +115,7 @@ def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
 
 
 def _hole(mesh: TriangleMesh, edges: NDArray[np.int64], where: str) -> MeshError:
-    """The error for open edges: how many holes, and where the widest one is."""
+    """Return the error for open edges, with the number of holes and the place of the widest one."""
     count = len(mesh.vertices)
     graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
     _, group = connected_components(graph, directed=False)
@@ -170,7 +170,9 @@ def _refuse_crossings(mesh: TriangleMesh, where: str) -> None:
 
 
 def _consistent(mesh: TriangleMesh, notes: list[str]) -> TriangleMesh:
-    """An open mesh whose faces agree with their neighbours; in each shell the majority wins."""
+    """Return an open mesh whose faces agree with their neighbours; in each shell the majority
+    decides.
+    """
     faces = with_consistent_winding(mesh).faces
     turned = (faces != mesh.faces).any(axis=1)
     labels = shells(mesh)
@@ -183,7 +185,7 @@ def _consistent(mesh: TriangleMesh, notes: list[str]) -> TriangleMesh:
 
 
 def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
-    """Neighbours wound alike, and each shell outward, or inward where it is a cavity."""
+    """Return a mesh with consistent winding and each shell outward, or inward if it is a cavity."""
     labels = shells(mesh)
     faces = with_consistent_winding(mesh).faces.copy()
     bodies = [mesh.with_faces(faces[labels == label]) for label in range(labels.max() + 1)]
@@ -210,7 +212,7 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
 
 
 def _edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(k, 2) undirected edges and (k,) how many faces each has."""
+    """Return the undirected edges (k, 2) and the number (k,) of faces of each."""
     ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     size = len(mesh.vertices)
     keys, count = np.unique(ends.min(axis=1) * size + ends.max(axis=1), return_counts=True)

@@ -14,23 +14,23 @@ from scipy import sparse
 FloatArray = NDArray[np.float64]
 
 SAME_NORMAL = 1e-6
-"""Corners of a vertex whose normals differ by less share it."""
+"""Difference of unit normals below which corners of a vertex share it; a margin for rounding."""
 
 
 def smooth_corners(
     triangles: FloatArray, faces: NDArray[np.integer], normals: FloatArray, crease: float
 ) -> tuple[NDArray[np.integer], NDArray[np.int32], FloatArray]:
-    """Corner normals, and the vertices split where they disagree.
+    """Compute corner normals, and split the vertices whose corners disagree.
 
     Args:
-        triangles: (m, 3, 3) mm, face, corner, coordinate.
+        triangles: (m, 3, 3) corners of the faces (face, corner, coordinate), mm.
         faces: (m, 3) vertex numbers.
         normals: (m, 3) unit face normals.
-        crease: degrees; faces around a vertex that differ by more are not averaged.
+        crease: angle (degrees) above which faces around a vertex are not averaged.
 
     Returns:
-        (k,) the old number of each new vertex; (m, 3) int32 faces over the new ones; (k, 3)
-        their unit normals.
+        The old number (k,) of each new vertex, faces (m, 3) int32 of the new vertices, and their
+        unit normals (k, 3).
     """
     vertex = faces.reshape(-1)
     count = int(vertex.max()) + 1 if len(vertex) else 0
@@ -39,8 +39,8 @@ def smooth_corners(
     total = np.column_stack([np.bincount(vertex, weighted[:, k], count) for k in range(3)])
     length = np.linalg.norm(total, axis=1, keepdims=True)
     mean: FloatArray = total / np.where(length > 0, length, 1.0)
-    # Faces within half the crease of their mean are within the crease of each other: the usual
-    # case by far, which needs no look at pairs.
+    # Faces within half the crease angle of their mean are within the crease angle of each other.
+    # This is the usual case, and needs no test of pairs.
     lowest = np.full(count, np.inf)
     np.minimum.at(lowest, vertex, np.einsum("ij,ij->i", mean[vertex], normal))
     plain = (lowest >= np.cos(np.radians(crease / 2))) & np.isfinite(lowest)
@@ -66,7 +66,9 @@ def smooth_corners(
 def _averaged(
     vertex: NDArray[np.integer], weighted: FloatArray, normal: FloatArray, crease: float
 ) -> FloatArray:
-    """(c, 3) each corner's mean over those corners of its vertex within the crease."""
+    """Return each corner's mean normal (c, 3) over the corners of its vertex within the crease
+    angle.
+    """
     count = len(vertex)
     incidence = sparse.csr_matrix(
         (np.ones(count, np.int8), vertex, np.arange(count + 1)),
@@ -84,7 +86,7 @@ def _averaged(
 
 
 def corner_angles(triangles: FloatArray) -> FloatArray:
-    """(3 m,) float64, radians: the angle of each face corner of triangles (m, 3, 3)."""
+    """Return the angle (3 m,) float64, radians, of each corner of triangles (m, 3, 3)."""
     edges = [triangles[:, (k + 1) % 3] - triangles[:, k] for k in range(3)]
     twice_area = np.linalg.norm(np.cross(edges[0], edges[1]), axis=1)
     angles = np.empty((len(triangles), 3))

@@ -1,7 +1,7 @@
 """Reading STEP files, with the extra `step` (Open CASCADE through cadquery-ocp).
 
-A STEP file knows its units and holds exact surfaces, which are cut into triangles here. The
-calls used are the same in the releases of Open CASCADE from 7.8 to 8.
+A STEP file states its units and holds exact surfaces, which this module triangulates. The calls
+used are the same in the releases of Open CASCADE from 7.8 to 8.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ CHORD = 0.003
 of 0.01 mm and more."""
 
 BEND = 6.0
-"""Degrees: and neighbouring ones on a curve bend no more than this."""
+"""Largest angle (degrees) between neighbouring triangles on a curved surface."""
 
 _WELD = 1e-5
-"""Distance in mm within which vertices of neighbouring faces are one; Open CASCADE's triangles meet
-to this."""
+"""Distance (mm) within which vertices of neighbouring faces are merged; Open CASCADE's triangles
+meet with this accuracy."""
 
 BODIES, WRONG = "bodies.npz", "wrong.json"
-"""Files in the folder: what was found, or what is wrong."""
+"""Files that the process writes into its folder: the bodies found, or the error."""
 
 READER = "optisense.geometry.step_process"
-"""The module that is run as the process that reads a file."""
+"""Module of the process that reads a file."""
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class StepBody:
     """A solid, or a surface that is part of none.
 
     Attributes:
-        name: of its product in the file, numbered where several share one.
-        mesh: mm, in the frame of the whole file.
+        name: name of its product in the file, numbered if several bodies share it.
+        mesh: the mesh in the frame of the whole file, mm.
         solid: whether it is a solid.
     """
 
@@ -62,12 +62,12 @@ class StepBody:
 
 
 def no_step(error: ImportError, action: str, instead: str, where: Path | None = None) -> SetupError:
-    """What to say where Open CASCADE can't be imported.
+    """Return the error to raise if Open CASCADE cannot be imported.
 
     Args:
-        error: of the import.
+        error: the error of the import.
         action: "reading" or "writing".
-        instead: what a user can do without it.
+        instead: hint for what a user can do without it.
         where: the file.
     """
     place = None if where is None else str(where)
@@ -86,7 +86,7 @@ def no_step(error: ImportError, action: str, instead: str, where: Path | None = 
 
 
 def read_step(path: str | Path) -> list[StepBody]:
-    """All bodies of a STEP file, in its order, each where its assembly puts it.
+    """Read all bodies of a STEP file, in its order, placed by its assembly.
 
     Another process reads it (`optisense.geometry.step_process`), as some malformed files crash Open
     CASCADE.
@@ -103,11 +103,11 @@ def read_step(path: str | Path) -> list[StepBody]:
 
 
 def _read_apart(path: Path) -> list[StepBody]:
-    """The bodies of a STEP file, read by a process of its own.
+    """Read the bodies of a STEP file in a separate process.
 
     Raises:
-        SetupError: Open CASCADE can't be imported there.
-        MeshError: the file can't be read, or the process has ended over it.
+        SetupError: Open CASCADE cannot be imported there.
+        MeshError: the file cannot be read, or the process has crashed.
     """
     with tempfile.TemporaryDirectory(prefix="optisense-") as folder:
         search = os.pathsep.join(each or str(Path.cwd()) for each in sys.path)
@@ -139,10 +139,10 @@ def _read_apart(path: Path) -> list[StepBody]:
 
 
 def bodies_of(path: Path) -> list[StepBody]:
-    """The same, read in this process.
+    """Read the bodies of a STEP file in this process.
 
     Raises:
-        SetupError: Open CASCADE can't be imported.
+        SetupError: Open CASCADE cannot be imported.
         MeshError: the file is not STEP, or holds no faces.
     """
     try:
@@ -194,7 +194,7 @@ def quiet() -> None:
 
 
 def _products(root: Any) -> Iterator[tuple[str, Any]]:
-    """Name and shape, in its place, of each leaf of the tree of assemblies."""
+    """Yield the name and the placed shape of each leaf of the tree of assemblies."""
     from OCP.TDF import TDF_ChildIterator, TDF_Label
     from OCP.TopLoc import TopLoc_Location
     from OCP.XCAFDoc import XCAFDoc_ShapeTool
@@ -236,7 +236,9 @@ def _name(label: Any) -> str:
 
 
 def _bodies(shape: Any) -> Iterator[tuple[bool, Any]]:
-    """Solids, then the faces that are in no solid; the first value says which it is."""
+    """Yield solids, then the faces that belong to no solid; the first value tells whether it is a
+    solid.
+    """
     from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
     from OCP.TopExp import TopExp_Explorer
 
@@ -253,12 +255,12 @@ def _bodies(shape: Any) -> Iterator[tuple[bool, Any]]:
 
 
 def triangles(shape: Any, chord: float = CHORD, bend: float = BEND) -> TriangleMesh:
-    """Cut the faces of a shape into triangles, which look out of a solid.
+    """Triangulate the faces of a shape; face normals point out of a solid.
 
     Args:
-        shape: of Open CASCADE, mm.
-        chord: mm, how far triangles may be off the exact surface.
-        bend: degrees, by which neighbouring ones on a curve may bend.
+        shape: shape of Open CASCADE, mm.
+        chord: largest distance of triangles from the exact surface, mm.
+        bend: largest angle (degrees) between neighbouring triangles on a curved surface.
     """
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh

@@ -1,9 +1,9 @@
 """The process in which Open CASCADE reads a STEP file, for `optisense.geometry.step.read_step`.
 
-Open CASCADE is compiled code that some malformed files crash, or keep busy without an end, and an
-exception can't be made of either. So it reads in a process of its own, whose end is only the end of
-reading that file. ``python -m optisense.geometry.step_process FILE FOLDER`` is that process: it
-writes what it has found, or what is wrong with the file, into the folder.
+Open CASCADE is compiled code that crashes or does not terminate on some malformed files, and
+neither raises an exception. It therefore runs in a separate process, so that a crash only ends the
+reading of that file. The process ``python -m optisense.geometry.step_process FILE FOLDER`` writes
+the bodies found, or the error, into the folder.
 """
 
 from __future__ import annotations
@@ -21,14 +21,15 @@ from optisense.errors import OptiSenseError
 from optisense.geometry.step import BODIES, WRONG, bodies_of
 
 LONGEST = 600
-"""Seconds of the processor for one file: the largest STEP files of sensors take about a minute."""
+"""Largest processor time (s) for one file; the largest STEP files of sensors take about a
+minute."""
 
 MOST_MEMORY = 16 * 2**30
-"""Bytes of address space for one file: 64 MiB of STEP take some 4 GiB."""
+"""Largest address space (bytes) for one file; 64 MiB of STEP take some 4 GiB."""
 
 
 def main() -> int:
-    """Read a file and write what it holds; 1 where it can't be read."""
+    """Read a file and write its bodies; return the exit status, 1 if it cannot be read."""
     path, folder = Path(sys.argv[1]), Path(sys.argv[2])
     _bound()
     try:
@@ -48,7 +49,7 @@ def main() -> int:
 
 
 def _bound() -> None:
-    """Bound the time and the memory of this process, where the system can."""
+    """Limit the time and the memory of this process, if the system supports it."""
     with suppress(ImportError, ValueError, OSError):
         import resource
 
@@ -58,5 +59,6 @@ def _bound() -> None:
 
 
 if __name__ == "__main__":
-    # Without the interpreter's own end, which takes down what may be half made.
+    # os._exit skips the interpreter's finalisation, which would destroy objects that may be
+    # incomplete.
     os._exit(main())

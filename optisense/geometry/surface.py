@@ -1,4 +1,4 @@
-"""Coordinates on a sensing surface, which may be curved: where (u, v) lies."""
+"""Coordinates (u, v) on a sensing surface, which may be curved."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from optisense.geometry.mesh import TriangleMesh
 FloatArray = NDArray[np.float64]
 
 _ARRIVED = 1e-9
-"""Distance in mm left to go below which a walk over the surface has arrived; a margin for
+"""Remaining distance (mm) below which a walk over the surface has arrived; a margin for
 rounding."""
 
 
@@ -22,8 +22,8 @@ class SurfacePoint(NamedTuple):
     """A place on the sensing surface.
 
     Attributes:
-        point: (3,) float64, mm.
-        inward: (3,) float64 unit normal, into the gel.
+        point: (3,) float64, the position, mm.
+        inward: (3,) float64, the unit normal into the gel.
     """
 
     point: FloatArray
@@ -33,25 +33,25 @@ class SurfacePoint(NamedTuple):
 class SensingSurface:
     """A sensing surface with coordinates (u, v) in mm.
 
-    From the origin, (u, v) is reached by walking sqrt(u^2 + v^2) mm straight ahead in direction
-    u * u_axis + v * v_axis. Straight means unfolded across each edge (the straightest geodesics
-    of Polthier and Schmies, 1998). On a flat surface (u, v) are plain plane coordinates.
+    The point (u, v) lies at distance sqrt(u^2 + v^2) from the origin along the straightest geodesic
+    in direction u * u_axis + v * v_axis, which is unfolded across each edge (Polthier and Schmies,
+    1998). On a flat surface (u, v) are Cartesian coordinates.
     """
 
     def __init__(
         self, mesh: TriangleMesh, origin: ArrayLike, u_axis: ArrayLike, v_axis: ArrayLike
     ) -> None:
-        """Put coordinates on a surface.
+        """Define coordinates on a surface.
 
         Args:
             mesh: the sensing surface, mm; its face normals point into the gel.
-            origin: (3,) mm; the surface point nearest to it becomes (0, 0).
-            u_axis, v_axis: (3,) directions; made to lie in the surface at the origin and
-                square to each other, with u kept as it is.
+            origin: (3,) a point (mm) whose nearest point on the surface is (0, 0).
+            u_axis, v_axis: (3,) directions, which are projected on the surface at the origin; v is
+                made perpendicular to u.
 
         Raises:
             MeshError: the mesh is empty.
-            ContactError: an axis stands on the surface, or both are parallel.
+            ContactError: an axis is perpendicular to the surface, or both are parallel.
         """
         mesh.validate("sensing surface", closed=False)
         self.mesh = mesh.welded()
@@ -61,10 +61,10 @@ class SensingSurface:
         self.v_axis = _in_plane(np.asarray(v_axis, dtype=np.float64), [normal, self.u_axis], "v")
 
     def point_at(self, u: float, v: float) -> SurfacePoint:
-        """The place with surface coordinates (u, v) mm.
+        """Return the place with surface coordinates (u, v), mm.
 
         Raises:
-            ContactError: the way there leads over the edge of the surface.
+            ContactError: the path to it crosses the edge of the surface.
         """
         way = u * self.u_axis + v * self.v_axis
         length = float(np.hypot(u, v))
@@ -80,11 +80,13 @@ class SensingSurface:
         return self._surface_point(face, point)
 
     def nearest(self, point: ArrayLike) -> SurfacePoint:
-        """The place nearest to `point` (3,) mm."""
+        """Return the place nearest to `point` (3,), mm."""
         return self._surface_point(*self._closest(point))
 
     def height_above(self, place: SurfacePoint) -> float:
-        """How far (mm) the surface rises outward over its tangent plane at a place."""
+        """Return the largest height (mm) of the surface, outward, over its tangent plane at a
+        place.
+        """
         outward = (self.mesh.vertices - place.point) @ -place.inward
         return max(0.0, float(outward.max()))
 
@@ -98,7 +100,9 @@ class SensingSurface:
         return face, np.asarray(on_faces[face], dtype=np.float64)
 
     def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
-        """The frame has the smooth normal, so that presses nearby have nearly one direction."""
+        """Return the place with the smooth normal, so that neighbouring presses have nearly the
+        same direction.
+        """
         smooth = self._smooth
         assert smooth.normals is not None
         share = _barycentric(self.mesh.triangles[face], point)
@@ -111,7 +115,7 @@ class SensingSurface:
 
     @cached_property
     def _neighbours(self) -> dict[tuple[int, int], list[int]]:
-        """The faces at each edge, by its (lower, higher) vertex."""
+        """The faces at each edge, by its (lower, higher) vertex numbers."""
         result: dict[tuple[int, int], list[int]] = {}
         for face, (a, b, c) in enumerate(self.mesh.faces.tolist()):
             for one, other in ((a, b), (b, c), (c, a)):
@@ -121,7 +125,9 @@ class SensingSurface:
     def _walk(
         self, face: int, point: FloatArray, direction: FloatArray, length: float
     ) -> tuple[int, FloatArray, float]:
-        """Go straight from a point of `face`; also what was left of `length` at a border."""
+        """Walk straight from a point of `face`; return the end and the remaining part of `length`
+        at a border.
+        """
         mesh = self.mesh
         for _ in range(10 * len(mesh.faces) + 100):
             corners = mesh.triangles[face]
@@ -149,7 +155,7 @@ class SensingSurface:
         )
 
     def _unfolded(self, direction: FloatArray, ends: list[int], face: int) -> FloatArray:
-        """The direction after stepping over the edge `ends` into `face`."""
+        """Return the direction after crossing the edge `ends` into `face`."""
         start = self.mesh.vertices[ends[0]]
         edge = self.mesh.vertices[ends[1]] - start
         edge = edge / np.linalg.norm(edge)
@@ -163,7 +169,7 @@ class SensingSurface:
 
 
 def closest_points(mesh: TriangleMesh, point: FloatArray) -> FloatArray:
-    """The point of each face that lies nearest to `point` (3,) mm: (m, 3) mm."""
+    """Return the point (m, 3), mm, of each face that is nearest to `point` (3,), mm."""
     corners = mesh.triangles
     edges = np.roll(corners, -1, axis=1) - corners
     squares = np.maximum(np.einsum("mei,mei->me", edges, edges), 1e-300)
@@ -180,7 +186,7 @@ def closest_points(mesh: TriangleMesh, point: FloatArray) -> FloatArray:
 
 
 def _barycentric(triangle: FloatArray, point: FloatArray) -> FloatArray:
-    """(3,) shares of the corners (3, 3) in a point of their plane."""
+    """Return the barycentric coordinates (3,) of a point in the plane of three corners (3, 3)."""
     edges = (triangle[1:] - triangle[0]).T
     second, third = np.linalg.lstsq(edges, point - triangle[0], rcond=None)[0]
     return np.array([1.0 - second - third, second, third])

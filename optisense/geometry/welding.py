@@ -1,4 +1,4 @@
-"""Making one vertex of several that lie closely together."""
+"""Merging of vertices that lie close together."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from optisense.geometry.mesh import TriangleMesh
 
 
 def merged_vertices(mesh: TriangleMesh, distance: float) -> TriangleMesh:
-    """Vertices nearer to each other than `distance` (mm) made one; collapsed faces dropped.
+    """Merge vertices that are nearer to each other than `distance` (mm), and drop collapsed faces.
 
-    Unlike `TriangleMesh.welded`, which compares coordinates rounded to a grid and is faster, no
-    two vertices at such a distance stay apart. Shading normals are dropped.
+    Unlike `TriangleMesh.welded`, which compares coordinates rounded to a grid and is faster, this
+    merges all such vertices. Shading normals are dropped.
     """
     pairs = cKDTree(mesh.vertices).query_pairs(distance, output_type="ndarray")
     count = len(mesh.vertices)

@@ -98,8 +98,8 @@ class GridResponse:
         return np.stack([self._back(each) for each in (x, y, z)])
 
     def sideways(self, shear: FloatArray) -> FloatArray:
-        """Return the displacement (2, rows, columns), mm, along x and y due to a shear (2, rows,
-        columns), MPa.
+        """Return the displacement (2, rows, columns), mm, along x and y due to a shear
+        (2, rows, columns), MPa.
         """
         kernels = self._kernels
         along_x, along_y = self._there(shear[0]), self._there(shear[1])

@@ -103,8 +103,8 @@ class Relighting:
         return np.array([group.channel_flux() for group in design.lights.values()])
 
     def untouched(self, flux: ArrayLike) -> NDArray[np.float32]:
-        """Return the radiance (h, w, 3) of the untouched sensor under lights of a power (groups,
-        3), mW.
+        """Return the radiance (h, w, 3) of the untouched sensor under lights of a power
+        (groups, 3), mW.
         """
         return self._as_image(_mixed(self._untouched, flux))
 

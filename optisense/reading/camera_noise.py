@@ -13,14 +13,15 @@ ByteArray = NDArray[np.uint8]
 
 
 def add_camera_noise(picture: ByteArray, noise: float, seed: int | list[int]) -> ByteArray:
-    """A picture (h, w, 3) with independent Gaussian noise on each pixel and channel.
+    """Add independent Gaussian noise to each pixel and channel of a picture (h, w, 3).
 
     Args:
-        picture: uint8. noise: standard deviation in levels of 255, on the encoded picture; 0 for
-            none. seed: of NumPy's default generator.
+        picture: the encoded picture, uint8.
+        noise: standard deviation in levels of 255; 0 for none.
+        seed: seed of NumPy's default generator.
 
     Returns:
-        uint8, rounded and clipped.
+        The picture with noise, uint8, rounded and clipped.
     """
     if noise <= 0:
         return picture

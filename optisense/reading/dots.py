@@ -10,31 +10,32 @@ from scipy.spatial import cKDTree
 FloatArray = NDArray[np.float64]
 
 REACH = 0.5
-"""Distance from a dot's place at rest within which it is looked for, over that of its nearest
-neighbour: two dots never look for each other."""
+"""Search radius around a dot's place at rest, over the distance to its nearest neighbour; with a
+half, the search areas of two dots do not overlap."""
 LEAST_REACH = 1.5
-"""Pixels that a dot is looked for at least."""
+"""Smallest search radius of a dot, pixels."""
 FAINTEST = 0.3
-"""Darkness over the greatest one near a dot from which pixels count as its own; lights' shades are
-fainter than ink."""
+"""Darkness from which on pixels belong to a dot, over the greatest darkness near it; shading by
+lights is fainter than ink."""
 LEAST_DARKNESS = 10.0
-"""Levels of 255 by which a dot is darker than what is around it at least, several times the noise
+"""Smallest difference (levels of 255) between a dot and its surroundings, several times the noise
 of a camera."""
 
 
 def dots_in_picture(picture: NDArray[np.uint8], at_rest: FloatArray) -> FloatArray:
-    """Columns and rows of dots that have moved a little.
+    """Locate dots that have moved a little.
 
-    What is darker than its surroundings, and smaller than the distance of dots, counts as a dot (a
-    black top-hat transform); the centre of this darkness near its place at rest is its place.
+    Areas that are darker than their surroundings and smaller than the distance of dots count as
+    dots (a black top-hat transform). The position of a dot is the centre of this darkness near its
+    place at rest.
 
     Args:
-        picture: (h, w, 3), as the camera stored it.
+        picture: (h, w, 3) picture that the camera stored.
         at_rest: (n, 2) column and row of each dot in the untouched picture, in pixels from the
             upper left corner; NaN where it is not seen.
 
     Returns:
-        (n, 2) column and row; NaN where no dot is found.
+        The column and row (n, 2) of each dot; NaN where no dot is found.
     """
     result = np.full(at_rest.shape, np.nan)
     seen = np.flatnonzero(np.isfinite(at_rest).all(axis=1))

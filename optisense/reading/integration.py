@@ -22,15 +22,15 @@ smaller."""
 
 
 class GridIntegrator:
-    """Finds values on the pixels of a mask from their slopes.
+    """Integrator of slopes on the pixels of a mask.
 
-    Minimises the squared difference between the values' steps from pixel to pixel and the mean
-    of the slopes at both ends, which is exact for quadratic surfaces. Whatever is connected is
-    known up to a constant; each connected part gets the mean 0.
+    It minimises the squared difference between the values' steps from pixel to pixel and the mean
+    of the slopes at both ends, which is exact for quadratic surfaces. The values of a connected
+    part are determined up to a constant; their mean is set to 0.
     """
 
     def __init__(self, mask: NDArray[np.bool_]) -> None:
-        """Args: mask: (h, w), the pixels that belong to the surface."""
+        """Prepare the equations for the pixels (h, w) that belong to the surface."""
         self.mask = mask
         number = np.full(mask.shape, -1)
         number[mask] = np.arange(mask.sum())
@@ -54,17 +54,17 @@ class GridIntegrator:
 
     @cached_property
     def _solve(self) -> object:
-        # One pixel of each part is held, so that the matrix has an inverse.
+        # One pixel of each part is fixed, so that the matrix is invertible.
         _, held = np.unique(self._part, return_index=True)
         pins = np.zeros(self._steps.shape[1])
         pins[held] = 1.0
         return factorized((self._steps.T @ self._steps + sparse.diags(pins)).tocsc())
 
     def from_steps(self, across: FloatArray, down: FloatArray) -> FloatArray:
-        """Values (h, w) from their steps to the next pixel: (h, w - 1) along rows, and (h - 1, w)
-        along columns; NaN off the mask.
+        """Return values (h, w) from their steps to the next pixel, (h, w - 1) along rows and (h -
+        1, w) along columns; NaN outside the mask.
 
-        Steps to or from pixels off the mask are not read.
+        Steps to or from pixels outside the mask are ignored.
         """
         wanted = np.concatenate([across[self._across], down[self._down]])
         values = self._solve(self._steps.T @ wanted)  # type: ignore[operator]
@@ -76,32 +76,32 @@ class GridIntegrator:
 
 
 class NormalIntegrator:
-    """Depth from the normals that a camera sees, on flat and on curved sensors alike.
+    """Integrator of the normals that a camera sees to depth, on flat and on curved sensors.
 
-    What is integrated is not a height over a plane but t, how far back along its own ray (in the
-    gel, a straight line) each pixel's surface lies: the surface is p(t) = p0 - t d, where p0 is the
-    untouched point and d the ray's direction. From one pixel to the next, the step between the two
-    lies in the surface, so it is square to its normal n. With t and d in the middle of both pixels,
-    and D for what changes from one to the other,
+    The integrated quantity is not a height over a plane but t, the distance of the surface back
+    along each pixel's own ray (in the gel, a straight line): the surface is p(t) = p0 - t d, where
+    p0 is the untouched point and d the ray's direction. The step from one pixel to the next lies in
+    the surface, so it is perpendicular to its normal n. With t and d in the middle of both pixels,
+    and D for differences between the two pixels,
 
         D t = (D p0 - t D d) . n / (d . n),
 
-    as the mean of what the normals of both pixels give, which is exact for quadratic surfaces.
-    Perspective, refraction and curvature are all in p0 and d, which chief rays give; t on the right
-    is taken from the round before, first 0. Only neighbours that are both seen make a step, so that
-    nothing is read beyond the border of the view.
+    averaged over the normals of both pixels, which is exact for quadratic surfaces. Perspective,
+    refraction and curvature are contained in p0 and d, the results of chief rays; t on the right
+    side is that of the previous round, and 0 in the first. Steps connect only neighbours that are
+    both seen, so that no values beyond the border of the view are used.
     """
 
     def __init__(self, untouched: UntouchedSurface) -> None:
-        """Args: untouched: the sensor's surface and rays at the image's resolution."""
+        """Prepare the integration for a sensor's surface and rays at the image's resolution."""
         self._untouched = untouched
         self._grid = GridIntegrator(untouched.seen)
 
     def depths(self, normals: NDArray[np.floating]) -> FloatArray:
-        """(h, w) mm along the inward normal, from unit inward normals (h, w, 3).
+        """Return the depth (h, w), mm, along the inward normal, from unit inward normals (h, w, 3).
 
-        The constant that integration leaves open is set so that the median along the border of
-        what is seen is 0: a contact should leave most of the border untouched.
+        The integration constant is set so that the median along the border of the view is 0, as a
+        contact should leave most of the border untouched.
         """
         untouched = self._untouched
         normal = np.asarray(normals, dtype=np.float64)
@@ -117,12 +117,12 @@ class NormalIntegrator:
 
 
 class _Steps(NamedTuple):
-    """How far back along its ray the surface goes from each pixel to the next along an axis.
+    """The steps of t from each pixel to the next along an axis.
 
     Attributes:
         axis: 0 along columns, 1 along rows.
-        rise: mm, of a surface that is not moved.
-        turn: what the change of the ray's direction adds to it, for each mm back.
+        rise: step (mm) for t = 0.
+        turn: additional step due to the change of the ray's direction, per mm of t.
     """
 
     axis: int
@@ -131,7 +131,7 @@ class _Steps(NamedTuple):
 
     @staticmethod
     def between(untouched: UntouchedSurface, normal: FloatArray, axis: int) -> _Steps:
-        """The steps along an axis of a surface with these unit normals (h, w, 3)."""
+        """Return the steps along an axis for a surface with unit normals (h, w, 3)."""
         ways = _middle(untouched.directions, axis)
         changes = [np.diff(each, axis=axis) for each in (untouched.points, untouched.directions)]
         found = []
@@ -143,23 +143,25 @@ class _Steps(NamedTuple):
         return _Steps(axis, rise, turn)
 
     def of(self, back: FloatArray) -> FloatArray:
-        """mm, where the surface is about `back` (h, w) mm back."""
+        """Return the steps (mm) for a surface whose t is about `back` (h, w), mm."""
         return self.rise - _middle(back, self.axis) * self.turn
 
 
 def _middle(values: FloatArray, axis: int) -> FloatArray:
-    """The means of neighbours along an axis."""
+    """Return the means of neighbours along an axis."""
     before, after = _neighbours(values, axis)
     return 0.5 * (before + after)
 
 
 def _neighbours(values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
-    """The values before and after each step along an axis."""
+    """Return the values before and after each step along an axis."""
     return (values[:, :-1], values[:, 1:]) if axis else (values[:-1], values[1:])
 
 
 def _border(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The pixels of a mask that touch what is not in it, or the image's edge."""
+    """Return the pixels of a mask that are adjacent to pixels outside it, or to the image's
+    edge.
+    """
     padded = np.pad(mask, 1)
     whole = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     return mask & ~whole

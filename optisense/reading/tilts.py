@@ -1,8 +1,8 @@
 """Tilts of a surface, normals, and the angles between them.
 
 The *tilt* of a surface at a place is the two components of its unit normal along the tangents of
-the untouched surface there (the sines of the slopes). It is 0 where nothing touches, on curved
-sensors too.
+the untouched surface there (the sines of the slopes). It is 0 where nothing touches, also on curved
+sensors.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 STEEPEST = 80.0
-"""Degrees that a read normal is tilted by at most, and between a ray and the normal of a surface
-that is integrated; steeper ones count as this."""
+"""Largest tilt (degrees) of a read normal, and largest angle between a ray and the normal of an
+integrated surface; larger angles are reduced to it."""
 
 
 def tilts_of(normals: NDArray[np.floating], first: FloatArray, second: FloatArray) -> FloatArray:
-    """(..., 2): the components of unit normals (..., 3) along two tangents (..., 3)."""
+    """Return the components (..., 2) of unit normals (..., 3) along two tangents (..., 3)."""
     return np.stack(
         [np.einsum("...i,...i", normals, first), np.einsum("...i,...i", normals, second)], axis=-1
     )
@@ -27,7 +27,9 @@ def tilts_of(normals: NDArray[np.floating], first: FloatArray, second: FloatArra
 def normals_of(
     tilts: FloatArray, first: FloatArray, second: FloatArray, normals: FloatArray
 ) -> FloatArray:
-    """(..., 3): unit normals tilted so (..., 2) from the untouched ones, by STEEPEST at most."""
+    """Return the unit normals (..., 3) with tilts (..., 2) from the untouched ones, by at most
+    STEEPEST.
+    """
     most = np.sin(np.radians(STEEPEST))
     length = np.linalg.norm(tilts, axis=-1, keepdims=True)
     within = tilts * np.minimum(1.0, most / np.maximum(length, 1e-12))
@@ -37,6 +39,6 @@ def normals_of(
 
 
 def angles_between(first: FloatArray, second: FloatArray) -> FloatArray:
-    """(...) degrees between unit vectors (..., 3)."""
+    """Return the angles (...), degrees, between unit vectors (..., 3)."""
     cosine = np.einsum("...i,...i", first, second)
     return np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))

@@ -1,4 +1,4 @@
-"""The untouched sensing surface behind each pixel, and how deep a touched one lies below it."""
+"""The untouched sensing surface that each pixel sees, and depths below it."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 UNMOVED = 1e-4
-"""mm; smaller displacements than these are rounding of single precision, and the tangent plane in
-place of a curved surface."""
+"""Displacement (mm) below which a surface counts as unmoved; smaller values are rounding of single
+precision and the error of the tangent plane on a curved surface."""
 
 
 @dataclass(frozen=True)
 class UntouchedSurface:
-    """The camera's view of a sensor that nothing touches; arrays are (h, w, ...).
+    """The camera's view of an untouched sensor, in the design's frame.
 
-    points: mm. normals: unit, inward. directions: unit, of the ray that arrives. seen: (h, w),
-    where the other three count. Everything is in the design's frame.
+    Attributes:
+        points: (h, w, 3) points of the surface, mm.
+        normals: (h, w, 3) unit normals into the gel.
+        directions: (h, w, 3) unit directions of the rays on arrival.
+        seen: (h, w) mask of the pixels with valid entries.
     """
 
     points: FloatArray
@@ -35,7 +38,7 @@ class UntouchedSurface:
 
     @classmethod
     def of(cls, rays: ChiefRays) -> UntouchedSurface:
-        """The view along chief rays without contacts."""
+        """Return the view of chief rays without contacts."""
         return cls(
             points=rays.points.astype(np.float64),
             normals=rays.normals.astype(np.float64),
@@ -48,16 +51,17 @@ class UntouchedSurface:
         return cKDTree(self.points[self.seen])
 
     def depth(self, points: NDArray[np.floating]) -> FloatArray:
-        """How far (mm) points lie below the surface, along its inward normal.
+        """Return the depth (mm) of points below the surface, along its inward normal.
 
-        Measured from the tangent plane at the nearest point that a pixel sees: on a surface of
-        radius R and pixels of p mm it is exact to p^2 / (4 R), less than a ten-thousandth of a mm.
+        It is measured from the tangent plane at the nearest point that a pixel sees. On a surface
+        of radius R with pixels of size p, the error is at most p^2 / (4 R), less than a
+        ten-thousandth of a mm.
 
         Args:
-            points: (..., 3) mm; NaN gives NaN.
+            points: (..., 3) points, mm; NaN gives NaN.
 
         Returns:
-            (...) mm; negative above the surface.
+            The depth (...), mm; negative above the surface.
         """
         flat = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         known = np.isfinite(flat).all(axis=1)
@@ -68,7 +72,8 @@ class UntouchedSurface:
         return depth.reshape(np.shape(points)[:-1])
 
     def image_depth(self, image: TactileImage) -> NDArray[np.float32]:
-        """(h, w) mm that an image's coating is pushed in, NaN where unseen.
+        """Return the depth (h, w), mm, of an image's coating below the untouched surface, NaN where
+        unseen.
 
         It is 0 where the coating has not moved, and negative where an elastic skin bulges.
         """
@@ -79,10 +84,10 @@ class UntouchedSurface:
         return depth.astype(np.float32)
 
     def frames(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Two unit tangents of the surface at each pixel, square to each other: (h, w, 3) each.
+        """Return two perpendicular unit tangents of the surface at each pixel, (h, w, 3) each.
 
         Args:
-            right: (3,) the first tangent is this direction made to lie in the surface.
+            right: (3,) direction whose projection on the surface is the first tangent.
         """
         along = right - (self.normals @ right)[..., None] * self.normals
         with np.errstate(invalid="ignore"):

@@ -1,4 +1,4 @@
-"""The objects, and the indenter that presses one of them.
+"""The objects, and the kind of indenter for them.
 
 Sizes are those of the real things where these are small enough for a fingertip: ISO metric threads
 and nuts, DIN 7985 pan heads, Braille by ISO 17049; the brick is a toy brick at half scale.
@@ -102,8 +102,8 @@ def _letters(x: FloatArray, y: FloatArray) -> FloatArray:
         for left, letter in _LETTERS
         for stroke in letter
     ]
-    # Seen through the object from its back they read the right way round, so its face has them
-    # mirrored, as the types of a printer are.
+    # The letters read correctly from the back of the object, so they are mirrored on its face, like
+    # a printer's types.
     return -outlines.raised(outlines.strokes(x, y, lines) - 0.2, 0.5) + outlines.wall(
         outlines.rectangle(x, y, 7.8, 3.4)
     )
@@ -192,7 +192,7 @@ class ObjectIndenter(IndenterKind):
     """One of the objects that come with the package.
 
     Attributes:
-        name: of the object, a key of `OBJECTS`.
+        name: name of the object, a key of `OBJECTS`.
         scale: factor on its size.
     """
 
@@ -207,7 +207,7 @@ class ObjectIndenter(IndenterKind):
         """Check the name and the scale.
 
         Raises:
-            ContactError: there is no such object, or the scale is out of its limits.
+            ContactError: there is no such object, or the scale is outside its limits.
         """
         if self.name not in OBJECTS:
             near = suggestion(self.name, OBJECTS)
@@ -251,7 +251,7 @@ class ObjectIndenter(IndenterKind):
         return OBJECTS[self.name].mesh().transformed(np.eye(3) * self.scale)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
-        """See `Indenter.mesh`: its triangles up to that height, or all of them."""
+        """Return the triangles up to that height, or all of them; see `Indenter.mesh`."""
         whole = self._mesh
         near = whole.faces[whole.vertices[whole.faces, 2].min(axis=1) <= reach]
         kept, numbers = np.unique(near, return_inverse=True)

@@ -1,4 +1,4 @@
-"""Signed distances (mm) to plane figures, negative inside, and what heights are made of."""
+"""Signed distances (mm) to plane figures, negative inside, and height profiles."""
 
 from __future__ import annotations
 
@@ -10,30 +10,34 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 STEEP = 5.67
-"""Slope of walls: the tangent of 80 degrees, the draft of a mould's wall seen from above."""
+"""Slope of walls: the tangent of 80 degrees, with the draft of a mould's wall."""
 
 
 def disc(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
-    """To a disc around the origin."""
+    """Return the distance to a disc around the origin."""
     return np.hypot(x, y) - radius
 
 
 def rectangle(x: FloatArray, y: FloatArray, width: float, height: float) -> FloatArray:
-    """To a rectangle around the origin."""
+    """Return the distance to a rectangle around the origin."""
     over_x, over_y = np.abs(x) - 0.5 * width, np.abs(y) - 0.5 * height
     outside = np.hypot(np.maximum(over_x, 0.0), np.maximum(over_y, 0.0))
     return outside + np.minimum(np.maximum(over_x, over_y), 0.0)
 
 
 def hexagon(x: FloatArray, y: FloatArray, across_flats: float) -> FloatArray:
-    """To the sides of a regular hexagon around the origin, measured square to the nearest side."""
+    """Return the distance to the sides of a regular hexagon around the origin, perpendicular to the
+    nearest side.
+    """
     turns = np.radians([0.0, 60.0, 120.0])
     sides = [np.abs(x * np.cos(turn) + y * np.sin(turn)) for turn in turns]
     return np.maximum.reduce(sides) - 0.5 * across_flats
 
 
 def strokes(x: FloatArray, y: FloatArray, lines: list[list[tuple[float, float]]]) -> FloatArray:
-    """To the nearest of several polylines, each a list of points (mm); never negative."""
+    """Return the distance to the nearest of several polylines, each a list of points (mm); never
+    negative.
+    """
     nearest = np.full(x.shape, np.inf)
     for line in lines:
         for start, end in itertools.pairwise(line):
@@ -49,20 +53,20 @@ def _segment(x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray) -
 
 
 def wall(distance: FloatArray) -> FloatArray:
-    """The height of a steep wall that begins where a distance is 0 and rises outside."""
+    """Return the height of a steep wall that begins where a distance is 0 and rises outside."""
     return STEEP * np.maximum(distance, 0.0)
 
 
 def raised(distance: FloatArray, height: float) -> FloatArray:
-    """How much is taken from a ground by a figure that stands out of it by `height` mm: all of it
-    inside, and less down its steep wall.
+    """Return the amount (mm) to subtract from a ground for a figure that stands out by `height`
+    (mm): all of it inside, and less along its steep wall.
     """
     return np.clip(height - wall(distance), 0.0, height)
 
 
 def dome(distance: FloatArray, radius: float, height: float) -> FloatArray:
-    """The same for a cap of a sphere of a base radius and a height (mm), by the distance from its
-    middle.
+    """Return the amount (mm) to subtract from a ground for a spherical cap of a base radius and a
+    height (mm), by the distance from its middle.
     """
     sphere = (radius**2 + height**2) / (2.0 * height)
     top = np.sqrt(np.maximum(sphere**2 - distance**2, 0.0)) - (sphere - height)
@@ -70,7 +74,7 @@ def dome(distance: FloatArray, radius: float, height: float) -> FloatArray:
 
 
 def star(x: FloatArray, y: FloatArray, points: int, outer: float, inner: float) -> FloatArray:
-    """How far inside a star a place is, from 0 at its outline to 1 in its middle.
+    """Return the relative depth of a place inside a star, from 0 at its outline to 1 in its middle.
 
     Level lines are smaller stars, so that a relief of these heights has plane facets.
     """

@@ -1,4 +1,4 @@
-"""A relief: heights over a plane, made into a closed mesh on a base plate."""
+"""Reliefs: heights over a plane, converted to a closed mesh on a base plate."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ FloatArray = NDArray[np.float64]
 Heights = Callable[[FloatArray, FloatArray], FloatArray]
 
 CELLS = 200
-"""Cells of the grid along an object's longer side: 0.04 mm on one of 8 mm, which is less than a
-pixel of any built-in sensor shows."""
+"""Number of cells of the grid along an object's longer side: 0.04 mm on an object of 8 mm, smaller
+than the pixel of any built-in sensor."""
 
 EDGE = 0.8
-"""Standard deviation, in cells of the grid, of the Gaussian that rounds edges: to a radius of about
-0.05 mm, as deburred metal and moulded plastic have."""
+"""Standard deviation, in cells of the grid, of the Gaussian that rounds edges to a radius of about
+0.05 mm, that of deburred metal and moulded plastic."""
 
 TOP = 2.0
-"""mm above the lowest point where the base plate begins, which no contact reaches."""
+"""Height (mm) above the lowest point at which the base plate begins, which no contact reaches."""
 
 PLATE = 1.0
-"""mm, the thickness of the base plate."""
+"""Thickness (mm) of the base plate."""
 
 BORDER = 0.6
-"""mm by which the base plate is wider than the object on each side, so that walls fit in."""
+"""Width (mm) by which the base plate extends beyond the object on each side, so that walls fit
+in."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +40,12 @@ class Relief:
     """An object as heights over a plane.
 
     Attributes:
-        title: how people write its name.
-        help: one sentence with its sizes.
-        size: (x, y) mm, the sides of the rectangle around it.
-        depth: mm, how deep it is pressed to show what it is.
-        heights: gives the height (mm) at places x, y (mm) around the middle; larger is farther
-            from the sensor. A constant more changes nothing.
+        title: display name.
+        help: description with its sizes, one sentence.
+        size: (x, y) sides of the rectangle around it, mm.
+        depth: depth (mm) of a press at which it is recognisable.
+        heights: function that returns the height (mm) at places x, y (mm) around the middle; larger
+            is farther from the sensor. An added constant has no effect.
     """
 
     title: str
@@ -54,8 +55,10 @@ class Relief:
     heights: Heights
 
     def mesh(self) -> TriangleMesh:
-        """The object as a closed mesh in mm: +z points away from the sensor and the lowest point
-        lies at z = 0. Shading normals point out of it and are those of the heights.
+        """Return the object as a closed mesh (mm).
+
+        +z points away from the sensor and the lowest point lies at z = 0. Shading normals point out
+        of the object and are those of the heights.
         """
         return _mesh(self)
 
@@ -80,7 +83,7 @@ def _mesh(relief: Relief) -> TriangleMesh:
 
 
 def _sides(vertices: FloatArray) -> list[TriangleMesh]:
-    """The four walls of the base plate, from the border of the heights to the back."""
+    """Return the four walls of the base plate, from the border of the heights to the back."""
     rims = (vertices[0], vertices[-1], vertices[:, 0], vertices[:, -1])
     outward = ((0.0, -1.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     walls = []
@@ -92,7 +95,7 @@ def _sides(vertices: FloatArray) -> list[TriangleMesh]:
 
 
 def _back(vertices: FloatArray) -> TriangleMesh:
-    """The back of the base plate: a fan whose rim has the corners of the walls."""
+    """Return the back of the base plate: a fan whose rim has the corners of the walls."""
     rim = np.concatenate(
         [vertices[0, :-1], vertices[:-1, -1], vertices[-1, :0:-1], vertices[:0:-1, 0]]
     )
