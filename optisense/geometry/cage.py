@@ -106,7 +106,7 @@ def deformed(
         mesh: the mesh at rest, mm, all inside the box.
         box: (2, 3) mm, lower and upper corner.
         resolution: number of points along x, y, z, at least 2 each.
-        points: (nx * ny * nz, 3) mm.
+        points: (nx * ny * nz, 3) control points, mm.
 
     Raises:
         DesignError: a vertex lies outside the box.

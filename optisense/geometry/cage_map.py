@@ -21,9 +21,9 @@ def jacobians(
 
     Args:
         vertices: (n, 3) vertices at rest, mm, inside the box.
-        box: (2, 3) mm.
+        box: (2, 3) lower and upper corner, mm.
         resolution: number of points along x, y, z.
-        points: (nx * ny * nz, 3) mm.
+        points: (nx * ny * nz, 3) control points, mm.
 
     Returns:
         The derivatives (n, 3, 3) of deformed coordinates (row) by coordinates at rest (column). The
@@ -58,9 +58,9 @@ def is_one_to_one(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> 
     whole lattice has no effect.
 
     Args:
-        box: (2, 3) mm.
+        box: (2, 3) lower and upper corner, mm.
         resolution: number of points along x, y, z.
-        points: (nx * ny * nz, 3) mm.
+        points: (nx * ny * nz, 3) control points, mm.
 
     Returns:
         True if the map is certainly one to one; False if it is unknown.
@@ -99,7 +99,7 @@ def refined_points(points: ArrayLike, resolution: Resolution, finer: Resolution)
     section on degree elevation), axis by axis, one point at a time.
 
     Args:
-        points: (nx * ny * nz, 3) mm.
+        points: (nx * ny * nz, 3) control points, mm.
         resolution: nx, ny, nz.
         finer: resolution of the finer lattice, at least as many points along each axis.
 

@@ -116,35 +116,35 @@ class TriangleMesh:
 
     @cached_property
     def bounds(self) -> FloatArray:
-        """(2, 3) float64, mm: the lowest and highest corner."""
+        """Lowest and highest corner (2, 3) float64, mm."""
         return np.array([self.vertices.min(axis=0), self.vertices.max(axis=0)])
 
     @cached_property
     def triangles(self) -> FloatArray:
-        """(m, 3, 3) float64, mm: face, corner, coordinate."""
+        """Corners of the faces (m, 3, 3) float64, mm: face, corner, coordinate."""
         return self.vertices[self.faces]
 
     @cached_property
     def face_bounds(self) -> tuple[FloatArray, FloatArray]:
-        """(m, 3), (m, 3) float64, mm: the lowest and highest corner of each face's box."""
+        """Lowest and highest corners of the faces' boxes, (m, 3) float64 each, mm."""
         a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
         return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
     @cached_property
     def face_vectors(self) -> FloatArray:
-        """(m, 3) float64, mm^2: face normals times twice the face areas."""
+        """Face normals times twice the face areas, (m, 3) float64, mm^2."""
         a, b, c = self.triangles[:, 0], self.triangles[:, 1], self.triangles[:, 2]
         return np.cross(b - a, c - a)
 
     @cached_property
     def face_areas(self) -> FloatArray:
-        """(m,) float64, face areas, mm^2."""
+        """Face areas (m,) float64, mm^2."""
         areas: FloatArray = 0.5 * np.linalg.norm(self.face_vectors, axis=1)
         return areas
 
     @cached_property
     def face_normals(self) -> FloatArray:
-        """(m, 3) float64 unit normals; zero for a degenerate face."""
+        """Unit face normals (m, 3) float64; zero for a degenerate face."""
         length = np.linalg.norm(self.face_vectors, axis=1, keepdims=True)
         return np.divide(
             self.face_vectors, length, out=np.zeros_like(self.face_vectors), where=length > 0

@@ -23,7 +23,7 @@ def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[
     a three by three grid along the principal axes of the points. It is deterministic.
 
     Args:
-        points: (n, 3) mm, points of the visible sensing surface; at least nine.
+        points: (n, 3) points of the visible sensing surface, mm; at least nine.
         weights: (n,) the area that each point stands for; equal if None.
 
     Returns:

@@ -84,12 +84,12 @@ class Evaluation(MadeOnce):
 
     @property
     def resolution(self) -> tuple[int, int]:
-        """(width, height) of the images."""
+        """Size (width, height) of the images, pixels."""
         return self.settings.resolution or size_for(self.design.camera.resolution)
 
     @property
     def ray_resolution(self) -> tuple[int, int]:
-        """(width, height) of the chief rays."""
+        """Size (width, height) of the grid of chief rays."""
         return self.settings.ray_resolution or size_for(self.design.camera.resolution)
 
     @property

@@ -1,4 +1,4 @@
-"""The exposure at which a sensor and its contacts are judged."""
+"""The exposure with which a sensor and its contacts are scored."""
 
 from __future__ import annotations
 

@@ -28,8 +28,10 @@ def _figure(width: float, height: float) -> Figure:
 def _square_grid(
     count: int, width: float, height: float, *, sharey: bool = False
 ) -> tuple[Figure, NDArray[np.object_]]:
-    """A figure with axes (rows, columns) for at least so many drawings of a width and height in
-    inches, as many side by side as one below the other; those that are left over are hidden."""
+    """Return a figure with a square grid of axes (rows, columns) for at least ``count`` drawings.
+
+    ``width`` and ``height`` are the size of a drawing in inches; unused axes are hidden.
+    """
     across = int(np.ceil(count**0.5))
     down = -(-count // across)
     figure = _figure(width * across, height * down)

@@ -96,7 +96,7 @@ class DraftView(SkinView):
         self._placed = lru_cache(maxsize=PLACED_CONTACTS)(super().place)
 
     def place(self, contact: Contact) -> TriangleMesh:
-        """See `SkinView`."""
+        """Place a contact, from the cache if it is known; see `SkinView.place`."""
         return self._placed(contact)
 
 
@@ -118,7 +118,7 @@ class DraftModel(OpticalModel):
         super().__init__(self._straightened(design), variant)
 
     def set_design(self, design: SensorDesign) -> None:
-        """See `OpticalModel`."""
+        """Adopt another design; see `RayModel.set_design`."""
         super().set_design(self._straightened(design))
 
     def _view_of(self, design: SensorDesign, scenes: SensorScenes) -> SkinView:

@@ -145,7 +145,7 @@ def features_of(height: int, width: int) -> dict[str, Any]:
     """The types of the columns, as Hugging Face's `datasets` writes them.
 
     Args:
-        height, width: pixels of the pictures.
+        height, width: size of the pictures, pixels.
     """
     found: dict[str, Any] = {"image": {"_type": "Image"}}
     for name, (dtype, channels) in ARRAYS.items():

@@ -218,12 +218,12 @@ class ObjectIndenter(IndenterKind):
 
     @classmethod
     def quantities(cls) -> dict[str, Quantity]:
-        """See `IndenterKind.quantities`: the scale."""
+        """Return the scale; see `IndenterKind.quantities`."""
         return {"scale": cls.__dataclass_fields__["scale"].metadata["quantity"]}
 
     @classmethod
     def from_text(cls, text: str) -> ObjectIndenter:
-        """See `IndenterKind.from_text`: NAME or NAME,SCALE."""
+        """Read NAME or NAME,SCALE; see `IndenterKind.from_text`."""
         name, separator, scale = text.strip().partition(",")
         try:
             return cls(name, float(scale) if separator else 1.0)
@@ -235,7 +235,7 @@ class ObjectIndenter(IndenterKind):
 
     @classmethod
     def from_plain(cls, values: Mapping[str, Any]) -> ObjectIndenter:
-        """See `IndenterKind.from_plain`: `name`, and maybe `scale`."""
+        """Read `name` and optionally `scale`; see `IndenterKind.from_plain`."""
         name, scale = values.get("name"), values.get("scale", 1.0)
         if not isinstance(name, str) or not set(values) <= {"name", "scale"}:
             raise ContactError(

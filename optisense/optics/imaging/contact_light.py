@@ -1,4 +1,6 @@
-"""Light that contacts reflect to the skin, which is smooth: few rays, averaged over pixels."""
+"""Light that contacts reflect to the skin. It varies smoothly, so few rays are averaged over
+pixels.
+"""
 
 from __future__ import annotations
 
@@ -26,17 +28,19 @@ if TYPE_CHECKING:
     """Points and their radiance, one colour for each light group."""
 
 THROWN_RAYS = 8
-"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
-more. Few of the rays end where a contact mirrors a lamp."""
+"""Rays per pixel that sample the light that contacts reflect through the interfaces, in an image
+`REFERENCE_WIDTH` wide; smaller images take more. Few of the rays end where a contact mirrors a
+lamp."""
 BROAD_THROWN_RAYS = 1
-"""Rays per pixel for lobes that are not narrower than most lamps; one suffices, as they receive
-little such light, and evenly from all directions."""
+"""Value of `THROWN_RAYS` for lobes that are not narrower than most lamps; one suffices, as they
+receive little such light, and evenly from all directions."""
 THROWN_REACH = 1.0 / 40.0
-"""Width of the averaging of that light over the skin, as a fraction of the image width: half a
-millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
+"""Width over which light from contacts is averaged on the skin, as a fraction of the image width:
+half a millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
 BESIDE_DIRECTIONS = 2
-"""Rays per pixel that sample this light in an image `REFERENCE_WIDTH` wide; smaller images take
-more. The light is averaged over `THROWN_REACH`, which leaves noise of some tenths of a per cent."""
+"""Rays per pixel that sample the light that contacts reflect to the skin beside them, in an image
+`REFERENCE_WIDTH` wide; smaller images take more. The light is averaged over `THROWN_REACH`, which
+leaves noise of some tenths of a per cent."""
 
 
 def thrown_layers(

@@ -20,7 +20,7 @@ that must be bright for the pixel to count as real: the visible reflection of a 
 
 LONE_RATIO = 2.0
 """Ratio of a pixel's light to that of the `LONE_RANK`-th brightest pixel in its square above which
-the excess is spread."""
+the excess light is spread over the pixels around it."""
 
 SPECK_REACH = 1.0 / 8.0
 """Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the

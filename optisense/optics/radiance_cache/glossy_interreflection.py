@@ -25,11 +25,11 @@ from optisense.optics.scene.surface_cells import plane_of
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 DIRECTIONS = 4
-"""Directions per camera sample in which interreflected light is looked for. The lobes of the places
-seen are summed over all light, so that fewer directions suffice than in `interreflection`, where
-one ray stands for the light of a place."""
+"""Number of rays per camera sample that sample interreflected light. The lobes of the places seen
+are summed over all light, so that fewer directions suffice than in `interreflection`, where one ray
+stands for the light of a place."""
 BROAD_DIRECTIONS = 2
-"""Directions per camera sample for lobes that are not narrower than most lamps. In a contact of
+"""Number of rays per camera sample for lobes that are not narrower than most lamps. In a contact of
 GelSight Mini of specularity 0.6, the noise at a million photons is then 2.24 % instead of 2.16
 %."""
 MAX_BOUNCES = 4

@@ -28,10 +28,10 @@ class PilotPhotons:
     """Landings of the pilot pass.
 
     Attributes:
-        points: (n, 3) mm.
+        points: (n, 3) positions, mm.
         cosines: (n,) cosines of incidence.
-        powers: (n,) mW.
-        groups: (n,) light groups.
+        powers: (n,) powers, mW.
+        groups: (n,) numbers of the light groups.
         halves: (n,) the half of the photons that each landing belongs to, 0 or 1.
     """
 

@@ -49,11 +49,11 @@ MAX_FINE_TALLY_BYTES = 750e6
 """Memory (bytes) that the tally of one seed may take with the fine direction bins of narrow
 lobes."""
 VIEW_MARGIN = 2.0
-"""Margin (mm) around what the camera sees to which photons are sent: light that lands there would
-meet the flank of an indenter."""
+"""Margin (mm) around the camera's view to which photons are sent as well: light that lands there
+would meet the flank of an indenter."""
 SMOOTHED_MARGIN = 5.0
-"""Margin (mm) around what the camera sees, beyond which cells are smoothed with the narrowest
-kernel only, as few of them are read."""
+"""Margin (mm) around the camera's view beyond which cells are smoothed with the narrowest kernel
+only, as few of them are read."""
 MAX_CACHES = 2
 """Number of radiance caches that a store keeps; the oldest is dropped when there are more."""
 GRAZING_SHARE_LIMIT = 0.25
@@ -294,8 +294,10 @@ class CacheStore:
             seconds: time since ``began``; None for no such limit.
             most: number of photons at which tracing ends in any case.
             began: start of the render (`time.perf_counter`).
-            on_stage: called when a stage begins and after each pass; see `StageCallback`.
-            partial: whether Ctrl-C after the first pass ends the tracing; else it is raised.
+            on_stage: function that is called when a stage begins and after each pass; see
+                `StageCallback`.
+            partial: whether Ctrl-C after the first pass ends the tracing; otherwise
+                KeyboardInterrupt is raised.
 
         Returns:
             The cache, and whether Ctrl-C ended the tracing early.
