@@ -99,13 +99,12 @@ class _Watched:
         designs = {-1: ("before", self._study.space.design)}
         if best is not None:
             designs[best.number] = ("after", best.design)
-        found = {}
-        for number, (label, design) in designs.items():
-            if number not in self._looks:
-                settings = self._study.settings.settings
-                self._looks[number] = look(design, settings, pictures=False)
-            found[label] = self._looks[number]
-        return found
+        settings = self._study.settings.settings
+        self._looks = {
+            number: self._looks.get(number) or look(design, settings, pictures=False)
+            for number, (_, design) in designs.items()
+        }
+        return {label: self._looks[number] for number, (label, _) in designs.items()}
 
 
 def _version_of(study: Study) -> str:

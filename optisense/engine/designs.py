@@ -30,6 +30,11 @@ MOST_MESHES = 200
 """Largest number of mesh files that are kept; the one not used for longest is dropped first.
 """
 
+MOST_FOLDERS = 20
+"""Largest number of folders of designs that are kept; the one not used for longest is dropped
+first.
+"""
+
 Stamp = tuple[str, int, int]
 
 
@@ -149,8 +154,9 @@ class Designs:
                 self._built[name] = load(name if name.startswith("builtin:") else f"builtin:{name}")
             return self._built[name]
         file = path / DESIGN_FILE if is_folder(path) else path
-        kept = self._folders.get(name)
+        kept = self._folders.pop(name, None)
         if kept is not None and _stamps(kept[1], file) == kept[0]:
+            self._folders[name] = kept
             return kept[1]
         design = load_design(file)
         for part, value in design.parts.items():  # the same file is the same mesh
@@ -158,6 +164,8 @@ class Designs:
             design.meshes[part] = self._checked(mesh, part, value.role)
         design._source, design._lines = None, {}  # from here on a place is a dotted path
         self._folders[name] = _stamps(design, file), design
+        while len(self._folders) > MOST_FOLDERS:
+            del self._folders[next(iter(self._folders))]
         return design
 
     def _from_data(

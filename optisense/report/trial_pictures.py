@@ -25,10 +25,13 @@ ACROSS = 240
 PHOTONS = 200_000
 """Number of photons of a picture: its noise, some 4 %, is hardly visible at this size."""
 
+MOST_PICTURES = 500
+"""Largest number of pictures that are kept, of 130 KB each; the oldest is dropped first."""
+
 
 class TrialPictures:
-    """Renderer of trials with the nine balls that objectives press in; each trial is rendered
-    once.
+    """Renderer of trials with the nine balls that objectives press in; a trial whose picture is
+    still kept is not rendered again.
     """
 
     def __init__(self, study: Study) -> None:
@@ -52,6 +55,8 @@ class TrialPictures:
                 raise
             except OptiSenseError:
                 self._found[trial.number] = self._model = None
+            while len(self._found) > MOST_PICTURES:
+                del self._found[next(iter(self._found))]
         return self._found[trial.number]
 
     def _rendered(self, trial: Trial) -> NDArray[np.uint8]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import os
+import shutil
+import weakref
 from pathlib import Path
 
 import pytest
 
 import optisense as ots
+from optisense.engine import designs as designs_of_requests
 from optisense.engine.designs import DesignReference, Designs
 from optisense.engine.failures import UnsoundDesignError
 from optisense.errors import DesignError
@@ -73,3 +77,18 @@ def test_an_unsound_design_tells_all_that_is_wrong(folder: Path) -> None:
     assert len(errors) == 3  # the board reaches into the shell, so the camera is in both
     assert sum("the camera is inside" in message for message in errors) == 2
     assert "and 2 more" in caught.value.message
+
+
+def test_folders_that_were_not_read_for_long_are_let_go(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(designs_of_requests, "MOST_FOLDERS", 2)
+    others = [Path(shutil.copytree(folder, tmp_path / f"copy-{number}")) for number in range(2)]
+    designs = Designs()
+    first = weakref.ref(designs.read(str(folder)))
+    designs.read(str(others[0]))
+    assert designs.read(str(folder)) is first(), "two of them are kept"
+    for other in others:
+        designs.read(str(other))
+    gc.collect()
+    assert first() is None
