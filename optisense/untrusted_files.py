@@ -14,6 +14,7 @@ import io
 import json
 import math
 import os
+import re
 import stat
 import zipfile
 from collections.abc import Mapping
@@ -73,6 +74,9 @@ them.
 
 LARGEST_INTEGER = 2**63 - 1
 """Largest integer that is accepted in JSON: NumPy and SQLite hold no larger one."""
+
+_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
+"""A surrogate as JSON escapes it; a high and a low one after another are one character."""
 
 COPY_AGAIN = "Check that this is the right file, and copy or make it again"
 
@@ -177,13 +181,23 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
         error: the text is not such JSON; the message names the line if it is known.
     """
     try:
-        return json.loads(
+        found = json.loads(
             text,
             parse_constant=_refused_constant,
             parse_float=_finite,
             parse_int=_integer,
             object_pairs_hook=_object,
         )
+        if _SURROGATE.search(text):
+            json.dumps(found, ensure_ascii=False).encode()
+        return found
+    except UnicodeEncodeError as wrong:
+        character = wrong.object[wrong.start].encode("unicode-escape").decode()
+        raise error(
+            f"{what} holds {character} alone, which is half of a character",
+            where=source,
+            hint=COPY_AGAIN,
+        ) from None
     except json.JSONDecodeError as found:
         raise error(
             f"{what} is not JSON: {found.msg}",
@@ -196,16 +210,33 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
         raise error(f"{what} is not JSON: {found}", where=source, hint=COPY_AGAIN) from None
 
 
-def read_table(path: Path, error: Error, what: str = "the table") -> list[dict[str, str]]:
+def read_table(
+    path: Path, error: Error, what: str = "the table", padded: bool = False
+) -> list[dict[str, str]]:
     """Return the rows of a CSV file as text, by column.
 
+    Args:
+        path: of the file.
+        error: class of what is raised.
+        what: how messages call it.
+        padded: whether a row may have fewer values than there are columns, as in tables that are
+            written by hand; the others are empty.
+
     Raises:
-        error: see `read_text`; or the file is no CSV file; the message names the line.
+        error: as `read_text`, or it is no such file; says the line.
     """
     text = read_text(path, MOST_TABLE, error, what)
-    reader = csv.DictReader(io.StringIO(text, newline=""))
+    reader = csv.DictReader(io.StringIO(text, newline=""), restval="" if padded else None)
+    rows = []
     try:
-        return list(reader)
+        for row in reader:
+            if None in row or None in row.values():
+                count = len(reader.fieldnames or ())
+                raise csv.Error(
+                    f"the row has {'more' if None in row else 'fewer'} than {count} values"
+                )
+            rows.append(row)
+        return rows
     except csv.Error as found:
         where = f"{path}:{reader.line_num}"
         raise error(f"can't read {what}: {found}", where=where, hint=COPY_AGAIN) from None

@@ -190,7 +190,7 @@ def _picture(folder: Path, name: str, where: str) -> tuple[ByteArray, str]:
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
-    rows = read_table(path, CalibrationError)
+    rows = read_table(path, CalibrationError, padded=True)
     if not rows:
         raise CalibrationError(
             "the table has no presses", where=str(path), hint="Add a row for each photograph"

@@ -110,15 +110,34 @@ def options_of(model: type[CommandOptions], values: dict[str, Any]) -> CommandOp
     Raises:
         typer.BadParameter: an option is invalid.
     """
+    given = {name: value for name, value in values.items() if value is not None and value != []}
     try:
-        return model.model_validate({k: v for k, v in values.items() if v is not None and v != []})
+        return model.model_validate(given)
+    except UnicodeEncodeError:  # such as bytes that are not UTF-8 on the command line
+        odd = next(name for name, value in given.items() if not _is_text(value))
+        raise typer.BadParameter("the text is not UTF-8", param_hint=_hint(model, odd)) from None
     except ValidationError as error:
         found = error.errors()[0]
         cause = found.get("ctx", {}).get("error")
         name = str(found["loc"][0]) if found["loc"] else ""
-        field = model.model_fields.get(name)
-        hint = None
-        if field is not None:
-            _, notes = _plain(field.annotation)
-            hint = _flags(name, _written([*notes, *field.metadata]))[0]
-        raise typer.BadParameter(str(cause or found["msg"]), param_hint=hint) from None
+        raise typer.BadParameter(
+            str(cause or found["msg"]), param_hint=_hint(model, name)
+        ) from None
+
+
+def _hint(model: type[CommandOptions], name: str) -> str | None:
+    """The option of a field; None for a name that is no field's."""
+    field = model.model_fields.get(name)
+    if field is None:
+        return None
+    _, notes = _plain(field.annotation)
+    return _flags(name, _written([*notes, *field.metadata]))[0]
+
+
+def _is_text(value: object) -> bool:
+    """Whether what is written in a value can be written as UTF-8."""
+    try:
+        str(value).encode()
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -54,7 +54,7 @@ class Mesh(Fields):
 
     file: AnyMesh
     role: Role | None = None
-    scale: float = Field(default=1.0, gt=0.0)
+    scale: float = Field(default=1.0, ge=1e-9, le=1e6)
 
 
 class ChangeCage(OfDesign):

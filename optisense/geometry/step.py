@@ -6,6 +6,7 @@ used are the same in the releases of Open CASCADE from 7.8 to 8.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import re
@@ -155,7 +156,8 @@ def bodies_of(path: Path) -> list[StepBody]:
     quiet()
     reader = STEPCAFControl_Reader()
     reader.SetNameMode(True)
-    status = reader.ReadFile(str(path))
+    # Open CASCADE opens no file whose name is not UTF-8.
+    status = reader.ReadStream("step", io.BytesIO(path.read_bytes()))
     document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
     if "RetDone" not in str(status) or not reader.Transfer(document):
         raise MeshError(

@@ -7,6 +7,7 @@ one face.
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -85,12 +86,10 @@ def write_step(path: Path, shapes: Sequence[Shape], title: str = "sensor") -> li
     writer.SetColorMode(True)
     transferred = writer.Transfer(document, STEPControl_AsIs)
     _sign(writer)
-    if not transferred or "RetDone" not in str(writer.Write(str(path))):
-        raise OutputError(
-            "the STEP file can't be written",
-            where=str(path),
-            hint="Check that the folder can be written and the disk is not full",
-        )
+    content = io.BytesIO()  # Open CASCADE opens no file whose name is not UTF-8
+    if not transferred or "RetDone" not in str(writer.WriteStream(content)):
+        raise OutputError("Open CASCADE can't write the bodies as STEP", where=str(path))
+    path.write_bytes(content.getvalue())
     return notes
 
 

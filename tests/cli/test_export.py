@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
 import pytest
+from step_extra import needs_step
 from typer.testing import CliRunner
 
 from optisense.cli import app
 from optisense.cli.export import FORMATS
 from optisense.geometry import TriangleMesh
+from optisense.geometry.step import read_step
 from optisense.workshop import FORMATS as WRITABLE
 
 
@@ -71,3 +74,20 @@ def test_an_output_folder_that_is_a_file(tmp_path: Path) -> None:
     code, text = run("gelsight-mini", "--out", str(tmp_path / "file"))
     assert code == 1
     assert "file" in text
+
+
+@needs_step
+def test_folders_may_have_names_that_are_not_utf_8(tmp_path: Path) -> None:
+    """As Linux allows them; other systems refuse to make the folder."""
+    folder = tmp_path / os.fsdecode(b"caf\xe9")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("the file system takes only UTF-8")
+    code, text = run("gelsight-mini", "--out", str(folder / "made"), "--format", "step")
+    assert code == 0, text
+    assert {body.name for body in read_step(folder / "made" / "gelsight-mini.step")} >= {"gel"}
+    options = ["--photons", "20000", "--resolution", "40x30", "--out", str(folder / "picture")]
+    result = CliRunner().invoke(app, ["render", "gelsight-mini", *options])
+    assert result.exit_code == 0, result.output
+    assert (folder / "picture" / "radiance.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import resource
 import selectors
 import shutil
 import subprocess
@@ -138,6 +139,7 @@ class FuzzedEngine:
                 [sys.executable, "-m", "optisense.cli", "engine"], stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE, stderr=log, cwd=self._folder,
                 env={**os.environ, "OPTISENSE_LIBRARY": str(self._folder.parent / "library")},
+                preexec_fn=_unlimited,
             )  # fmt: skip
         hello = {"id": "hello", "do": "hello", "protocol": 1, "client": "fuzz"}
         self.ask(json.dumps({**hello, "folder": HERE, "variant": "llvm"}).encode())
@@ -155,13 +157,19 @@ class FuzzedEngine:
                         raise TimeoutError(f"no answer in {limit:.0f} s")
                     read = os.read(self._process.stdout.fileno(), 1 << 20)
                     if not read:
+                        code = self._process.wait()
                         self.end()
-                        raise EOFError("the engine has ended")
+                        raise EOFError(f"the engine has ended with {code}")
                     self._said += read
                 line, _, self._said = self._said.partition(b"\n")
                 message: dict[str, Any] = json.loads(line)
                 if "ok" in message:
                     return message
+
+
+def _unlimited() -> None:
+    """Lift the limit of the processor's time for one case, which an engine would inherit."""
+    resource.setrlimit(resource.RLIMIT_CPU, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
 
 
 ENGINE = FuzzedEngine()

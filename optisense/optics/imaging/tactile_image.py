@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import errno
 import json
-import os
 import re
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -217,15 +215,12 @@ def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray
 
 
 def _bitmap(values: NDArray[Any], path: Path) -> None:
+    """Write an array as an EXR or PNG file, whose path may be one that Mitsuba can't open."""
     bitmap = mi.Bitmap(np.ascontiguousarray(values))
+    kind = mi.Bitmap.FileFormat.PNG
     if path.suffix == ".exr":
+        kind = mi.Bitmap.FileFormat.OpenEXR
         bitmap.metadata()["unit"] = RADIANCE_UNIT
-    try:
-        bitmap.write(str(path))
-    except RuntimeError as error:
-        full = os.strerror(errno.ENOSPC) in str(error)  # the error has a text only, and no number
-        number = errno.ENOSPC if full else errno.EIO
-        said = os.strerror(number) if full else str(error)
-        raise OSError(number, said, str(path)) from error
-    if path.stat().st_size == 0:  # no error is raised when the disk is full
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
+    stream = mi.MemoryStream()
+    bitmap.write(stream, kind)
+    path.write_bytes(stream.raw_buffer())
