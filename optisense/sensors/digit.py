@@ -55,6 +55,10 @@ HOUSING_WALL = 1.5
 BEHIND_PUPIL = 2.0
 """Distance from the camera's pupil to the floor of the housing, mm."""
 
+SMOOTHER = 16
+"""Sides of the outline that the rings of the dome are cut from, for each side of a ring: their
+corners lie on the outline itself but for 1/256 of the height of a ring's arcs over its sides."""
+
 EDGE_STEPS = 6
 """Number of rings of the rounded edge of the gel: about 13 degrees each."""
 
@@ -278,7 +282,9 @@ def _gel(
     thickness, wall, rise, inset = heights
     rim_z = -rise
     wall_z = wall - thickness
-    foot, rim = outline.points(tessellation), outline.inset(inset).like(outline, tessellation)
+    edge = outline.inset(inset)
+    foot, rim = outline.points(tessellation), edge.like(outline, tessellation)
+    smooth = edge.points(tessellation / SMOOTHER)
     reach = np.linalg.norm(rim, axis=1)
     slope = 2.0 * rise / reach * np.linalg.norm(foot - rim, axis=1)
     steep = max(rim_z - float(slope.mean()), 0.5 * (wall_z + rim_z))
@@ -292,7 +298,7 @@ def _gel(
     count = max(4, math.ceil(reach.mean() / tessellation))
     for share in np.linspace(1.0, 0.0, count + 1)[1:-1]:
         corners = max(12, math.ceil(share * len(rim)))
-        rings.append(_ring(share * _resampled(rim, corners), -rise * share * share))
+        rings.append(_ring(share * _resampled(smooth, corners), -rise * share * share))
     mesh = stacked(rings)
     mesh.vertices[-1, 2] = 0.0  # the top
     return mesh

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from optisense.geometry import TriangleMesh
 from optisense.workshop.recognised import SAME
@@ -74,13 +75,18 @@ def _around(ring: FloatArray, middle: FloatArray) -> FloatArray:
 
 
 def _at(ring: FloatArray, ways: FloatArray, middle: FloatArray) -> FloatArray:
-    """Return the points of a ring in n directions from its middle, (n, 3) mm."""
-    off = ring[:, :2] - middle
+    """Return the points (n, 3), in mm, of a smooth curve through a ring's corners.
+
+    Args:
+        ring: (m, 3) mm, the corners in their order around the middle.
+        ways: (n,) radians, directions from the middle.
+        middle: (2,) mm.
+    """
+    reach = np.linalg.norm(ring[:, :2] - middle, axis=1)
     own = _angles(ring, middle)
-    after = np.searchsorted(own, ways, side="right") % len(own)
-    one, side = off[after - 1], off[after] - off[after - 1]
-    way = np.column_stack([np.cos(ways), np.sin(ways)])
-    reach = (one[:, 0] * side[:, 1] - one[:, 1] * side[:, 0]) / (
-        way[:, 0] * side[:, 1] - way[:, 1] * side[:, 0]
+    around = CubicSpline(
+        np.append(own, own[0] + 2.0 * np.pi), np.append(reach, reach[0]), bc_type="periodic"
     )
-    return np.column_stack([middle + reach[:, None] * way, np.full(len(ways), ring[0, 2])])
+    found = around(np.where(ways < own[0], ways + 2.0 * np.pi, ways))[:, None]
+    way = np.column_stack([np.cos(ways), np.sin(ways)])
+    return np.column_stack([middle + found * way, np.full(len(ways), ring[0, 2])])
