@@ -31,7 +31,7 @@ _items: list[tuple[str, str, str, int]] = []
 
 
 class OPTISENSE_PG_calibration(bpy.types.PropertyGroup):
-    """What a calibration is asked for, and what came of the last one."""
+    """Settings of a calibration, and the result of the last one."""
 
     photos: StringProperty(
         name="Photographs", subtype="DIR_PATH", options={"SKIP_SAVE"},
@@ -112,7 +112,9 @@ def _take(result: dict[str, Any]) -> None:
 
 
 def words(result: dict[str, Any]) -> list[str]:
-    """What a calibration has found, a line each."""
+    """Return the result of a calibration as lines of text: what is left unexplained, and each
+    fitted number before and after with its uncertainty.
+    """
     before, after = (100.0 * each for each in result["unexplained"])
     held = "presses held out" if result["held_out"] else "fitted presses"
     lines = [f"Not explained of {held}: {before:.0f} % before, {after:.0f} % after"]

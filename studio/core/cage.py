@@ -15,18 +15,20 @@ FloatArray = NDArray[np.float64]
 Resolution = tuple[int, int, int]
 
 OUTSIDE_TOLERANCE = 1e-6
-"""A vertex may lie this far (mm) outside the box, by rounding."""
+"""Distance that a vertex may lie outside the box, mm: rounding, no more."""
 
 
 def rest_points(box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """(nx * ny * nz, 3) mm, the control points at rest; x slowest, z fastest."""
+    """Return the control points at rest, (nx * ny * nz, 3) mm; the index of x varies slowest, that
+    of z fastest.
+    """
     lower, upper = np.asarray(box, dtype=np.float64)
     axes = [np.linspace(lower[k], upper[k], resolution[k]) for k in range(3)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 def weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """(n, nx * ny * nz): how much each control point moves each vertex.
+    """Return the weight of each control point for each vertex, (n, nx * ny * nz).
 
     Raises:
         ValueError: a vertex lies outside the box.
@@ -42,7 +44,9 @@ def weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) -> Floa
 
 
 def edges(resolution: Resolution) -> NDArray[np.int32]:
-    """(m, 2) pairs of neighbouring control points, to draw the lattice."""
+    """Return the pairs of neighbouring control points between which the lattice is drawn, (m, 2)
+    indices.
+    """
     index = np.arange(math.prod(resolution)).reshape(resolution)
     pairs = [
         np.stack([index.take(range(n - 1), axis), index.take(range(1, n), axis)], -1).reshape(-1, 2)
@@ -52,18 +56,18 @@ def edges(resolution: Resolution) -> NDArray[np.int32]:
 
 
 def blended(c_min: ArrayLike, c_max: ArrayLike, blend: ArrayLike) -> FloatArray:
-    """(N, 3) mm: (1 - A) C_min + A C_max, with one A or one for each coordinate."""
+    """Return (1 - A) C_min + A C_max, (N, 3) mm, with one A or one for each coordinate."""
     share = np.asarray(blend, dtype=np.float64)
     return (1.0 - share) * np.asarray(c_min) + share * np.asarray(c_max)
 
 
 def nearest_blend(points: ArrayLike, c_min: ArrayLike, c_max: ArrayLike) -> float:
-    """The A in 0..1 whose shape (1 - A) C_min + A C_max is nearest, by least squares.
+    """Return the blend A in 0..1 whose shape (1 - A) C_min + A C_max is nearest, by least squares.
 
     Args:
-        points: (N, 3) mm, a shape.
-        c_min: (N, 3) mm, the shape of A = 0.
-        c_max: (N, 3) mm, the shape of A = 1; A is 0 where it is the same.
+        points: shape to approximate, (N, 3) mm.
+        c_min: shape of A = 0, (N, 3) mm.
+        c_max: shape of A = 1, (N, 3) mm; the blend is 0 if it equals `c_min`.
     """
     lower = np.asarray(c_min, dtype=np.float64)
     way = (np.asarray(c_max, dtype=np.float64) - lower).ravel()

@@ -1,9 +1,10 @@
-"""The engine as a child process: JSON lines out, JSON lines in, nothing ever waits.
+"""The engine as a child process: requests and answers are lines of JSON, and nothing waits.
 
-Whoever owns an `Engine` calls `poll` now and then, and callbacks run there. There are no threads:
+The owner of an `Engine` calls `poll` regularly, and callbacks run there. There are no threads:
 Blender looks up its context without holding Python's lock while an operator runs, and crashes now
-and then where another Python thread runs meanwhile. So the engine answers into a file, which can be
-read without waiting on every system, and requests wait here while its pipe is full.
+and then if another Python thread runs meanwhile. Therefore the engine answers into a file, which
+can be read without waiting on every operating system, and requests wait in memory while the
+engine's pipe is full.
 """
 
 from __future__ import annotations
@@ -26,27 +27,27 @@ PROTOCOL = 1
 """Version of the protocol that this client speaks; see docs/engine.md."""
 CLIENT = "optisense-blender 0.2.0"
 SHUTDOWN_SECONDS = 2.0
-"""Seconds that the engine may take to end by itself before it is killed."""
+"""Time that the engine may take to end by itself before it is killed, s."""
 GREETING_SECONDS = 30.0
-"""Seconds that the engine may take to say hello, which it does before it loads anything large."""
+"""Time that the engine may take to greet, s; it greets before it loads any large library."""
 ELSEWHERE = "Set the engine's path in the preferences of the extension"
 LOG_LINES = 40
-"""Number of lines of the engine's messages that are kept, to be shown when it dies."""
+"""Number of lines of the engine's log that are kept, to be shown if it dies."""
 PIECE = 1 << 16
-"""Number of bytes that are written to the engine at once; a pipe of Linux holds as many."""
+"""Number of bytes that are written to the engine at once: the capacity of a pipe on Linux."""
 
 Answer = Callable[[dict[str, Any]], None]
 
 
 class EngineError(Exception):
-    """What went wrong, for the user.
+    """Error of the engine, or of its process, with texts for the user.
 
     Attributes:
-        kind: as of the engine's errors; `EngineGone` where the process ended.
-        message, where, hint: what is wrong, the place, what to do.
-        path: the dotted path in the design, if known.
-        part: the part of the design that it is about, if known.
-        contact: the number of the contact that it is about, if it is about one; the first is 0.
+        kind: kind of the error, as the engine names it; `EngineGone` if the process ended.
+        message, where, hint: description of the error, its place, and what to do about it.
+        path: dotted path in the design, if known.
+        part: part of the design that the error is about, if known.
+        contact: number of the contact that the error is about, from 0; None if it is about none.
     """
 
     def __init__(self, error: dict[str, Any]) -> None:
@@ -60,7 +61,7 @@ class EngineError(Exception):
         self.contact: int | None = error.get("contact")
 
     def text(self) -> str:
-        """Everything in one line."""
+        """Return message, place and hint in one line."""
         where = f" ({self.where})" if self.where else ""
         hint = f". {self.hint[:1].upper()}{self.hint[1:]}" if self.hint else ""
         return f"{self.message[:1].upper()}{self.message[1:]}{where}{hint}"
@@ -68,7 +69,7 @@ class EngineError(Exception):
 
 @dataclass
 class Request:
-    """A request that has no answer yet."""
+    """Request that was sent to the engine."""
 
     number: int
     what: str
@@ -78,7 +79,7 @@ class Request:
     done: bool = field(default=False)
 
     def ignore(self) -> None:
-        """Whatever comes, nobody is told."""
+        """Drop the callbacks: the answer is read and discarded."""
         self.on_result = self.on_error = self.on_event = _nothing
 
 
@@ -87,7 +88,7 @@ def _nothing(_: Any) -> None:
 
 
 class _Lines:
-    """The lines that a process writes into a file, as they come."""
+    """Reader of the lines that a process writes into a temporary file."""
 
     def __init__(self, folder: str, prefix: str) -> None:
         handle, name = tempfile.mkstemp(prefix=prefix, suffix=".log", dir=folder)
@@ -97,7 +98,7 @@ class _Lines:
         self._rest = b""
 
     def new(self) -> list[str]:
-        """The lines that were finished since the last time."""
+        """Return the lines that were completed since the last call."""
         with contextlib.suppress(OSError), self._path.open("rb") as file:
             file.seek(self._read)
             came = file.read()
@@ -107,21 +108,21 @@ class _Lines:
         return [line.decode("utf-8", "replace").rstrip("\r") for line in lines]
 
     def close(self) -> None:
-        """It will not be asked for more."""
+        """Close and delete the file."""
         self.end.close()
         with contextlib.suppress(OSError):
             self._path.unlink()
 
 
 class Engine:
-    """One running engine.
+    """Engine that runs as a child process.
 
     Args:
-        command: how to start it, for example `["optisense", "engine"]`.
-        folder: an existing folder for its pictures and meshes.
+        command: command that starts the engine, for example `["optisense", "engine"]`.
+        folder: existing folder for the engine's pictures and meshes.
 
     Raises:
-        EngineError: it can't be started.
+        EngineError: the process can't be started.
     """
 
     def __init__(self, command: list[str], folder: str) -> None:
@@ -136,7 +137,7 @@ class Engine:
         self._gone = False
         self._refusal: EngineError | None = None
         self.end: EngineError | None = None
-        """Why it is gone, where it was not asked to go."""
+        """Error with which the engine ended, if it was not asked to end."""
         environment = {
             name: value
             for name, value in os.environ.items()
@@ -180,22 +181,22 @@ class Engine:
 
     @property
     def alive(self) -> bool:
-        """Whether it can still answer."""
+        """Whether the engine can still answer."""
         return not self._gone and self._process.poll() is None
 
     @property
     def ended(self) -> bool:
-        """Whether it is gone and everybody who waited was told."""
+        """Whether the engine has ended and all pending requests were told so."""
         return self._gone
 
     @property
     def waiting(self) -> bool:
-        """Whether it owes an answer."""
+        """Whether a request has no answer yet."""
         return bool(self._requests)
 
     @property
     def pid(self) -> int:
-        """The process's number."""
+        """Process identifier."""
         return self._process.pid
 
     def send(
@@ -207,10 +208,10 @@ class Engine:
         on_event: Answer = _nothing,
         **fields: Any,
     ) -> Request:
-        """Ask for something; the answer comes through `poll`.
+        """Send a request; its answer arrives in a later call of `poll`.
 
         Raises:
-            EngineError: a number is not finite.
+            EngineError: a number among the fields is not finite.
         """
         self._number += 1
         request = Request(self._number, what, on_result, on_error, on_event)
@@ -225,12 +226,14 @@ class Engine:
         return request
 
     def cancel(self, request: Request) -> None:
-        """Ask that a request be given up; it still gets its answer."""
+        """Ask the engine to give a request up; the request still gets an answer, which may be its
+        result.
+        """
         if not request.done:
             self.send("cancel", of=request.number)
 
     def poll(self) -> bool:
-        """Run the callbacks of all that came in; whether anything did."""
+        """Run the callbacks of everything that arrived, and return whether anything did."""
         if self._gone:
             return False
         self._write()
@@ -258,8 +261,10 @@ class Engine:
     def wait(self, request: Request, timeout: float = 600.0) -> None:
         """Poll until a request has its answer; for scripts and tests.
 
+        The calls block for up to `timeout` seconds.
+
         Raises:
-            TimeoutError: it took longer.
+            TimeoutError: there is no answer after `timeout` seconds.
         """
         end = time.monotonic() + timeout
         while not request.done:
@@ -269,7 +274,7 @@ class Engine:
                 time.sleep(0.005)
 
     def stop(self) -> None:
-        """End the process: ask, then insist."""
+        """End the process: ask it to shut down, and kill it if it does not."""
         if self._process.poll() is None:
             self.send("shutdown")
         with contextlib.suppress(OSError):
@@ -284,20 +289,22 @@ class Engine:
         self._close_files()
 
     def abandon(self) -> None:
-        """Tell everybody who waits for a dead engine, whether or not its pipe is drained."""
+        """Report the end of a dead engine to all pending requests, even if its output was not read
+        to the end.
+        """
         self.poll()
         if not self._gone:
             self._ended()
 
     def kill(self) -> None:
-        """End the process at once."""
+        """Kill the process."""
         self._process.kill()
 
     def _greeted(self, result: dict[str, Any]) -> None:
         self.version = result.get("version")
 
     def _refused(self, error: EngineError) -> None:
-        """It does not speak this protocol: everybody who waits is told that."""
+        """Fail all pending requests: the process does not speak this version of the protocol."""
         self._refusal = error
         self.kill()
         self._fail_all(error)
@@ -313,7 +320,7 @@ class Engine:
             message = json.loads(line)
         except ValueError:
             message = None
-        if not isinstance(message, dict):  # it is no engine, or a library of it prints
+        if not isinstance(message, dict):  # No engine, or a library of the engine that prints.
             self.log.append(line)
             return
         request = self._requests.get(message.get("id", 0))
@@ -350,14 +357,14 @@ class Engine:
         self._fail_all(self.end)
 
     def _write(self) -> None:
-        """Write as much of the requests as the pipe takes now."""
+        """Write as much of the pending requests as the pipe takes."""
         try:
             while self._unsent:
                 taken = self._pipe.write(self._unsent[:PIECE])
                 if not taken:
                     return
                 del self._unsent[:taken]
-        except (OSError, ValueError):  # it is gone; `poll` tells those who wait
+        except (OSError, ValueError):  # The process is gone; `poll` fails the pending requests.
             self._unsent.clear()
 
     def _close_files(self) -> None:

@@ -1,13 +1,13 @@
-"""Errors of scenes that are no design."""
+"""Errors about scenes that do not form a design."""
 
 from __future__ import annotations
 
 
 class SceneError(ValueError):
-    """A scene that can't be written down as a design.
+    """Error about a scene that can't be written as a design.
 
     Attributes:
-        path: the dotted path in the design that it is about; empty if it is about none.
+        path: dotted path in the design that the error is about; empty if it is about none.
     """
 
     def __init__(self, message: str, path: str = "") -> None:

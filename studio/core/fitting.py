@@ -1,4 +1,4 @@
-"""A perspective view that is moved until what it shows fills a part of it."""
+"""Framing: the perspective view in which given points fill the free part of a window."""
 
 from __future__ import annotations
 
@@ -8,18 +8,23 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 ROOM = 0.86
-"""Share of the free part of a view that the sensor fills; its head and gizmos stay beside it."""
+"""Share of the free part of a view that the sensor fills; the margin leaves room for the header and
+gizmos.
+"""
 
 ROUNDS = 12
-"""The number of times that a view is fitted: nearer things grow faster, and after twelve times
-nothing moves by a pixel any more."""
+"""Number of iterations of the fit. Nearer points grow faster than far ones, so one step is not
+enough; after twelve nothing moves by a pixel.
+"""
 
 NEAREST = 0.2
-"""Share of the distance between eye and middle: nothing is taken to be nearer to the eye."""
+"""Smallest distance of a point from the eye, as a share of the distance between the eye and the
+centre of the view.
+"""
 
 
 class Fit(NamedTuple):
-    """The point that a view looks at and its distance, mm."""
+    """Centre of a view and the eye's distance from it, mm."""
 
     location: NDArray[np.float64]
     distance: float
@@ -28,14 +33,14 @@ class Fit(NamedTuple):
 def on_screen(
     points: ArrayLike, axes: ArrayLike, fit: Fit, focal: float, size: tuple[float, float]
 ) -> NDArray[np.float64]:
-    """(n, 2) pixels from the lower left where a view shows points.
+    """Return where a view shows points, (n, 2) pixels from its lower left corner.
 
     Args:
-        points: (n, 3) mm.
-        axes: (3, 3) rows: the view's right, up, and the way back to the eye.
-        fit: where it looks.
-        focal: pixels, the focal length.
-        size: pixels, width and height of the view.
+        points: positions, (n, 3) mm.
+        axes: rows of the view's rotation, (3, 3): right, up, and the direction back to the eye.
+        fit: centre of the view and distance of the eye.
+        focal: focal length in pixels.
+        size: width and height of the view, pixels.
     """
     x, y, back = np.asarray(axes) @ (np.asarray(points, dtype=np.float64) - fit.location).T
     depth = np.maximum(fit.distance - back, NEAREST * fit.distance)
@@ -49,14 +54,14 @@ def fitted(
     size: tuple[float, float],
     free: tuple[float, float],
 ) -> Fit:
-    """Return where a view has to look so that points fill the free part of it.
+    """Return the centre and distance of the view in which points fill its free part.
 
     Args:
-        points: (n, 3) mm.
-        axes: (3, 3) rows: the view's right, up, and the way back to the eye.
-        focal: pixels, the focal length.
-        size: pixels, width and height of the view.
-        free: pixels from the left, where the free part begins and ends.
+        points: positions, (n, 3) mm.
+        axes: rows of the view's rotation, (3, 3): right, up, and the direction back to the eye.
+        focal: focal length in pixels.
+        size: width and height of the view, pixels.
+        free: left and right limits of the free part, pixels from the left edge.
     """
     places, frame = np.asarray(points, dtype=np.float64), np.asarray(axes, dtype=np.float64)
     low, high = places.min(axis=0), places.max(axis=0)

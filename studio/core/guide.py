@@ -10,22 +10,24 @@ _LINK = re.compile(r"\[([^\]]*)\]\(([^)]*)\)")
 
 
 def folder() -> Path:
-    """Where the pages are: in the extension, or in the project that it is run from."""
+    """Return the folder of the pages: in the extension, or in the project if Blender runs from its
+    source.
+    """
     own = Path(__file__).parents[1] / "help"
     return own if own.is_dir() else Path(__file__).parents[2] / "docs"
 
 
 def page(name: str) -> str:
-    """A page without its pictures and the addresses of its links.
+    """Return the text of a page without pictures and without the addresses of links.
 
     Raises:
-        OSError: it is not there.
+        OSError: there is no such page.
     """
     text = (folder() / f"{name}.md").read_text(encoding="utf-8")
     return _LINK.sub(r"\1", _PICTURE.sub("", text))
 
 
 def line_of(text: str, begins: str) -> int:
-    """The first line that begins with some words, the first line of all is 0; 0 where none does."""
+    """Return the number of the first line, from 0, that begins with `begins`; 0 if no line does."""
     lines = text.splitlines()
     return next((number for number, line in enumerate(lines) if line.startswith(begins)), 0)

@@ -1,21 +1,21 @@
-"""A light ledger in words."""
+"""The light ledger as text."""
 
 from __future__ import annotations
 
 from typing import Any
 
 MOST_LINES = 6
-"""Lines of a light group: the largest shares; what is left is summed up in one more."""
+"""Largest number of lines for a light group: the largest shares; one more line sums up the rest."""
 
 LEAST = 0.002
-"""Share of the light below which a line is not worth reading, 0.2 %."""
+"""Share of the light below which no line is written, 0.2 %: it would not be worth reading."""
 
 
 def told(ledger: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
-    """For each light group a title, and by share where its light went.
+    """Return for each light group a title and lines (place, amount), the largest share first.
 
     Args:
-        ledger: as the engine answers it.
+        ledger: light ledger as the engine's answer holds it.
     """
     found = []
     for group, emitted in ledger["emitted"].items():
@@ -32,7 +32,9 @@ def told(ledger: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
 
 
 def told_of_place(place: dict[str, Any]) -> list[str]:
-    """For each light group a line that says how bright a place is, and by which ways."""
+    """Return for each light group a line with the brightness of a place and the ways its light
+    takes.
+    """
     lines = []
     for group, light in place["groups"].items():
         ways = sorted(light["ways"].items(), key=lambda way: -way[1])
@@ -44,7 +46,7 @@ def told_of_place(place: dict[str, Any]) -> list[str]:
 
 
 def per_cent(share: float) -> str:
-    """A share, 0 to 1, as text."""
+    """Return a share, 0 to 1, as text in per cent."""
     return f"{100 * share:.1f} %"
 
 

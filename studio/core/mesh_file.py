@@ -1,4 +1,6 @@
-"""Triangle meshes as the engine writes and reads them: OBJ with nothing but v, vn and f."""
+"""Triangle meshes as the engine writes and reads them: OBJ files with the keywords v, vn and f
+only.
+"""
 
 from __future__ import annotations
 
@@ -11,12 +13,12 @@ from numpy.typing import NDArray
 
 @dataclass
 class Mesh:
-    """A triangle mesh.
+    """Triangle mesh.
 
     Attributes:
-        vertices: (n, 3) float64, mm.
-        faces: (m, 3) int32, counter-clockwise seen from outside.
-        normals: (n, 3) float64 shading normals at the vertices, or None.
+        vertices: positions, (n, 3) float64, mm.
+        faces: indices of vertices, (m, 3) int32, counter-clockwise seen from outside.
+        normals: shading normals at the vertices, (n, 3) float64, or None.
     """
 
     vertices: NDArray[np.float64]
@@ -25,11 +27,11 @@ class Mesh:
 
 
 def read(path: Path) -> Mesh:
-    """Read an OBJ of triangles whose corners name the normal of their vertex, if any.
+    """Read an OBJ file of triangles whose corners refer to the normal of their own vertex, if any.
 
     Raises:
-        ValueError: it is anything else.
-        OSError: it can't be read.
+        ValueError: the file holds anything else.
+        OSError: the file can't be read.
     """
     rows: dict[str, list[str]] = {"v": [], "vn": [], "f": []}
     for line in path.read_text(encoding="utf-8").splitlines():
@@ -46,7 +48,7 @@ def read(path: Path) -> Mesh:
 
 
 def write(mesh: Mesh, path: Path) -> None:
-    """Write a mesh so that it reads back bit for bit."""
+    """Write a mesh to an OBJ file; coordinates read back bit for bit."""
     lines = ["# millimetres"]
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
     faces = (mesh.faces + 1).tolist()

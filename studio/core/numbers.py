@@ -1,6 +1,6 @@
-"""Numbers that pass through Blender and come back as they were.
+"""Conversion of numbers between design files and Blender without loss.
 
-Blender keeps properties and coordinates in single precision; a design file has double precision.
+Blender stores properties and coordinates in single precision, a design file in double precision.
 """
 
 from __future__ import annotations
@@ -15,16 +15,18 @@ FloatArray = NDArray[np.float64]
 
 
 def short(shown: float) -> float:
-    """The shortest decimal number that is the same in single precision: 0.3, not 0.30000001192."""
+    """Return the shortest decimal number with the same single-precision value: 0.3, not
+    0.30000001192.
+    """
     return float(str(np.float32(shown)))
 
 
 def kept(original: Any, shown: float) -> float:
-    """The number as it was read, while Blender still shows it; else what Blender shows.
+    """Return the number of the design file while Blender still shows it, otherwise Blender's.
 
     Args:
-        original: the number of the design file; anything else counts as absent.
-        shown: the value of a Blender property.
+        original: number of the design file; anything that is no number counts as absent.
+        shown: value of the Blender property.
     """
     is_number = isinstance(original, (int, float)) and not isinstance(original, bool)
     if is_number and np.float32(original) == np.float32(shown):
@@ -33,14 +35,14 @@ def kept(original: Any, shown: float) -> float:
 
 
 def kept_list(original: Any, shown: Sequence[float]) -> list[float]:
-    """`kept` for each number of a vector or colour."""
+    """Apply `kept` to each number of a vector or colour."""
     if not isinstance(original, (list, tuple)) or len(original) != len(shown):
         original = [None] * len(shown)
     return [kept(one, other) for one, other in zip(original, shown, strict=True)]
 
 
 def kept_array(original: ArrayLike | None, shown: ArrayLike) -> FloatArray:
-    """`kept` for an array; an original of another shape counts as absent."""
+    """Apply `kept` to each number of an array; an original of another shape counts as absent."""
     seen = np.asarray(shown, dtype=np.float32)
     short_ones = seen.astype(np.float64)
     if original is not None:
@@ -58,9 +60,9 @@ def _short_array(shown: NDArray[np.float32]) -> FloatArray:
 
 
 def split(values: ArrayLike) -> list[NDArray[np.float32]]:
-    """Three single-precision arrays whose sum is exactly the double-precision one.
+    """Split double-precision numbers into three single-precision arrays whose sum is exact.
 
-    Three times 24 bits hold the 53 bits of a double.
+    Three mantissas of 24 bits hold the 53 bits of a double.
     """
     rest = np.asarray(values, dtype=np.float64)
     parts = []
@@ -72,7 +74,7 @@ def split(values: ArrayLike) -> list[NDArray[np.float32]]:
 
 
 def joined(parts: Sequence[NDArray[np.float32]]) -> FloatArray:
-    """What `split` took apart; added from the smallest, so that nothing is rounded away."""
+    """Return the sum of the arrays of `split`, added from the smallest so that no bit is lost."""
     total = np.zeros(parts[0].shape)
     for part in reversed(parts):
         total = part.astype(np.float64) + total
@@ -80,7 +82,7 @@ def joined(parts: Sequence[NDArray[np.float32]]) -> FloatArray:
 
 
 def shown_number(value: float) -> str:
-    """A number as people read it: counts in full, the rest with four digits that count."""
+    """Return a number as text for people: integers in full, others with four significant digits."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int):

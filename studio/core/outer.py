@@ -1,4 +1,4 @@
-"""The outer faces of a gel, which its coating lies on."""
+"""Outer faces of a gel, on which its coating lies."""
 
 from __future__ import annotations
 
@@ -10,33 +10,36 @@ from numpy.typing import NDArray
 from .mesh_file import Mesh
 
 FACING = 30.0
-"""Degrees between a face and the outward direction up to which the choice of faces begins with it:
-the top of a dome faces outward, and its flanks follow by tangency."""
+"""Largest angle in degrees between a face and the outward direction for the faces that the
+selection starts with: on a dome the top, from which the flanks follow by tangency.
+"""
 
 TANGENT = 30.0
-"""Degrees between neighbouring faces up to which one continues the other: the edge of a gel's top
-is sharper, and the faces of a coarse dome are not."""
+"""Largest angle in degrees between neighbouring faces of one smooth surface: smaller than at the
+edge of a gel's top, larger than between the faces of a coarse dome.
+"""
 
 WELDED = 1e-5
-"""mm: corners nearer than this are one; files of meshes often have each corner once a face."""
+"""Distance in mm below which corners are one: mesh files often repeat a corner for each face."""
 
 
 def outer_faces(mesh: Mesh, outward: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Return the faces that face outward, with those that continue them.
+    """Return the faces that face outward and those that continue them smoothly.
 
     Args:
-        mesh: a solid, its faces counter-clockwise from outside.
-        outward: (3,) the direction away from the rest of the sensor.
+        mesh: solid with faces counter-clockwise seen from outside.
+        outward: direction away from the rest of the sensor, (3,), of any length but zero.
 
     Returns:
-        (k,) indices of faces; empty where none faces outward.
+        Indices of faces, (k,); empty if no face faces outward.
     """
     normals = face_normals(mesh)
     way = outward / np.linalg.norm(outward)
     facing = normals @ way > math.cos(math.radians(FACING))
     if not facing.any():
         return np.empty(0, dtype=np.int64)
-    # Of several terraces, the outermost: the others are steps of a housing's groove, for example.
+    # Of several terraces only the outermost is taken: the others may be steps of a housing's
+    # groove.
     height = (mesh.vertices[mesh.faces] @ way).max(axis=1)
     seeds = np.flatnonzero(facing & (height >= height[facing].max() - WELDED))
     one, other = _neighbours(mesh)
@@ -53,7 +56,9 @@ def outer_faces(mesh: Mesh, outward: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def skin_of(mesh: Mesh, faces: NDArray[np.int64]) -> Mesh:
-    """The sensing surface that lies on some faces of a gel: turned around, so that it faces in."""
+    """Return the sensing surface on some faces of a gel, with the faces reversed so that they face
+    into the gel.
+    """
     chosen = _welded(mesh)[mesh.faces[faces]]
     used, numbered = np.unique(chosen, return_inverse=True)
     turned = numbered.reshape(-1, 3)[:, ::-1]
@@ -61,14 +66,14 @@ def skin_of(mesh: Mesh, faces: NDArray[np.int64]) -> Mesh:
 
 
 def face_normals(mesh: Mesh) -> NDArray[np.float64]:
-    """(m, 3) unit normals of the faces; 0 where one has no area."""
+    """Return unit normals of the faces, (m, 3); zero for a face without area."""
     one, two, three = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     found = np.cross(two - one, three - one)
     return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
 
 
 def _welded(mesh: Mesh) -> NDArray[np.int64]:
-    """(n,) for each vertex the first one at its place."""
+    """Return for each vertex the index of the first vertex at the same place, (n,)."""
     _, first, inverse = np.unique(
         np.round(mesh.vertices / WELDED).astype(np.int64),
         axis=0,
@@ -79,7 +84,7 @@ def _welded(mesh: Mesh) -> NDArray[np.int64]:
 
 
 def _neighbours(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Faces that share an edge, in pairs."""
+    """Return pairs of faces that share an edge, as two arrays of indices."""
     corners = _welded(mesh)[mesh.faces]
     edges = np.stack([corners, np.roll(corners, -1, axis=1)], axis=-1).reshape(-1, 2)
     edges.sort(axis=1)

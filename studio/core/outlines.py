@@ -1,4 +1,4 @@
-"""Lines and triangles that a sensor is drawn with, as arrays."""
+"""Lines and triangles with which a sensor is drawn, as arrays."""
 
 from __future__ import annotations
 
@@ -8,31 +8,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 CREASE = 30.0
-"""Degrees between two faces from which the edge between them is drawn: those of a cylinder of 13
-sides or more are not."""
+"""Smallest angle in degrees between two faces for which their common edge is drawn; those of a
+cylinder of 13 sides or more are not.
+"""
 
 BEAM_STEPS = 24
-"""Sides of a beam that is drawn as a cone: it looks round."""
+"""Number of sides of a cone-shaped beam; it looks round."""
 
 
 FAR_APART = 8.0
-"""Length of a quad's side, of the usual one, from which its corners are no neighbours on the
-surface: a view at a slant stretches quads less than that."""
+"""Ratio of a quad's side to the median side above which its corners are taken not to be neighbours
+on the surface; a view at a slant stretches quads less than that.
+"""
 
 
 def feature_edges(
     corners: ArrayLike, starts: ArrayLike, normals: ArrayLike, edges: int
 ) -> NDArray[np.int64]:
-    """Return which edges of a mesh are creases or borders.
+    """Return the indices of the edges of a mesh that are creases or borders.
 
     Args:
-        corners: (m,) the edge at each corner of the faces, one face after the other.
-        starts: (n,) where in `corners` each face begins.
-        normals: (n, 3) of the faces.
-        edges: the number of edges.
+        corners: index of the edge at each corner of the faces, (m,), one face after the other.
+        starts: index in `corners` of the first corner of each face, (n,).
+        normals: normals of the faces, (n, 3).
+        edges: number of edges.
 
     Returns:
-        (k,) indices of the edges whose faces meet at more than `CREASE`, or which have one face.
+        Indices (k,) of the edges whose faces meet at more than `CREASE`, or that have one face
+        only.
     """
     at, begins = np.asarray(corners), np.asarray(starts)
     faces = np.searchsorted(begins, np.arange(len(at)), side="right") - 1
@@ -49,16 +52,17 @@ def feature_edges(
 def beam(
     shape: str, size: tuple[float, float], half_angle: float, length: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return the sides of a lamp's beam along -z, and how much of its light is left there.
+    """Return the sides of a lamp's beam along -z, and the brightness at their corners.
 
     Args:
-        shape: of the lamp's window, `disc` or `rectangle`.
-        size: mm, width and height of the window.
-        half_angle: degrees, by which the beam widens.
-        length: mm.
+        shape: shape of the lamp's window, `disc` or `rectangle`.
+        size: width and height of the window, mm.
+        half_angle: angle by which the beam widens, degrees.
+        length: length of the beam, mm.
 
     Returns:
-        (3 n, 3) mm, the corners of triangles, and (3 n,) 1 at the window and 0 at the end.
+        Corners of triangles, (3 n, 3) mm, and their brightness, (3 n,): 1 at the window, 0 at the
+        end.
     """
     width, height = size[0] / 2, size[1] / 2
     if shape == "rectangle":
@@ -78,7 +82,7 @@ def beam(
 
 
 def window(shape: str, size: tuple[float, float]) -> NDArray[np.float32]:
-    """(3 n, 3) mm, the corners of triangles that fill a lamp's window."""
+    """Return the corners of triangles that fill a lamp's window, (3 n, 3) mm."""
     corners, _ = beam(shape, size, 0.0, 1.0)
     rim = corners.reshape(-1, 6, 3)[:, :2]
     middle = np.zeros((len(rim), 1, 3), dtype=np.float32)
@@ -88,16 +92,17 @@ def window(shape: str, size: tuple[float, float]) -> NDArray[np.float32]:
 def grid_quads(
     points: NDArray[np.float32], hit: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the quads between neighbouring points of a grid, and the outline of all of them.
+    """Return the quads between neighbouring points of a grid, and the outline of all quads
+    together.
 
     Args:
-        points: (h, w, 3) where rays met a surface.
-        hit: (h, w) whether they did.
+        points: points at which rays met a surface, (h, w, 3).
+        hit: whether each ray met the surface, (h, w).
 
     Returns:
-        (n, 4) indices of the corners of quads, in their order around; without those between points
-        that lie far apart, such as on either side of a mirror's edge. (m, 2) indices of the ends of
-        those of their edges that only one of them has.
+        Corners of the quads in their order around, (n, 4) indices, without quads between points
+        that lie far apart, such as on either side of a mirror's edge; and the ends of the edges
+        that belong to one quad only, (m, 2) indices.
     """
     height, width = hit.shape
     number = np.arange(height * width).reshape(height, width)

@@ -1,6 +1,7 @@
-"""Poses of lights and cameras: Blender's are matrices, a design's are position, direction, up.
+"""Conversion of poses of lights and cameras: matrices in Blender; position, direction and up in
+designs.
 
-In Blender, lights and cameras look along their own -z axis, with +y upward.
+In Blender, lights and cameras look along their own -z axis, with +y up.
 """
 
 from __future__ import annotations
@@ -15,15 +16,18 @@ from .numbers import kept_list, short
 FloatArray = NDArray[np.float64]
 
 SAME_DIRECTION = 3e-6
-"""Unit vectors closer than this are the same: what single precision makes of a rotation."""
+"""Distance below which unit vectors count as the same: the rounding error of a rotation in single
+precision.
+"""
 
 
 def matrix_of(position: ArrayLike, direction: ArrayLike, up: ArrayLike | None) -> FloatArray:
-    """(4, 4) of an object that looks along `direction` from `position` (3,) mm.
+    """Return the matrix (4, 4) of an object at `position`, (3,) mm, that looks along `direction`.
 
     Args:
-        direction: (3,) of any length but zero.
-        up: (3,) roughly upward; None takes whichever axis lies most across.
+        direction: viewing direction, (3,), of any length but zero.
+        up: approximate up direction, (3,); None takes the coordinate axis z, or y for an object
+            that looks along z.
     """
     ahead = np.asarray(direction, dtype=np.float64)
     ahead = ahead / np.linalg.norm(ahead)
@@ -41,15 +45,16 @@ def matrix_of(position: ArrayLike, direction: ArrayLike, up: ArrayLike | None) -
 
 
 def pose_of(matrix: ArrayLike, original: dict[str, Any] | None, *, up: bool) -> dict[str, Any]:
-    """Position, direction and (where `up`) up of an object; as read, where it has not moved.
+    """Return position, direction and, if needed, up of an object; unchanged numbers stay as they
+    were read.
 
     Args:
-        matrix: (4, 4) of the object in the world.
-        original: the pose as it was read, if it was.
-        up: whether the result must have an `up`, even if the original has none.
+        matrix: world matrix of the object, (4, 4).
+        original: pose as it was read from the design file, or None.
+        up: whether the result must contain `up`, even if the original does not.
 
     Raises:
-        ValueError: the object is scaled to nothing, or its place is not finite.
+        ValueError: the object is scaled to zero, or its matrix is not finite.
     """
     world = np.asarray(matrix, dtype=np.float64)
     lengths = np.linalg.norm(world[:3, :3], axis=0)
@@ -78,5 +83,5 @@ def pose_of(matrix: ArrayLike, original: dict[str, Any] | None, *, up: bool) -> 
 
 
 def unit(vector: ArrayLike) -> list[float]:
-    """A direction in few digits."""
+    """Return a direction rounded to six decimals, without negative zeros."""
     return [short(round(float(x), 6)) + 0.0 for x in np.asarray(vector)]

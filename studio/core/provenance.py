@@ -1,4 +1,4 @@
-"""Where the numbers of a design come from, after somebody changed some of them."""
+"""Provenance of the numbers of a design after some of them were changed."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from typing import Any
 BY_HAND = {"status": "assumed", "source": "set by hand in OptiSense Studio"}
 
 AXES = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
-"""Names of the three numbers of a list."""
+"""Index of each coordinate or colour channel in a list of three numbers."""
 
 
 def updated(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
-    """The sources of a design: of what was changed it is the user, of what went there is none.
+    """Return the provenance of a changed design: changed values are attributed to the user, removed
+    ones have no entry.
 
     Args:
-        before: the design with its `provenance`, by dotted path.
-        now: the same design, changed.
+        before: design with its `provenance`, by dotted path.
+        now: same design after the changes.
     """
     found = {}
     for path, entry in (before.get("provenance") or {}).items():
@@ -29,7 +30,9 @@ def updated(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
 
 
 def value_at(document: Any, path: str) -> tuple[Any, ...]:
-    """What is at a dotted path, in a tuple; an empty one where the path leads nowhere."""
+    """Return the value at a dotted path as a tuple of one; an empty tuple if the path leads
+    nowhere.
+    """
     for step in re.findall(r"[^.\[\]]+", path):
         if isinstance(document, dict) and step in document:
             document = document[step]

@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 OFF_LINE = 0.1
-"""The largest distance of a row's lights from its line, as a share of its length."""
+"""Largest distance of a row's lights from its line, as a share of its length."""
 
 SHORTEST = 1e-6
-"""mm: shorter edges have no direction, and places that are nearer to one another are one."""
+"""Length in mm below which an edge has no direction, and two places are one."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """Lights on a line.
+    """Row of lights on a straight line.
 
     Attributes:
-        middle: (3,) mm, between the first and the last.
-        along: (3,) unit, from the first to the last.
-        pitch: mm, mean distance of neighbours; 0 for a single light.
+        middle: point midway between the first and the last light, (3,) mm.
+        along: unit vector from the first to the last light, (3,).
+        pitch: mean distance of neighbours, mm; 0 for a single light.
     """
 
     middle: FloatArray
@@ -33,16 +33,18 @@ class Row:
     pitch: float
 
     def places(self, count: int, pitch: float) -> FloatArray:
-        """(count, 3) mm: lights with another pitch about the same middle."""
+        """Return the positions of lights with another count and pitch about the same middle,
+        (count, 3) mm.
+        """
         shifts = (np.arange(count) - (count - 1) / 2) * pitch
         return self.middle + shifts[:, None] * self.along
 
 
 def row_through(positions: Sequence[Sequence[float]]) -> Row | None:
-    """The row in which lights stand, in the order given; None where they stand in no row.
+    """Return the row in which lights stand, in the order given; None if they are not on a line.
 
     Args:
-        positions: (n, 3) mm. A single light is a row along x.
+        positions: positions of the lights, (n, 3) mm. A single light is a row along x.
     """
     places = np.array(positions, dtype=np.float64).reshape(-1, 3)
     if len(places) == 0:
@@ -62,17 +64,18 @@ def row_through(positions: Sequence[Sequence[float]]) -> Row | None:
 
 
 def nearest_edge(row: Row, edges: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-    """Return the place (3,) on the edge nearest to a row's middle, and that edge's way (3,).
+    """Return the point on the edge nearest to a row's middle, and the direction of that edge.
 
-    Edges of no length are none. Where several meet at that place, the one counts that runs most
-    along the row.
+    Edges without length are ignored. Where several edges meet at the nearest point, the one most
+    parallel to the row is taken.
 
     Args:
-        row: of lights.
-        edges: (n, 2, 3) mm, their ends.
+        row: row of lights.
+        edges: ends of the edges, (n, 2, 3) mm.
 
     Returns:
-        mm and a unit vector that runs with the row, not against it; None without edges.
+        Point (3,) in mm and unit vector (3,), which runs with the row, not against it; None without
+        edges.
     """
     ways = edges[:, 1] - edges[:, 0]
     lengths = np.linalg.norm(ways, axis=1)
@@ -93,14 +96,14 @@ def nearest_edge(row: Row, edges: FloatArray) -> tuple[FloatArray, FloatArray] |
 def row_on_face(
     corners: FloatArray, normal: FloatArray, target: FloatArray, count: int, pitch: float
 ) -> list[dict[str, Any]]:
-    """Poses of lights in a row through the middle of a face, along its longer side.
+    """Return the poses of lights in a row through the middle of a face, along its longer side.
 
     Args:
-        corners: (n, 3) mm, vertices of the face.
-        normal: (3,) of the face, of any length but zero.
-        target: (3,) mm; the lights shine along the normal, to the side where this is.
-        count: how many lights.
-        pitch: mm between neighbours.
+        corners: vertices of the face, (n, 3) mm.
+        normal: normal of the face, (3,), of any length but zero.
+        target: point (3,) in mm on the side to which the lights shine, along the normal.
+        count: number of lights.
+        pitch: distance between neighbours, mm.
     """
     way = normal / np.linalg.norm(normal)
     middle = (corners.min(axis=0) + corners.max(axis=0)) / 2

@@ -1,14 +1,14 @@
-"""The kinds of emitters, materials and coatings, and their fields, as the engine tells them."""
+"""Kinds of emitters, materials and coatings, and their fields, as the engine describes them."""
 
 from __future__ import annotations
 
 from typing import Any
 
 Row = dict[str, Any]
-"""A kind or a field, as the engine's answer to `kinds` has it."""
+"""Description of a kind or a field, as in the engine's answer to `kinds`."""
 
 JUST_BEYOND = 1e-6
-"""The distance kept from an exclusive bound, in the number's own unit."""
+"""Distance kept from an exclusive bound, in the unit of the field."""
 
 _told: dict[str, Any] = {}
 
@@ -20,40 +20,42 @@ def learn(answer: dict[str, Any]) -> None:
 
 
 def is_known() -> bool:
-    """Whether an engine has told its kinds."""
+    """Whether an engine has described its kinds."""
     return bool(_told)
 
 
 def kinds(noun: str) -> list[Row]:
-    """All kinds of an `emitter`, `material` or `coating`; none before an engine has told."""
+    """Return all kinds of `emitter`, `material` or `coating`; empty before an engine has described
+    them.
+    """
     return _told.get("kinds", {}).get(noun, [])
 
 
 def fields(noun: str, kind: str) -> dict[str, Row]:
-    """The fields of a kind, by name; none where no engine has told."""
+    """Return the fields of a kind by name; empty before an engine has described them."""
     found = next((row for row in kinds(noun) if row["name"] == kind), None)
     return {row["name"]: row for row in found["fields"]} if found else {}
 
 
 def file_fields(noun: str, kind: str) -> list[str]:
-    """The fields of a kind that name files."""
+    """Return the names of the fields of a kind that hold file names."""
     return [name for name, row in fields(noun, kind).items() if row["type"] == "file"]
 
 
 def materials_of(role: str) -> list[str]:
-    """The kinds of material that a part of a role can be made of."""
+    """Return the kinds of material of which a part with a given role can be made."""
     return _told.get("materials_of_role", {}).get(role, [])
 
 
 def bounded(row: Row, value: float) -> float:
-    """The number nearest to a value that a field can have."""
+    """Return the value nearest to `value` that a field allows."""
     low = max(row.get("minimum", -1e300), row.get("above", -1e300) + JUST_BEYOND)
     high = min(row.get("maximum", 1e300), row.get("below", 1e300) - JUST_BEYOND)
     return min(max(value, low), high)
 
 
 def start(row: Row) -> Any:
-    """A value to begin with."""
+    """Return the initial value of a field."""
     if row["start"] is not None:
         return row["start"]
     if row["type"] == "number":
@@ -66,7 +68,7 @@ def start(row: Row) -> Any:
 
 
 def explained(row: Row) -> str:
-    """What a field is, and between which bounds."""
+    """Return the help text of a field, with its bounds."""
     limits = [
         f"{word} {row[bound]:g}"
         for bound, word in (

@@ -1,4 +1,4 @@
-"""Scores as text: the place between poor and good sensors, and the change."""
+"""Scores as text: position between poor and good sensors, and change since the last evaluation."""
 
 from __future__ import annotations
 
@@ -8,20 +8,19 @@ from typing import Any
 from .numbers import shown_number
 
 SAME = 1e-6
-"""Scores that differ by a smaller part of the larger one count as the same: rays are traced in
-single precision."""
+"""Relative difference up to which scores count as the same: rays are traced in single precision."""
 
 
 def share(value: float | None, objective: dict[str, Any]) -> float | None:
-    """Where a value stands between poor (0) and good (1).
+    """Return the position of a value between poor (0) and good (1), limited to this range.
 
     Args:
-        value: of the score; None where it failed.
-        objective: what the engine tells of it, with `usual` (the values of the poorest and the best
-            built-in sensor) or `range` (all that there can be), each a pair or None.
+        value: value of the score; None if it failed.
+        objective: objective as the engine describes it, with `usual` (values of the poorest and the
+            best built-in sensor) or `range` (all possible values), each a pair or None.
 
     Returns:
-        None where nothing is known to compare with.
+        Position, 0 to 1, or None without a value or a range to compare with.
     """
     if value is None:
         return None
@@ -36,13 +35,13 @@ def share(value: float | None, objective: dict[str, Any]) -> float | None:
 
 
 def with_unit(value: float, unit: str, digits: int = 4) -> str:
-    """A value as people read it, with so many digits that count."""
+    """Return a value as text with its unit, with `digits` significant digits."""
     text = f"{value:.{digits}g}"
     return f"{text} {unit}" if unit else text
 
 
 def change(now: float | None, before: float | None, *, lower_is_better: bool) -> str:
-    """The change of a score in words; empty where there is none to tell."""
+    """Return the change of a score in words; empty if either score is missing."""
     if now is None or before is None or not math.isfinite(before):
         return ""
     difference = now - before
@@ -55,5 +54,5 @@ def change(now: float | None, before: float | None, *, lower_is_better: bool) ->
 
 
 def direction(objective: dict[str, Any]) -> str:
-    """Which way a score is good."""
+    """Return the direction in which a score is better, in words."""
     return "lower is better" if objective.get("lower_is_better") else "higher is better"

@@ -1,4 +1,4 @@
-"""Parameters of an object that a search may change, as paths of the engine."""
+"""Suggestions for the parameters of a search: what it may change of an object."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from numpy.typing import NDArray
 from .schema import Row
 
 TRIAL, BEST = (0.55, 0.75, 0.95, 1.0), (0.95, 0.55, 0.15, 1.0)
-"""Colours of the curve: each trial, and the line of the best so far."""
+"""Colours (red, green, blue, opacity) of the curve: dots of the trials, and line of the best so
+far.
+"""
 
 FEW = 60
-"""Number of trials up to which their dots in the curve are large."""
+"""Number of trials up to which their dots in the curve are drawn large."""
 
 REACH = 2.0
-"""mm to either side that a pose may move, until the user says otherwise."""
+"""Initial range of a position, mm to either side; the user can change it."""
 
 
 TURN = 10.0
-"""Degrees to either side that a direction may turn, until the user says otherwise."""
+"""Initial range of a direction, degrees to either side; the user can change it."""
 
 
 NEAR = 0.1
-"""The range of a number without two bounds, as a share of its present value."""
+"""Initial range of a number without two bounds, as a share of its present value, to either side."""
 
 
 def listed(text: str) -> list[str]:
-    """The entries of a list with commas between them; one inside brackets is part of an entry."""
+    """Return the entries of a comma-separated list; commas inside brackets do not separate."""
     found, depth = [""], 0
     for sign in text:
         depth += (sign == "(") - (sign == ")")
@@ -43,18 +45,18 @@ def listed(text: str) -> list[str]:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A parameter of a search: a label, and the text that the engine reads."""
+    """Suggested parameter of a search: a label, and the text that the engine reads."""
 
     label: str
     text: str
 
 
 def for_camera(model: str = "", models: Sequence[str] = ()) -> list[Suggestion]:
-    """Where the camera is and looks, how wide it sees, which one it is.
+    """Return suggestions for the camera: position, field of view, direction and model.
 
     Args:
-        model: the library camera that it is now.
-        models: those of the library.
+        model: present model of the camera in the library.
+        models: names of all camera models of the library.
     """
     places = [Suggestion(f"Camera {axis}", f"camera.position.{axis}=+-{REACH:g}") for axis in "xyz"]
     return [
@@ -68,14 +70,14 @@ def for_camera(model: str = "", models: Sequence[str] = ()) -> list[Suggestion]:
 def for_light(
     group: str, index: int, *, flux: float = 1.0, model: str = "", models: Sequence[str] = ()
 ) -> list[Suggestion]:
-    """Where one light is and shines, and what its whole group is like.
+    """Return suggestions for a light, and for the light group that it belongs to.
 
     Args:
-        group: its light group.
-        index: its number in the group.
-        flux: mW, of each light now.
-        model: the library light that it is now.
-        models: those of the library.
+        group: name of the light group.
+        index: number of the light in its group, from 0.
+        flux: present radiant flux of each light, mW.
+        model: present model of the lights in the library.
+        models: names of all light models of the library.
     """
     light, whole = f"lights.{group}.lights[{index}]", f"lights.{group}"
     return [
@@ -92,13 +94,13 @@ def for_light(
 def for_surface(
     library: str, libraries: Sequence[str], values: Mapping[str, Any], rows: Mapping[str, Row]
 ) -> list[Suggestion]:
-    """What the sensing surface is coated with.
+    """Return suggestions for the coating of the sensing surface.
 
     Args:
-        library: the library coating that it is now.
-        libraries: those of the library.
-        values: of its fields, now.
-        rows: what the engine says of them.
+        library: name of the present coating in the library.
+        libraries: names of all coatings of the library.
+        values: present values of the coating's fields.
+        rows: descriptions of the fields, as from `schema.fields`.
     """
     return [
         *_for_fields("", "coating", values, rows),
@@ -109,7 +111,9 @@ def for_surface(
 def _for_fields(
     label: str, path: str, values: Mapping[str, Any], rows: Mapping[str, Row]
 ) -> list[Suggestion]:
-    """The numbers of a material or coating: fractions over their range, others near to now."""
+    """Return suggestions for the numbers of a material or coating: a fraction varies over 0..1,
+    another number about its present value.
+    """
     found = []
     for name, row in rows.items():
         value = values.get(name)
@@ -130,7 +134,7 @@ def _for_fields(
 
 
 def for_pose(part: str) -> list[Suggestion]:
-    """Where a part is that no cage moves, and how it is turned."""
+    """Return suggestions for position and direction of a part that is in no cage."""
     return [
         *(_move(f"{part} {axis}", f"parts.{part}.shift.{axis}") for axis in "xyz"),
         Suggestion(f"{part} direction", f"parts.{part}.turn=+-{TURN:g}"),
@@ -144,14 +148,14 @@ def for_material(
     rows: Mapping[str, Row],
     choices: Sequence[str],
 ) -> list[Suggestion]:
-    """What a part is made of.
+    """Return suggestions for the material of a part.
 
     Args:
-        part: its name.
-        material: its name.
-        values: of the material's fields, now.
-        rows: what the engine says of them.
-        choices: materials of the library that suit the part.
+        part: name of the part.
+        material: name of its material.
+        values: present values of the material's fields.
+        rows: descriptions of the fields, as from `schema.fields`.
+        choices: names of the library's materials that suit the part.
     """
     found = _for_fields(material, f"materials.{material}", values, rows)
     return [*found, *_one_of(f"{part} material", f"parts.{part}.material", material, choices)]
@@ -162,12 +166,12 @@ def _move(label: str, path: str) -> Suggestion:
 
 
 def _around(now: float, low: float, high: float) -> str:
-    """A range that what is there now lies in: a search starts from it."""
+    """Return a range as text, widened to include the present value: a search starts from it."""
     return f"{min(low, now):.6g}:{max(high, now):.6g}"
 
 
 def _one_of(label: str, path: str, now: str, names: Sequence[str]) -> list[Suggestion]:
-    """One of several names, what is there now the first of them; none where there is no choice."""
+    """Return a choice among names, the present one first; empty if there is only one."""
     choices = sorted(names, key=lambda name: name != now)
     return [Suggestion(label, f"{path}={','.join(choices)}")] if len(choices) > 1 else []
 
@@ -175,13 +179,13 @@ def _one_of(label: str, path: str, now: str, names: Sequence[str]) -> list[Sugge
 def for_cage(
     key: str, chosen: Sequence[int], *, blended: bool, reach: float = REACH
 ) -> list[Suggestion]:
-    """The blend of a cage, or its points: the chosen ones, or all.
+    """Return suggestions for a cage: its blend, or its control points.
 
     Args:
-        key: the cage's name.
-        chosen: indices of the selected control points; none means all.
-        blended: whether its shape is a mixture of C_min and C_max.
-        reach: mm to either side.
+        key: name of the cage.
+        chosen: indices of the selected control points; empty means all.
+        blended: whether the cage's shape is a blend of C_min and C_max.
+        reach: range of the control points, mm to either side.
     """
     if blended:
         return [Suggestion(f"{key}: A", f"cages.{key}.blend=0:1")]
@@ -194,14 +198,14 @@ def for_cage(
 
 
 def curve_picture(scores: Sequence[float | None], size: tuple[int, int]) -> NDArray[np.float32]:
-    """The scores of a search as a picture: each trial a dot, the best so far a line.
+    """Draw the scores of a search: a dot for each trial, a line for the best so far.
 
     Args:
-        scores: in the order of the trials; None where one failed.
-        size: pixels, width and height.
+        scores: scores in the order of the trials; None for a failed trial.
+        size: width and height, pixels.
 
     Returns:
-        (height, width, 4) float32, row 0 at the bottom.
+        Picture (height, width, 4), float32 RGBA in 0..1; row 0 is at the bottom.
     """
     width, height = size
     picture = np.zeros((height, width, 4), dtype=np.float32)
@@ -239,5 +243,5 @@ def _row(score: float, low: float, room: float, height: int, edge: int) -> int:
 
 
 def texts_of(rows: Sequence[Any]) -> list[str]:
-    """The texts of all parameters that are ticked."""
+    """Return the texts of all active parameters."""
     return [row.text.strip() for row in rows if row.active and row.text.strip()]

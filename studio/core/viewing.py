@@ -1,4 +1,4 @@
-"""Ways to look at a picture: a channel, false colours, beside another one, their difference."""
+"""Display of a picture: a channel, false colours, or a comparison with another picture."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 CHANNELS = {"COLOUR": None, "RED": 0, "GREEN": 1, "BLUE": 2, "MEAN": None}
-"""Column of each channel in a picture; the colour has all, and the brightness is their mean."""
+"""Index of each channel in a picture; None means all of them, which `MEAN` averages."""
 
 HEAT = (
     (0.00, 0.02, 0.02, 0.12),
@@ -15,14 +15,18 @@ HEAT = (
     (0.75, 0.98, 0.62, 0.12),
     (1.00, 1.00, 0.98, 0.80),
 )
-"""Value, red, green and blue of false colours, which grow brighter all the way from 0 to 1."""
+"""Colour map for brightness, rows of value, red, green, blue in 0..1; its lightness grows
+monotonically.
+"""
 
 DIVERGING = (
     (0.00, 0.10, 0.30, 0.85),
     (0.50, 0.90, 0.90, 0.90),
     (1.00, 0.85, 0.15, 0.10),
 )
-"""Value, red, green and blue of a difference: blue is darker than before, red is brighter."""
+"""Colour map for differences, rows of value, red, green, blue in 0..1: blue is darker than before,
+red is brighter.
+"""
 
 SEAM = 0.002
 """Half the width of the line between two pictures, as a share of the picture's width."""
@@ -38,17 +42,18 @@ def viewed(
     wipe: float = 0.5,
     gain: float = 4.0,
 ) -> NDArray[np.float32]:
-    """A picture as it is looked at.
+    """Return a picture as the viewer shows it.
 
     Args:
-        now: (h, w, 4) the picture, 0 to 1.
-        pinned: (H, W, 4) another one to compare with; none compares with nothing.
-        channel: a key of `CHANNELS`.
-        false_colour: show brightness as colours, which tell small differences apart.
-        compare: `WIPE` has the pinned picture left of `wipe` (0 to 1, of the width), `DIFFERENCE`
-            is grey where both are alike, `NONE` is the picture by itself.
-        wipe: where the two meet.
-        gain: what a difference is multiplied by; at 1 the whole range is from black to white.
+        now: picture, (h, w, 4), 0 to 1.
+        pinned: picture to compare with, (H, W, 4), or None.
+        channel: key of `CHANNELS`.
+        false_colour: show brightness as colours, so that small differences are visible.
+        compare: `WIPE` shows the pinned picture left of `wipe`, `DIFFERENCE` shows the difference,
+            grey where both are alike, `NONE` shows the picture alone.
+        wipe: position of the line between both pictures, 0 to 1 of the width.
+        gain: factor by which differences are multiplied; with 1 the full range goes from black to
+            white.
 
     Returns:
         (h, w, 4) float32, opaque.
@@ -71,7 +76,7 @@ def viewed(
 
 
 def resized(picture: NDArray[np.float32], width: int, height: int) -> NDArray[np.float32]:
-    """(height, width, 4) the nearest pixels of a picture of another size."""
+    """Return a picture at another size by nearest neighbours, (height, width, channels)."""
     rows = np.arange(height) * picture.shape[0] // height
     columns = np.arange(width) * picture.shape[1] // width
     return picture[rows[:, None], columns]
@@ -80,7 +85,9 @@ def resized(picture: NDArray[np.float32], width: int, height: int) -> NDArray[np
 def coloured(
     values: NDArray[np.float32], stops: tuple[tuple[float, float, float, float], ...]
 ) -> NDArray[np.float32]:
-    """(h, w, 3) of values (h, w), between colours at some of them; those beyond have the last."""
+    """Map values (h, w) to colours (h, w, 3) by linear interpolation between `stops`; values beyond
+    the ends get the end colours.
+    """
     table = np.array(stops)
     return np.stack(
         [np.interp(values, table[:, 0], table[:, each]) for each in (1, 2, 3)], axis=-1
@@ -88,7 +95,7 @@ def coloured(
 
 
 def _one_channel(picture: NDArray[np.float32], channel: str) -> NDArray[np.float32]:
-    """(h, w, 3): the colour, or one channel as grey."""
+    """Return the colours, or one channel as grey, (h, w, 3)."""
     colour = picture[..., :3]
     if channel == "COLOUR":
         return colour

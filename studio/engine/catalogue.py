@@ -1,4 +1,4 @@
-"""The engine's catalogue, asked at its start: sensors, the library, objectives, methods."""
+"""The engine's catalogue, queried when it starts: sensors, library, objectives, methods."""
 
 from __future__ import annotations
 
@@ -22,22 +22,26 @@ _NO_ENGINE: Items = [("NONE", "(no engine runs)", "The panel Sensor says what to
 
 
 def entries(name: str) -> list[dict[str, Any]]:
-    """What the engine told about `sensors`, `objectives`, `methods` or a kind of the library."""
+    """Return the engine's entries for `sensors`, `objectives`, `methods` or a kind of the
+    library.
+    """
     return _lists.get(name, [])
 
 
 def items(name: str) -> Items:
-    """The same as choices of a menu; the texts are kept, as Blender asks for."""
+    """Return the same entries as items of a menu; the strings are kept alive, as Blender
+    requires.
+    """
     return _items.get(name) or (_NONE if session.running() is not None else _NO_ENGINE)
 
 
 def objectives(_values: bpy.types.PropertyGroup, _context: bpy.types.Context | None) -> Items:
-    """The objectives, as properties ask for their choices."""
+    """Return the objectives in the form of an items callback of an `EnumProperty`."""
     return items("objectives")
 
 
 def refresh(engine: Engine) -> None:
-    """Ask for all lists; they are there when the engine has answered."""
+    """Request all lists; they are available when the engine has answered."""
     for what, name in (
         ("sensors", "sensors"),
         ("objectives", "objectives"),
@@ -54,7 +58,7 @@ def refresh(engine: Engine) -> None:
 
 
 def learn_kinds() -> None:
-    """Wait until the kinds and their fields are known.
+    """Wait until the engine's kinds and their fields are known.
 
     Raises:
         EngineError: there is no engine, or it does not answer.
@@ -64,7 +68,7 @@ def learn_kinds() -> None:
 
 
 def refresh_library(engine: Engine, kind: str, then: Callable[[], None] | None = None) -> None:
-    """Ask for a kind of the library anew, and do something when it is there."""
+    """Request a kind of the library again, and call `then` when it has arrived."""
 
     def told(result: dict[str, Any]) -> None:
         _keep(kind, result["entries"])

@@ -1,4 +1,4 @@
-"""Help: the page of the documentation that is about a panel, in a window of Blender's own."""
+"""Help: shows the page of the documentation about a panel in a window of Blender."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ STEPS = {
     "Search": ("search", ""),
     "Workshop": ("workshop", ""),
 }
-"""Where there is help on what: the page, and how its paragraph begins."""
+"""Page of each help topic, and the words with which its paragraph begins."""
 
 MORE = {
     "Shapes": "Cages",
@@ -39,18 +39,18 @@ MORE = {
     "Report and Export": "Workshop",
     "Calibrate": "Photographs",
 }
-"""The page that has more on what a panel is about."""
+"""Topic with further help for each panel."""
 
 ABOVE = 2
-"""Lines above the paragraph that the window begins with, so that it is seen where it begins."""
+"""Number of lines shown above the paragraph, so that its beginning is seen as such."""
 
 
 def text_of(topic: str) -> tuple[bpy.types.Text, int]:
-    """A page as a text of Blender's, and the line of a topic in it.
+    """Return a page as a text of Blender, and the number of the line of a topic in it.
 
     Raises:
         KeyError: there is no such topic.
-        OSError: the page is not there.
+        OSError: the page does not exist.
     """
     name, begins = STEPS[topic]
     content = guide.page(name)
@@ -93,7 +93,7 @@ class OPTISENSE_OT_help(bpy.types.Operator):
 
 
 def _text_area(context: bpy.types.Context) -> bpy.types.Area:
-    """The window that shows help already, or a new one."""
+    """Return the window area that already shows help, or that of a new window."""
     windows = context.window_manager.windows
     for window in windows:
         for area in window.screen.areas:
@@ -110,7 +110,7 @@ def _text_area(context: bpy.types.Context) -> bpy.types.Area:
 
 
 def draw_buttons(layout: bpy.types.UILayout, panel: str) -> None:
-    """The help of a panel, and the page that has more, in its head."""
+    """Draw the help buttons in the header of a panel: its own topic, and the page with more."""
     row = layout.row(align=True)
     for topic, icon in ((panel, "QUESTION"), (MORE.get(panel, ""), "TEXT")):
         if topic in STEPS:

@@ -1,4 +1,4 @@
-"""Handing the scene's design to the engine: a folder of meshes, and the rest as JSON."""
+"""Transfer of the scene's design to the engine: a folder of meshes, and the rest as JSON."""
 
 from __future__ import annotations
 
@@ -21,14 +21,15 @@ from ..scene.paths import absolute
 from . import catalogue, session
 
 _written: dict[str, bytes] = {}
-"""Digest of the mesh in each file of the present design, by the file's path."""
+"""Digest of the mesh in each file of the present design, by the path of the file."""
 
 
 def design(scene: bpy.types.Scene) -> dict[str, Any]:
-    """The scene's design as requests to the engine name it; only changed meshes are written.
+    """Return the scene's design as a field of requests to the engine; only changed meshes are
+    written.
 
     Raises:
-        EngineError: there is no engine, or the scene is no design.
+        EngineError: there is no engine, or the scene does not form a design.
     """
     folder = Path(session.folder()) / "design"
     try:
@@ -52,7 +53,7 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
 
 
 def contacts(scene: bpy.types.Scene) -> list[dict[str, Any]]:
-    """The scene's contacts that press, as requests to the engine name them.
+    """Return the scene's active contacts as a field of requests to the engine.
 
     Raises:
         EngineError: there is no engine.
@@ -70,7 +71,7 @@ def contacts(scene: bpy.types.Scene) -> list[dict[str, Any]]:
 
 
 def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
-    """Tells whether a part's mesh at rest changed."""
+    """Return a digest of a part's mesh at rest, to detect changes."""
     if part.mode == "EDIT":
         part.update_from_editmode()
     mesh = part.data
@@ -92,7 +93,9 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
 
 
 def _copy_lamp_files(document: dict[str, Any], source: Path, folder: Path) -> None:
-    """Files of lamps go along; those from elsewhere join the design under their own name."""
+    """Copy the files of lamps into the folder; those from elsewhere are renamed to their file
+    name.
+    """
     for group in document["lights"].values():
         emitter = group.get("emitter") or {"kind": "library"}
         for field in schema.file_fields("emitter", emitter["kind"]):
@@ -101,7 +104,7 @@ def _copy_lamp_files(document: dict[str, Any], source: Path, folder: Path) -> No
 
 
 def _copy_file(file: str, source: Path, folder: Path) -> str:
-    """Copy a lamp's file into the folder; returns its name there."""
+    """Copy a lamp's file into the folder, and return its name there."""
     origin, name = source / file, file
     if file.startswith("//") or Path(file).is_absolute() or ".." in Path(file).parts:
         origin = absolute(file)
@@ -116,7 +119,7 @@ def _copy_file(file: str, source: Path, folder: Path) -> str:
 
 
 def without_nulls(values: Any) -> Any:
-    """JSON as the design file has it, where absent means null."""
+    """Remove entries with the value None from nested dictionaries, as in design files."""
     if isinstance(values, dict):
         return {key: without_nulls(each) for key, each in values.items() if each is not None}
     if isinstance(values, list):

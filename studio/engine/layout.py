@@ -1,4 +1,4 @@
-"""Layout helpers that all panels share."""
+"""Layout helpers shared by all panels."""
 
 from __future__ import annotations
 
@@ -11,20 +11,22 @@ from . import guide, session
 
 TAB = "OptiSense"
 CHARACTERS = 46
-"""About what fits in a line of the sidebar, where that can't be measured."""
+"""Approximate number of characters in a line of the sidebar, used if it can't be measured."""
 
 FONT_SIZE = 11.0
-"""Size in points of labels in Blender's own themes."""
+"""Size of labels in Blender's own themes, points."""
 
 _told: set[str] = set()
-"""Titles of the jobs whose outcome is told beside the button that began them."""
+"""Titles of the jobs whose outcome is shown beside the button that started them."""
 
 EDGES, ICON, BOX = 56.0, 21.0, 14.0
-"""Pixels of the sidebar that a line of text can't have: its tabs and edges, an icon, a box."""
+"""Widths in pixels that are not available to a line of text: tabs and edges of the sidebar, an
+icon, a box.
+"""
 
 
 class SidebarPanel:
-    """A panel of the extension's tab; those that need a sensor are not drawn without one."""
+    """Base of the extension's panels; those that need a sensor are hidden without one."""
 
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
@@ -35,12 +37,12 @@ class SidebarPanel:
         return context.scene is not None and context.scene.optisense.is_open
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
-        """The button at the right end of the panel's head."""
+        """Draw the buttons at the right end of the panel's header."""
         guide.draw_buttons(self.layout, self.bl_label)
 
 
 def labelled(layout: bpy.types.UILayout) -> bpy.types.UILayout:
-    """A column of values with their names on the left, and no dots for keyframes."""
+    """Return a column for properties with their names on the left, without keyframe dots."""
     column = layout.column()
     column.use_property_split = True
     column.use_property_decorate = False
@@ -50,13 +52,13 @@ def labelled(layout: bpy.types.UILayout) -> bpy.types.UILayout:
 def paragraph(
     layout: bpy.types.UILayout, text: str, icon: str = "NONE", *, boxed: bool = False
 ) -> None:
-    """A text in as many lines as it needs.
+    """Draw a text in as many lines as it needs.
 
     Args:
-        layout: where to.
-        text: without line breaks.
-        icon: before the first line.
-        boxed: it is in a box, which leaves less room.
+        layout: layout to draw in.
+        text: text without line breaks.
+        icon: icon before the first line.
+        boxed: whether `layout` is a box, which leaves less room.
     """
     column = layout.column(align=True)
     column.scale_y = 0.8
@@ -67,7 +69,7 @@ def paragraph(
 
 
 def lines_of(text: str, *, has_icon: bool, boxed: bool) -> list[str]:
-    """A text broken where the sidebar ends, as wide as it is now."""
+    """Break a text into lines of the present width of the sidebar."""
     region = bpy.context.region
     if bpy.app.background or region is None:
         return textwrap.wrap(text, CHARACTERS)
@@ -85,7 +87,7 @@ def lines_of(text: str, *, has_icon: bool, boxed: bool) -> list[str]:
 
 
 def _pieces(word: str, room: float) -> list[str]:
-    """A word that may be longer than a line, such as a path, cut where lines end."""
+    """Break a word that may be longer than a line, such as a path."""
     pieces = [""]
     for letter in word:
         if pieces[-1] and blf.dimensions(0, pieces[-1] + letter)[0] > room:
@@ -95,12 +97,13 @@ def _pieces(word: str, room: float) -> list[str]:
 
 
 def show_job(layout: bpy.types.UILayout, *titles: str) -> bool:
-    """The progress of the job, where it is one of these, and a button to cancel it; whether it is.
+    """Draw progress and a cancel button if the running job has one of these titles; return whether
+    it has.
 
-    It stands in place of the button that began the job: Blender would leave that button grey after
-    the job for as long as the mouse rests on it. It is a property that can't be edited: Blender
-    takes a layout's progress bar that the mouse rests on for the next label or picture, once it
-    is gone, and draws that as a full bar.
+    They take the place of the button that started the job: Blender would leave that button grey
+    after the job while the mouse rests on it. The progress bar is a read-only property: with a
+    progress bar of the layout under the mouse, Blender would draw the next label or picture as a
+    full bar once the bar is gone.
     """
     now = session.state()
     if now.busy not in titles:
@@ -115,9 +118,9 @@ def show_job(layout: bpy.types.UILayout, *titles: str) -> bool:
 
 
 def show_outcome(layout: bpy.types.UILayout, *titles: str) -> None:
-    """What there is to tell of the job that was over last, where it is one of these.
+    """Draw the outcome of the last job if it has one of these titles.
 
-    The panel Sensor tells everything else.
+    The panel Sensor shows all other outcomes.
     """
     _told.update(titles)
     if not session.state().busy and session.state().about in titles:
@@ -125,13 +128,13 @@ def show_outcome(layout: bpy.types.UILayout, *titles: str) -> None:
 
 
 def show_other_outcomes(layout: bpy.types.UILayout) -> None:
-    """What there is to tell that no other panel tells beside the button that was pressed."""
+    """Draw the last outcome unless another panel shows it beside the button that was pressed."""
     if session.state().about not in _told:
         show_messages(layout)
 
 
 def show_messages(layout: bpy.types.UILayout) -> None:
-    """What went wrong last, or what there is to tell."""
+    """Draw the last problem or, without one, the last note."""
     now = session.state()
     if now.problem:
         box = layout.box()

@@ -1,4 +1,4 @@
-"""The end of operators: an error that the user sees, or a request to the engine."""
+"""Results of operators: errors that the user sees, and requests to the engine."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from . import handing, session
 
 
 def refuse(operator: bpy.types.Operator, text: str) -> set[str]:
-    """Report an error; returns what Blender wants of an operator that did nothing."""
+    """Report an error; return the result of an operator that did nothing."""
     operator.report({"ERROR"}, text)
     return {"CANCELLED"}
 
 
 def fail(operator: bpy.types.Operator, error: EngineError, title: str = "") -> set[str]:
-    """Refuse as `refuse` does, with the error on the panel that tells of the job `title`."""
+    """Refuse like `refuse`, with the error on the panel that shows the job `title`."""
     session.state().about = title
     session.say(error)
     return told(operator, error.text())
 
 
 def told(operator: bpy.types.Operator, text: str) -> set[str]:
-    """Refuse as `refuse` does, where a panel shows the error: Blender opens no window with it."""
+    """Refuse like `refuse`, for errors that a panel shows: Blender opens no window for them."""
     operator.report({"ERROR" if bpy.app.background else "WARNING"}, text)
     return {"CANCELLED"}
 
@@ -38,10 +38,10 @@ def start(
     wait: bool | None = None,
     **fields: Any,
 ) -> set[str]:
-    """Begin a long job (see `session.start_job`) and report it where it does not begin.
+    """Start a long job (see `session.start_job`), and report it if it can't be started.
 
     Args:
-        wait: until the job is over; by default in scripts without a window.
+        wait: block until the job is over; by default only in background mode.
     """
     wait = bpy.app.background if wait is None else wait
     if session.start_job(title, what, on_result, wait=wait, **fields):
@@ -53,7 +53,7 @@ def start(
 def start_with_design(
     operator: bpy.types.Operator, context: bpy.types.Context, *args: Any, **fields: Any
 ) -> set[str]:
-    """Start as `start` does, with the scene's design among the fields of the request."""
+    """Start like `start`, with the scene's design among the fields of the request."""
     try:
         design = handing.design(context.scene)
     except EngineError as error:
@@ -62,7 +62,7 @@ def start_with_design(
 
 
 class Starting:
-    """Operators that a click starts and a script waits for; their `start` does it."""
+    """Base of operators that call `start`: without waiting on a click, waiting in scripts."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return self.start(context, wait=False)
@@ -72,10 +72,10 @@ class Starting:
 
 
 class ChoosingFile:
-    """Operators that ask for a file or a folder first."""
+    """Base of operators that ask for a file or a folder first."""
 
     def suggested(self, context: bpy.types.Context) -> str:
-        """The path that the file selector begins with."""
+        """Return the path with which the file selector opens."""
         return self.filepath
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -85,7 +85,7 @@ class ChoosingFile:
 
 
 class ChoosingProperties:
-    """Operators that show their properties in a dialog first."""
+    """Base of operators that show their properties in a dialog first."""
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         return context.window_manager.invoke_props_dialog(self)

@@ -1,4 +1,4 @@
-"""Conditions of buttons, and the reason why one is grey."""
+"""Conditions under which buttons are enabled, and the reason shown if they are not."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import bpy
 from . import session
 
 Check = Callable[[type[bpy.types.Operator], bpy.types.Context], bool]
-"""Whether an operator can be used; says why where it can't."""
+"""Check whether an operator can be used; sets the operator's poll message if it can't."""
 
 
 def has_design(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """There is a sensor in the scene."""
+    """Check that the scene holds a sensor."""
     if context.scene is None or not context.scene.optisense.is_open:
         operator.poll_message_set("There is no sensor yet: make or open one under Sensor")
         return False
@@ -21,7 +21,7 @@ def has_design(operator: type[bpy.types.Operator], context: bpy.types.Context) -
 
 
 def is_idle(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """The engine has nothing long to do."""
+    """Check that the engine has no long job."""
     if session.is_busy():
         operator.poll_message_set("The engine is busy; wait or cancel")
         return False
@@ -29,7 +29,7 @@ def is_idle(operator: type[bpy.types.Operator], context: bpy.types.Context) -> b
 
 
 def in_object_mode(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Nothing is being edited."""
+    """Check that Blender is in object mode."""
     if context.mode != "OBJECT":
         operator.poll_message_set("Leave edit mode first (Tab)")
         return False
@@ -37,7 +37,7 @@ def in_object_mode(operator: type[bpy.types.Operator], context: bpy.types.Contex
 
 
 def in_3d_view(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """The button is in a 3D view."""
+    """Check that the button is in a 3D view."""
     if context.area is None or context.area.type != "VIEW_3D":
         operator.poll_message_set("Use it in a 3D view")
         return False
@@ -45,7 +45,7 @@ def in_3d_view(operator: type[bpy.types.Operator], context: bpy.types.Context) -
 
 
 def needing(is_there: Callable[[bpy.types.Context], object], text: str) -> Check:
-    """A check whether something is there; where it is not, the button says what to do."""
+    """Return a check that something exists; `text` is shown if it does not."""
 
     def check(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
         found = bool(is_there(context))
@@ -57,12 +57,12 @@ def needing(is_there: Callable[[bpy.types.Context], object], text: str) -> Check
 
 
 def selecting(*kinds: str, what: str) -> Check:
-    """A check whether an object of some kinds is selected."""
+    """Return a check that an object of some kinds is selected."""
     return needing(lambda context: picked(context, *kinds), f"Select {what} first")
 
 
 def picked(context: bpy.types.Context, *kinds: str) -> list[bpy.types.Object]:
-    """The selected objects of some kinds."""
+    """Return the selected objects of some kinds."""
     return [each for each in context.selected_objects if each.optisense.kind in kinds]
 
 
@@ -70,7 +70,7 @@ ASKING = (has_design, is_idle)
 
 
 class Checked:
-    """Operators whose buttons are grey until all of some checks hold."""
+    """Base of operators that are disabled until all of their `checks` hold."""
 
     checks: tuple[Check, ...] = ()
 
@@ -80,24 +80,24 @@ class Checked:
 
 
 class Designing(Checked):
-    """Operators that need a sensor in the scene."""
+    """Base of operators that need a sensor in the scene."""
 
     checks = (has_design,)
 
 
 class Arranging(Checked):
-    """Operators that change the objects of a sensor."""
+    """Base of operators that change the objects of a sensor."""
 
     checks = (has_design, in_object_mode)
 
 
 class Asking(Checked):
-    """Operators that ask the engine about the scene's sensor."""
+    """Base of operators that ask the engine about the scene's sensor."""
 
     checks = ASKING
 
 
 class Replacing(Checked):
-    """Operators that bring in what the engine reads."""
+    """Base of operators that import what the engine reads."""
 
     checks = (is_idle, in_object_mode)

@@ -1,4 +1,4 @@
-"""Preferences: the place of the engine."""
+"""Preferences of the extension: the command that starts the engine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ENVIRONMENT = "OPTISENSE_ENGINE"
 
 
 when_changed: list[Callable[[], None]] = []
-"""Called when another engine is named."""
+"""Callbacks for a change of the engine's command."""
 
 
 def _changed(values: bpy.types.AddonPreferences, context: bpy.types.Context) -> None:
@@ -46,16 +46,16 @@ HOW_TO_GET = "Type 'optisense studio' in a terminal, or set the engine's path in
 
 
 def preferences() -> bpy.types.AddonPreferences | None:
-    """The extension's preferences; None where it is not installed but only registered."""
+    """Return the extension's preferences; None if it is registered without being installed."""
     addon = bpy.context.preferences.addons.get(PACKAGE)
     return addon.preferences if addon else None
 
 
 def engine_command() -> list[str]:
-    """How to start the engine; empty where none is known.
+    """Return the command that starts the engine; empty if none is known.
 
-    The preferences come first, which what `optisense studio` says was written to when Blender
-    started; then that, then the search path.
+    The preferences come first, then the environment variable `OPTISENSE_ENGINE`, which `optisense
+    studio` sets and which `register` copies into the preferences, then the search path.
     """
     own = preferences()
     told = own.engine.strip() if own is not None else ""
@@ -67,7 +67,9 @@ def engine_command() -> list[str]:
 
 
 def _split(told: str) -> list[str]:
-    """The words of a command; a path with spaces needs no quotes, and `engine` may be left out."""
+    """Split a command into words; a path with spaces needs no quotes, and `engine` may be
+    omitted.
+    """
     program = told.removesuffix(" engine").strip()
     if not Path(program).is_file():
         return shlex.split(told)

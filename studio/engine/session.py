@@ -1,4 +1,4 @@
-"""The running engine, the one long job at a time, and what the panels show of it."""
+"""The running engine, the long job that it works on, and the state that the panels show."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from ..core.engine import Answer, Engine, EngineError, Request
 from .preferences import HOW_TO_GET, engine_command, when_changed
 
 TICK, BRISK = 0.05, 0.01
-"""Seconds between two looks at the engine: as a rule, and while it owes an answer."""
+"""Interval between two polls of the engine, s: normally, and while an answer is pending."""
 
 PATIENCE = 20.0
-"""Seconds that Blender waits at most for what is answered within a blink."""
+"""Longest time that Blender waits for requests that are normally answered at once, s."""
 
 _engine: Engine | None = None
 _folder: str | None = None
@@ -26,17 +26,17 @@ _job: Request | None = None
 _job_goes_on = False
 
 when_ticking: list[Callable[[], None]] = []
-"""Called some twenty times a second while the engine runs."""
+"""Callbacks for each poll, about twenty times a second while the engine runs."""
 
 when_started: list[Callable[[Engine], None]] = []
-"""Called with every engine that is started, to ask it something."""
+"""Callbacks for each engine that is started."""
 
 when_leaving: list[Callable[[], None]] = []
-"""Called before another .blend file is opened."""
+"""Callbacks for the moment before another .blend file is opened."""
 
 
 class OPTISENSE_PG_session(bpy.types.PropertyGroup):
-    """What is going on; never saved."""
+    """State of the engine and its job, as the panels show it; never saved."""
 
     busy: StringProperty(description="What the engine works on", options={"SKIP_SAVE"})
     about: StringProperty(
@@ -58,15 +58,15 @@ class OPTISENSE_PG_session(bpy.types.PropertyGroup):
 
 
 def state() -> OPTISENSE_PG_session:
-    """What is going on."""
+    """Return the state that the panels show."""
     return bpy.context.window_manager.optisense
 
 
 def engine() -> Engine:
-    """The running engine; started where none runs.
+    """Return the running engine; start one if none runs.
 
     Raises:
-        EngineError: there is none, or it can't be started.
+        EngineError: no engine is known, or it can't be started.
     """
     global _engine, _folder
     if _engine is not None and _engine.alive:
@@ -88,11 +88,11 @@ def engine() -> Engine:
 
 
 def restart() -> None:
-    """End the engine, and start it as the preferences now say; what goes wrong is said."""
+    """End the engine, and start it again with the command of the preferences; errors are shown."""
     global _engine
     if _engine is not None:
         if not _engine.alive:
-            _engine.abandon()  # whoever waits is told
+            _engine.abandon()  # Pending requests are told.
         _engine.stop()
         _engine = None
     now = state()
@@ -106,19 +106,19 @@ def restart() -> None:
 
 
 def folder() -> str:
-    """Where the engine puts pictures, and where designs go on their way to it."""
+    """Return the folder of the engine's pictures and of designs on their way to the engine."""
     return engine().folder
 
 
 def running() -> Engine | None:
-    """The engine, if one runs."""
+    """Return the running engine; None if none runs."""
     return _engine if _engine is not None and _engine.alive else None
 
 
 def ask(
     what: str, on_result: Answer, on_error: Callable[[EngineError], None], **fields: Any
 ) -> Request | None:
-    """A quick request; None where there is no engine."""
+    """Send a short request; return None if there is no engine, which `on_error` is told."""
     try:
         return engine().send(what, on_result=on_result, on_error=on_error, **fields)
     except EngineError as error:
@@ -127,10 +127,11 @@ def ask(
 
 
 def ask_and_wait(what: str, **fields: Any) -> dict[str, Any]:
-    """A request that is answered within a blink, such as a list of the library.
+    """Send a request that is answered at once, such as for a list of the library, and return the
+    answer.
 
     Raises:
-        EngineError: as the engine says, or there is none.
+        EngineError: the engine answered with an error or not in time, or there is no engine.
     """
     answers: list[Any] = []
     running = engine()
@@ -160,15 +161,15 @@ def start_job(
     wait: bool,
     **fields: Any,
 ) -> bool:
-    """Begin the long job that the panels show; whether it ended well, or goes on.
+    """Start the long job that the panels show; return whether it ended well, or still runs.
 
     Args:
-        title: what it is, for the progress bar.
-        what: the request.
-        on_result: called with its result, with the job over.
-        on_event: called with its events, progress aside.
-        wait: until it is over, for scripts.
-        fields: of the request.
+        title: name of the job in the progress bar.
+        what: name of the request.
+        on_result: called with the result after the job has ended.
+        on_event: called with the job's events, except progress.
+        wait: block until the job is over, for scripts.
+        fields: fields of the request.
     """
     global _job, _job_goes_on
     _job_goes_on = bool(fields.get("go_on"))
@@ -210,7 +211,7 @@ def start_job(
 
 
 def cancel_job() -> None:
-    """Give up the long job."""
+    """Cancel the long job."""
     if _job is not None and _engine is not None:
         state().cancelling = True
         _engine.cancel(_job)
@@ -218,7 +219,9 @@ def cancel_job() -> None:
 
 @bpy.app.handlers.persistent
 def _loading(*_: Any) -> None:
-    """Another .blend file is opened: what is on its way is for the scene that goes."""
+    """Drop pending answers before another .blend file is opened: they are for the scene that
+    goes.
+    """
     if _job is not None:
         _job.ignore()
         if _engine is not None and not _job_goes_on:
@@ -229,12 +232,12 @@ def _loading(*_: Any) -> None:
 
 
 def is_busy() -> bool:
-    """Whether a long job is being worked on."""
+    """Whether a long job is running."""
     return _job is not None and not _job.done
 
 
 def say(error: EngineError) -> None:
-    """Show an error in the panels; select what it is about, and name that."""
+    """Show an error in the panels, and select the object that it is about."""
     now = state()
     texts = [error.where, f"{error.hint[:1].upper()}{error.hint[1:]}" if error.hint else ""]
     if error.part or error.path or error.contact is not None:
@@ -252,7 +255,7 @@ def say(error: EngineError) -> None:
 
 
 def redraw() -> None:
-    """Let the panels and pictures be drawn again."""
+    """Redraw the panels and pictures."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in ("VIEW_3D", "IMAGE_EDITOR"):
@@ -260,7 +263,7 @@ def redraw() -> None:
 
 
 def push_undo(message: str) -> None:
-    """Make what a finished job changed a step of its own in the undo history."""
+    """Add an undo step for the changes of a finished job."""
     windows = bpy.context.window_manager.windows
     if windows:
         with bpy.context.temp_override(window=windows[0]):
@@ -310,14 +313,14 @@ def _tick() -> float | None:
         state().hint = "This is a defect of the extension; the console shows where it is"
     if _engine.ended:
         if _engine.end is not None and not state().problem:
-            say(_engine.end)  # nobody waited for an answer who would have said it
+            say(_engine.end)  # No request was pending whose error would have told it.
         return None
     return BRISK if _engine.waiting else TICK
 
 
 @bpy.app.handlers.persistent
 def _undone(*_: Any) -> None:
-    """What went wrong last was wrong with a scene that is another one now."""
+    """Clear the last problem after undo or redo: the scene is another one now."""
     now = state()
     now.problem = now.hint = ""
 
@@ -326,7 +329,7 @@ PROPERTIES = {"WindowManager": {"optisense": OPTISENSE_PG_session}}
 
 
 def _another_engine_is_named() -> None:
-    """Start the engine that is named now, unless the one before is at work."""
+    """Restart the engine after its command was changed, unless a job is running."""
     if not is_busy():
         restart()
 

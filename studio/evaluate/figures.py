@@ -1,4 +1,4 @@
-"""Figures of scores as Blender's images, to be looked at in full."""
+"""Figures of scores as images of Blender."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ PREFIX = "OptiSense figure: "
 
 
 def load(title: str, file: str) -> bpy.types.Image:
-    """A figure as an image, in place of the one of that title before.
+    """Load a figure as an image, in place of an earlier one with the same title.
 
-    It is packed: the file is the engine's and goes with it, and the figure stays in the user's
-    .blend file if an editor shows it.
+    The image is packed: the file is the engine's and is deleted with it, whereas the figure stays
+    in the user's .blend file if an editor shows it.
 
     Raises:
-        RuntimeError: the file is gone or no picture.
+        RuntimeError: the file does not exist or is no picture.
     """
     name = f"{PREFIX}{title}"
     loaded = bpy.data.images.load(file)
@@ -30,5 +30,5 @@ def load(title: str, file: str) -> bpy.types.Image:
 
 
 def is_there(file: str) -> bool:
-    """Whether the engine's file of a figure is still there."""
+    """Whether the engine's file of a figure still exists."""
     return bool(file) and Path(file).is_file()

@@ -1,4 +1,4 @@
-"""Where the light goes: the ledger of each light group, and the light at a chosen place."""
+"""Light ledger: where the light of each group goes, and which light reaches a chosen place."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TITLE = "Following light"
 
 
 class OPTISENSE_PG_ledger(bpy.types.PropertyGroup):
-    """The last ledger; never saved."""
+    """Last ledger; never saved."""
 
     groups: StringProperty(description="The ledger as JSON", options={"SKIP_SAVE"})
     places: StringProperty(description="The light at places as JSON", options={"SKIP_SAVE"})
@@ -51,7 +51,7 @@ def _take(result: dict[str, Any]) -> None:
 
 
 def draw(layout: bpy.types.UILayout) -> None:
-    """The button, and what it told last."""
+    """Draw the button, and the last ledger."""
     if not show_job(layout, TITLE):
         layout.operator("optisense.ledger", icon="LIGHT")
     show_outcome(layout, TITLE)

@@ -1,4 +1,4 @@
-"""Scores that trace rays only, kept up to date while the sensor is edited."""
+"""Scores that only trace rays, updated while the sensor is edited."""
 
 from __future__ import annotations
 
@@ -15,20 +15,21 @@ from .operator import chosen, take_live
 KINDS = ("PART", "CAMERA", "CAGE")
 
 REST = 0.2
-"""Seconds without a change after which an edited sensor is scored: a score takes the engine some
-hundredths of a second and checks the sensor first, which pictures of a drag need not wait for."""
+"""Time without a change after which an edited sensor is scored, s: a score takes the engine some
+hundredths of a second and checks the design first, for which the pictures of a drag need not wait.
+"""
 
 _request = LatestRequest(REST)
 
 
 def objectives(context: bpy.types.Context) -> list[str]:
-    """The ticked objectives that trace rays only."""
+    """Return the chosen objectives that only trace rays."""
     quick = {row["name"] for row in catalogue.entries("objectives") if row.get("rays_only")}
     return [name for name in chosen(context) if name in quick]
 
 
 def wanted() -> None:
-    """The sensor changed, or scoring while editing was switched on."""
+    """Schedule a score: the sensor changed, or live scoring was switched."""
     if bpy.context.window_manager.optisense_evaluation.live:
         _request.want()
     else:

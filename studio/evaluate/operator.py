@@ -17,10 +17,12 @@ from ..simulate import editors
 from . import figures, rays
 
 ABOUT = ("unit", "lower_is_better")
-"""What a score tells of its objective, which may be one of the user's own."""
+"""Entries of a score that describe its objective; the catalogue lacks those of the user's own
+objectives.
+"""
 
 RAYS = (16, 12)
-"""Grid of the chief rays that are drawn (columns, rows); more hide the sensor."""
+"""Columns and rows of the grid of chief rays; more rays would hide the sensor."""
 
 
 class OPTISENSE_OT_choose_objective(bpy.types.Operator):
@@ -68,14 +70,14 @@ class OPTISENSE_OT_evaluate(polls.Checked, Starting, bpy.types.Operator):
 
 
 def chosen(context: bpy.types.Context) -> list[str]:
-    """The objectives to score by, the user's own last."""
+    """Return the chosen objectives, the user's own last."""
     values = context.window_manager.optisense_evaluation
     names = [name for name in sorted(values.chosen) if name != "NONE"]
     return [*names, objective(values.own)] if values.own.strip() else names
 
 
 def take(result: dict[str, Any]) -> None:
-    """Keep the scores for the panel, in place of those before."""
+    """Replace the scores in the panel."""
     values = bpy.context.window_manager.optisense_evaluation
     before = _before()
     opened = {score.name for score in values.scores if score.is_open}
@@ -90,7 +92,7 @@ def take(result: dict[str, Any]) -> None:
 
 
 def take_live(result: dict[str, Any]) -> None:
-    """The same for scores that were made while the sensor is edited; the others stay, as old."""
+    """Update the scores that are made while the sensor is edited, and keep the other scores."""
     values = bpy.context.window_manager.optisense_evaluation
     before = _before()
     for row in result["scores"]:
@@ -103,7 +105,7 @@ def take_live(result: dict[str, Any]) -> None:
 
 
 def _before() -> dict[str, float]:
-    """The scores of this sensor so far, by objective."""
+    """Return the present scores of this sensor by objective."""
     values = bpy.context.window_manager.optisense_evaluation
     if values.is_before:
         return {}
@@ -111,7 +113,7 @@ def _before() -> dict[str, float]:
 
 
 def _fill(score: bpy.types.PropertyGroup, row: dict[str, Any], before: float | None) -> None:
-    """Show what the engine says of a score, and how it changed."""
+    """Fill an entry of the panel with a score and its change."""
     known = {each["name"]: each for each in catalogue.entries("objectives")}
     about = {**known.get(row["objective"], {}), **{k: row[k] for k in ABOUT if k in row}}
     value = row["value"]
@@ -170,7 +172,7 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
 
 
 def draw_again(scene: bpy.types.Scene) -> None:
-    """Trace the chief rays of the sensor that took the place of the one before; nobody waits."""
+    """Trace the chief rays of a sensor that replaced another one, without waiting."""
     name = scene.name
 
     def traced(result: dict[str, Any]) -> None:

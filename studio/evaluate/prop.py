@@ -1,4 +1,4 @@
-"""Which objectives to score by, and the scores."""
+"""Properties of an evaluation: the chosen objectives, and the scores."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from bpy.props import (
 from ..engine import catalogue
 
 when_live_changed: list[Callable[[], None]] = []
-"""Called when scoring while editing is switched on or off."""
+"""Callbacks for live scoring being switched on or off."""
 
 
 def _live_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -25,7 +25,7 @@ def _live_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -
 
 
 class OPTISENSE_PG_score(bpy.types.PropertyGroup):
-    """A score; its name is the objective's."""
+    """Score; its name is that of the objective."""
 
     title: StringProperty()
     value: StringProperty()
@@ -49,7 +49,7 @@ class OPTISENSE_PG_score(bpy.types.PropertyGroup):
 
 
 class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
-    """The last evaluation; never saved."""
+    """Last evaluation; never saved."""
 
     chosen: EnumProperty(
         name="Objectives",

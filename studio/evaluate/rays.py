@@ -12,7 +12,7 @@ from ..scene.collections import collection, objects_of
 
 NAME = "Chief rays"
 THICKNESS = 0.02
-"""Radius in mm of the lines of chief rays."""
+"""Radius of the lines of chief rays, mm."""
 COLOURS = {
     "hit": ("green", (0.05, 0.55, 0.2, 1.0)),
     "escaped": ("red", (0.9, 0.1, 0.1, 1.0)),
@@ -24,7 +24,7 @@ OTHER = ("grey", (0.5, 0.5, 0.5, 1.0))
 
 
 def show(scene: bpy.types.Scene, result: dict[str, Any]) -> str:
-    """Draw the engine's chief rays in place of those before; what became of them, in words."""
+    """Draw the engine's chief rays in place of earlier ones; return a summary of their outcomes."""
     clear(scene)
     files = result["files"]
     vertices, counts = np.load(files["vertices"]), np.load(files["counts"])
@@ -42,12 +42,12 @@ def show(scene: bpy.types.Scene, result: dict[str, Any]) -> str:
 
 
 def drawn(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The rays that are shown, one object for each outcome."""
+    """Return the objects of the chief rays that are drawn."""
     return [e for e in objects_of(scene, "SHOWN") if e.optisense.key.startswith("ray ")]
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Remove the rays."""
+    """Remove the chief rays."""
     for each in drawn(scene):
         curve = each.data
         bpy.data.objects.remove(each)

@@ -11,14 +11,17 @@ from ..simulate.picture import file_icon
 from . import figures, ledger
 
 TITLE, VALUE = 0.28, 0.78
-"""Share of a score's line that its title has, and share of the rest that value and change have; the
-bar has what is left."""
+"""Share of a score's line that the title takes, and share of the rest that value and change take;
+the bar takes what is left.
+"""
 
 ARROWS = {"better": "TRIA_UP", "worse": "TRIA_DOWN"}
-"""Icons of changes: up is better, whichever way the value goes."""
+"""Icon of each change: up is better, even if a lower value is better."""
 
 FIGURE = 10.5
-"""Width of a figure in the panel, in widths of an icon; in full it opens in an editor."""
+"""Width of a figure in the panel, in widths of an icon; its button opens it in full in an
+editor.
+"""
 
 
 class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
@@ -61,7 +64,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
 
 
 def _strip(layout: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:
-    """All scores, one line each; a click on the arrow shows what one is made of."""
+    """Draw all scores, one line each; the arrow unfolds the parts of a score."""
     if values.is_before:
         layout.label(text="Scores of the sensor that was open before", icon="INFO")
     column = layout.column(align=True)

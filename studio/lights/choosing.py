@@ -1,4 +1,4 @@
-"""The list of light groups and the selected lights go together."""
+"""Synchronisation of the list of light groups with the selected lights."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ _following = False
 
 
 def lights_of(scene: bpy.types.Scene, group: str) -> list[bpy.types.Object]:
-    """The lights of a group, in the order of the design file."""
+    """Return the lights of a group in the order of the design file."""
     return [each for each in objects_of(scene, "LIGHT") if each.optisense.group == group]
 
 
 def _select(scene: bpy.types.Scene, index: int) -> None:
-    """A group is chosen in the list: select its lights."""
+    """Select the lights of the group that was chosen in the list."""
     groups = scene.optisense.light_groups
     if not _following and bpy.context.mode == "OBJECT" and 0 <= index < len(groups):
         lights = lights_of(scene, groups[index].name)
@@ -26,7 +26,7 @@ def _select(scene: bpy.types.Scene, index: int) -> None:
 
 @bpy.app.handlers.persistent
 def _follow(scene: bpy.types.Scene, *_: object) -> None:
-    """A light is selected in the view: choose its group in the list."""
+    """Choose the group of the light that was selected in the view."""
     global _following
     active = bpy.context.view_layer.objects.active if bpy.context.view_layer else None
     if active is None or active.optisense.kind != "LIGHT" or not active.select_get():

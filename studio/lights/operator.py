@@ -49,11 +49,12 @@ def _groups(operator: Any, context: bpy.types.Context | None) -> catalogue.Items
 _group_items: catalogue.Items = []
 
 USUAL_LAMP = "smd-3528"
-"""The lamp that a new group begins with: a common, small LED."""
+"""Lamp with which a new group begins: a common, small LED."""
 
 USUAL_PITCH, GAP = 4.0, 0.5
-"""mm: between lamps whose size is not known, and left free between lamps whose size is; boards are
-placed by machines, which need less."""
+"""Distances in mm: pitch of lamps of unknown size, and gap between lamps of known size; placement
+machines need less.
+"""
 
 WAYS = {
     "PLUS_X": (1.0, 0.0, 0.0),
@@ -71,10 +72,12 @@ AIMS = [
         for name in WAYS
     ),
 ]
-"""Where lights may look."""
+"""Directions that new lights can be aimed in."""
 
 SOLID = 1e-3
-"""The faces of a closed surface look to all sides: their sum is less than this share of all."""
+"""Share of the total area below which the sum of the faces' area vectors counts as zero: then the
+surface is closed, and has no facing direction.
+"""
 
 
 class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Operator):
@@ -169,7 +172,7 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
         return {"FINISHED"}
 
     def _fitting_pitch(self, context: bpy.types.Context) -> float:
-        """mm: the larger side of the lamp's window, and a gap."""
+        """Return the pitch in mm: the larger side of the lamp's window, and a gap."""
         group = context.scene.optisense.light_groups.get(self.group)
         if self.count == 1:
             return USUAL_PITCH
@@ -206,13 +209,13 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
 
 
 def _references(context: bpy.types.Context, what: str) -> list[bpy.types.Object]:
-    """The selected references for lights or the camera."""
+    """Return the selected reference objects for lights or the camera."""
     found = polls.picked(context, "REFERENCE")
     return [each for each in found if each.optisense.reference == what]
 
 
 def _middle(scene: bpy.types.Scene) -> Vector:
-    """The middle of the sensing surface; the origin where there is none."""
+    """Return the middle of the sensing surface, or the origin if there is none."""
     from ..scene.contacts import sensing_surface
 
     surface = sensing_surface(scene)
@@ -222,7 +225,9 @@ def _middle(scene: bpy.types.Scene) -> Vector:
 
 
 def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) -> np.ndarray:
-    """The direction in which most of a surface faces, by area; of a solid, the way to `target`."""
+    """Return the mean normal of a surface, weighted by area; for a closed surface, the direction to
+    `target`.
+    """
     faces = reference.data.polygons
     total = sum((face.normal * face.area for face in faces), Vector())
     if total.length > SOLID * sum(face.area for face in faces):
@@ -328,7 +333,7 @@ class OPTISENSE_OT_set_group(polls.Checked, ChoosingProperties, bpy.types.Operat
     checks = (polls.has_design, polls.selecting("LIGHT", what="lights"))
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Offer another group than the one that all of them are in."""
+        """Preselect a group that the selected lights are not all in."""
         names = [group.name for group in context.scene.optisense.light_groups]
         now = {each.optisense.group for each in polls.picked(context, "LIGHT")}
         others = [name for name in names if {name} != now]

@@ -1,5 +1,6 @@
-"""A gizmo that moves and turns a whole row of lights: arrows along the row, along the way its
-lights shine and across both, and a ring about the row."""
+"""Gizmo that moves and turns a row of lights: arrows along the row, along its light and across
+both, and a ring about the row.
+"""
 
 from __future__ import annotations
 
@@ -11,18 +12,19 @@ from ..scene.lamps import light_pose
 from .rows import of_one_group
 
 COLOURS = ((0.95, 0.75, 0.2), (0.3, 0.85, 0.95), (0.85, 0.45, 0.9))
-"""Red, green and blue of the arrows along the row, along its light and across; none is that of an
-axis of the world, which they need not follow."""
+"""Colours (red, green, blue) of the arrows along the row, along its light and across; none is that
+of a coordinate axis, which the arrows need not follow.
+"""
 
 LENGTH, BRIGHT, FAINT = 1.5, 1.0, 0.6
-"""Length of an arrow in the unit of gizmos, and opacities with and without the pointer on it."""
+"""Length of an arrow in units of gizmos, and its opacities with and without the pointer on it."""
 
 LEAST = 2
-"""Lights that make a row."""
+"""Smallest number of lights in a row that has a gizmo."""
 
 
 def frame(lights: list[bpy.types.Object]) -> Matrix:
-    """Where a row is: x runs along it, z against its light, and the origin is its middle."""
+    """Return the frame of a row: x along it, z against its light, and the origin in its middle."""
     poses = [light_pose(each) for each in lights]
     row = rows.row_through([pose["position"] for pose in poses])
     places = [Vector(pose["position"]) for pose in poses]

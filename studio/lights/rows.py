@@ -1,4 +1,6 @@
-"""Rows of lights as a whole: pitch, count and length as numbers; shown, hidden, or alone."""
+"""Operations on a whole row of lights: pitch, count and length; visibility; light of one group
+alone.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ _setting = False
 
 
 def of_one_group(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected lights, in the order of the design; none where they are of several groups."""
+    """Return the selected lights in the order of the design; empty if they are of several
+    groups.
+    """
     chosen = [each for each in objects_of(context.scene, "LIGHT") if each.select_get()]
     return chosen if len({each.optisense.group for each in chosen}) == 1 else []
 
@@ -36,7 +40,7 @@ def _length_changed(values: Any, context: bpy.types.Context) -> None:
 
 
 def _keep(values: Any, name: str, value: float) -> None:
-    """Let one number follow another, without the other following it back."""
+    """Set a dependent number without triggering its own update."""
     global _setting
     if not _setting:
         _setting = True
@@ -127,7 +131,7 @@ class OPTISENSE_OT_solo_group(polls.Designing, bpy.types.Operator):
 
 
 def hide_lights(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
-    """Hide the lights of a group in 3D views, or show them, as the group says."""
+    """Show or hide the lights of a group in 3D views, as the group's property says."""
     layer = bpy.context.view_layer
     for each in lights_of(scene, group.name):
         if layer is not None and each.name in layer.objects:

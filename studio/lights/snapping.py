@@ -1,4 +1,6 @@
-"""Lights on the edges of parts: a row put onto the nearest edge, and edges that catch moves."""
+"""Snapping of lights to the edges of parts: a row is put onto the nearest edge, and moves snap to
+edges.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,7 @@ from ..scene.lamps import light_pose
 from .rows import of_one_group
 
 CAUGHT = {"EDGE", "EDGE_MIDPOINT", "VERTEX"}
-"""What moves snap to: edges of parts, their middles and ends."""
+"""Elements of parts to which moves snap: edges, their midpoints and ends."""
 
 
 def is_on(scene: bpy.types.Scene) -> bool:

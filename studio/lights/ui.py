@@ -13,7 +13,7 @@ from . import snapping
 
 
 class OPTISENSE_UL_light_groups(bpy.types.UIList):
-    """Light groups: name, colour, flux."""
+    """List of light groups: name, colour, flux."""
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property) -> None:
         row = layout.row(align=True)

@@ -1,4 +1,6 @@
-"""How the lamps of light groups look, asked of the engine, to draw them in their real size."""
+"""Windows of the lamps of light groups, queried from the engine to draw lamps in their real
+size.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +16,15 @@ from ..scene.lamps import redraw
 
 
 def ask_for_windows(scene: bpy.types.Scene) -> None:
-    """Ask the engine about the lamps of all groups of a design, and draw them."""
+    """Query the lamps of all groups of a design, and draw them."""
     for group in scene.optisense.light_groups:
         ask_for_window(scene, group)
 
 
 def ask_for_window(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
-    """Ask the engine about the lamps of a group, and draw them; what it refuses stays as it is."""
+    """Query the lamps of a group, and draw them; if the engine refuses, the drawing stays as it
+    is.
+    """
     name, lamps = scene.name, group.name
     value = emitter_values(group)
     asked = {"entry": group.model} if value is None else {"value": value}
