@@ -104,7 +104,8 @@ def dataset(
                 write_parquet(made)
             write_card(made, licence)
     except KeyboardInterrupt:
-        from optisense.tasks.dataset import LABELS, Dataset
+        from optisense.tasks.dataset import Dataset
+        from optisense.tasks.dataset_tables import LABELS
 
         if (out / LABELS).exists():
             finished = len(Dataset.load(out))

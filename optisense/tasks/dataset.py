@@ -5,75 +5,27 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from optisense.errors import TaskError
 from optisense.picture_files import read_picture
-from optisense.tasks.records import read_object, read_rows
+from optisense.tasks.dataset_tables import INFO, LABELS, read_failures, read_info, read_labels
 from optisense.tasks.splits import SPLITS
 from optisense.text import brief
 from optisense.untrusted_files import (
     COPY_AGAIN,
-    MOST_TABLE,
     check_arrays,
-    first_problem,
     inside,
     is_file,
     read_arrays,
-    read_text,
 )
 
-SCHEMA_VERSION = 1
-"""Version of the format of a dataset's folder; it is raised when an older program cannot read
-it."""
-
-INFO = "dataset.json"
-LABELS = "metadata.csv"
-FAILURES = "failures.csv"
 BACKGROUND = "background.npz"
 CAMERA = "camera.npz"
 DESIGN = "design"
-
-TEXT_COLUMNS = ("file_name", "arrays", "radiance", "indenter", "split")
-WHOLE_COLUMNS = ("index", "contact_pixels", "cut", "attempt")
-NUMBER_COLUMNS = {
-    "radius": "mm, of a ball or a cylinder; empty for others",
-    "x": "mm, the place on the untouched surface, in the design's frame",
-    "y": "mm",
-    "z": "mm",
-    "column": "pixels from the picture's left edge, where the place is seen",
-    "row": "pixels from its top edge",
-    "depth": "mm, from the untouched surface to the indenter's lowest point",
-    "rotation": "degrees about the outward normal",
-    "tilt_x": "degrees about the indenter's x axis",
-    "tilt_y": "degrees about its y axis, after tilt_x",
-    "deepest": "mm, the largest depth that the picture shows",
-    "force": "N, along the outward normal; empty for a conforming skin",
-    "area": "mm^2 of skin that touches; empty for a conforming skin",
-    "pressure": "MPa, the greatest; empty for a conforming skin",
-}
-LATER_COLUMNS = {"force": "", "area": "", "pressure": "", "cut": "-1", "split": ""}
-"""Columns that tables of release 0.1 lack, with their default values; such tables can be read, and
-are continued without these columns."""
-COLUMNS = (
-    "file_name",
-    "index",
-    "indenter",
-    *NUMBER_COLUMNS,
-    "contact_pixels",
-    "attempt",
-    "arrays",
-    "radiance",
-    "cut",
-    "split",
-)
-"""Columns of `LABELS`; the first is the one that common loaders of image folders expect."""
-FIRST_COLUMNS = tuple(name for name in COLUMNS if name not in LATER_COLUMNS)
-"""Columns of `LABELS` in release 0.1."""
 
 MAKE_AGAIN = "Copy the file again, or make it again: optisense dataset with --mend"
 
@@ -93,105 +45,6 @@ elastic skin has pressure, penetration and displacement."""
 
 CAMERA_ARRAYS: ArrayKinds = {"points": ("f", 3), "directions": ("f", 3)}
 """Arrays of `CAMERA`, with their allowed types and the number of values per pixel."""
-
-FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class _KeptContacts(BaseModel):
-    """The stored ranges of contacts. They are compared with the requested ones, so any values are
-    allowed.
-    """
-
-    model_config = ConfigDict(extra="allow")
-
-    indenters: list[str] = Field(min_length=1)
-
-
-class _KeptSettings(BaseModel):
-    """The stored settings of a dataset. They are compared with the requested ones, so any further
-    values are allowed.
-    """
-
-    model_config = ConfigDict(extra="allow")
-
-    contacts: _KeptContacts
-    resolution: tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]]
-    estimator: str
-
-
-class _Info(BaseModel):
-    """The required content of `INFO`; further content is for people."""
-
-    model_config = ConfigDict(extra="allow", strict=False)
-
-    schema_version: Literal[1]
-    design_name: str
-    made_with: dict[str, str]
-    settings: _KeptSettings
-    mesh_files: dict[str, str] = Field(default_factory=dict)
-    meshes: dict[str, str]
-    exposure: Annotated[FiniteNumber, Field(gt=0.0)]
-
-
-def read_info(folder: Path) -> dict[str, Any]:
-    """Return the content of `dataset.json`.
-
-    Raises:
-        TaskError: the file is missing, damaged, or of another release; the message names the
-            defect.
-    """
-    path = folder / INFO
-    info = read_object(path)
-    if info.get("schema_version") != SCHEMA_VERSION:
-        raise TaskError(
-            f"schema_version {brief(repr(info.get('schema_version')))} can't be read; this release "
-            f"reads {SCHEMA_VERSION}",
-            where=str(path),
-            hint="Update OptiSense Studio, or copy the file again",
-        )
-    try:
-        _Info.model_validate(info)
-    except ValidationError as error:
-        raise TaskError(first_problem(error), where=str(path), hint=COPY_AGAIN) from None
-    return info
-
-
-def read_labels(folder: Path) -> list[dict[str, Any]]:
-    """Return the rows of `LABELS` with converted numbers; empty if there is no such file yet.
-
-    Raises:
-        TaskError: the table or one of its rows cannot be read; the message names the line.
-    """
-    path = folder / LABELS
-    rows = read_rows(path) if path.exists() else []
-    labels = [_typed(row, f"{path}:{line}") for line, row in enumerate(rows, start=2)]
-    seen: set[int] = set()
-    for line, row in enumerate(labels, start=2):
-        if row["index"] in seen or row["index"] < 0:
-            raise TaskError(
-                f"sample {row['index']} is there twice" if row["index"] >= 0 else "no such sample",
-                where=f"{path}:{line}",
-                hint="Delete the line",
-            )
-        seen.add(row["index"])
-    return labels
-
-
-def read_failures(folder: Path) -> list[dict[str, str]]:
-    """Return the rows of `FAILURES`; empty if there is no such file yet.
-
-    Raises:
-        TaskError: the table or one of its rows cannot be read; the message names the line.
-    """
-    path = folder / FAILURES
-    rows = read_rows(path) if path.exists() else []
-    for line, row in enumerate(rows, start=2):
-        if not (row.get("index") or "").isdecimal() or row.get("reason") is None:
-            raise TaskError("a row can't be read", where=f"{path}:{line}", hint=ROW_AGAIN)
-    return rows
-
-
-ROW_AGAIN = "Delete the line; the command that made the dataset then makes the sample again"
 
 
 @dataclass(frozen=True)
@@ -376,25 +229,3 @@ class Dataset:
         later = {each: LATER_ARRAYS[each] for each in LATER_ARRAYS if each in arrays}
         check_arrays(arrays, {**kinds, **later}, (height, width), path, TaskError)
         return arrays
-
-
-def columns_of(folder: Path) -> tuple[str, ...]:
-    """Return the columns of `LABELS` in a folder: those of release 0.1 if its file has them, else
-    all.
-    """
-    path = folder / LABELS
-    begun = read_text(path, MOST_TABLE, TaskError, "the table") if path.exists() else ""
-    return FIRST_COLUMNS if begun.startswith(",".join(FIRST_COLUMNS) + "\n") else COLUMNS
-
-
-def _typed(row: dict[str, str], where: str) -> dict[str, Any]:
-    try:
-        given = {**LATER_COLUMNS, **row}
-        result: dict[str, Any] = {name: given[name] for name in TEXT_COLUMNS}
-        result |= {name: int(given[name]) for name in WHOLE_COLUMNS}
-        if given["split"] not in ("", *SPLITS):
-            raise ValueError(f"there is no split '{brief(given['split'])}'")
-        result |= {n: float(given[n]) if given[n] else float("nan") for n in NUMBER_COLUMNS}
-    except (KeyError, TypeError, ValueError) as error:
-        raise TaskError(f"a row can't be read: {error}", where=where, hint=ROW_AGAIN) from error
-    return {name: result[name] for name in COLUMNS}

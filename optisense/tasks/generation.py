@@ -25,22 +25,19 @@ from optisense.reading.camera_noise import add_camera_noise
 from optisense.reading.untouched import UntouchedSurface
 from optisense.sensors import save_design
 from optisense.tasks.camera_model import camera_model, ray_arrays
-from optisense.tasks.dataset import (
-    BACKGROUND,
-    CAMERA,
-    DESIGN,
+from optisense.tasks.dataset import BACKGROUND, CAMERA, DESIGN, Dataset
+from optisense.tasks.dataset_settings import DatasetSettings
+from optisense.tasks.dataset_tables import (
     FAILURES,
     INFO,
     LABELS,
     NUMBER_COLUMNS,
     SCHEMA_VERSION,
-    Dataset,
     columns_of,
     read_failures,
     read_info,
     read_labels,
 )
-from optisense.tasks.dataset_settings import DatasetSettings
 from optisense.tasks.digests import design_values, file_digest, mesh_digests
 from optisense.tasks.draws import DrawnContact, Places, is_cut, keeps_margin
 from optisense.tasks.records import CsvTable, refuse_differences, write_whole

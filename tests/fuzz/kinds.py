@@ -36,7 +36,7 @@ from optisense.search.study.settings import StudySettings
 from optisense.sensors.from_meshes.building import design_from_meshes
 from optisense.sensors.from_meshes.recipe import Recipe
 from optisense.tasks.dataset import Dataset
-from optisense.tasks.dataset import _Info as DatasetInfo
+from optisense.tasks.dataset_tables import _Info as DatasetInfo
 
 from .cases import Case, read_case
 from .strategies import Schema, spoilt, spoilt_bytes, strange_numbers, strange_texts

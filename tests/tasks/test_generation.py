@@ -16,7 +16,7 @@ from optisense import OpticalModel, SensorDesign, library, load
 from optisense.design import LightGroup
 from optisense.errors import ContactError, OutputError, TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
-from optisense.tasks.dataset import LATER_COLUMNS
+from optisense.tasks.dataset_tables import LATER_COLUMNS
 
 COUNT = 4
 SETTINGS = DatasetSettings(
