@@ -17,7 +17,7 @@ from typing import Any
 
 from optisense.errors import OptiSenseError
 
-from .agreement import agrees
+from .agreement import agrees, same_values
 from .cluster import Cluster
 from .work import GOALS, WORK, half_files, whole_files
 
@@ -141,7 +141,9 @@ class Target:
         if name not in found or name not in self._result:
             return False
         one, other = self._result[name], found[name]
-        return agrees(name, one, other) if isinstance(one, bytes) else bool(one == other)
+        if isinstance(one, bytes):
+            return agrees(name, one, other)
+        return same_values(one, other) if self.work.fits else bool(one == other)
 
     def _begin(self, out: Path, *more: str) -> subprocess.Popen[str]:
         stand = {"@OUT": str(out), "@GOALS": str(self._home / "goals.py")}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from .agreement import agrees
+from .agreement import agrees, same_values
 from .killing import kill_repeatedly
 from .work import half_files, whole_files
 
@@ -47,6 +47,20 @@ def test_pictures_agree_up_to_rounding(tmp_path: Path) -> None:
         assert not agrees(name, whole, whole[: len(whole) // 2])
         assert not agrees(name, whole, written(name, light[:-1]))
     assert not agrees("a.csv", b"1\n", b"2\n")
+
+
+def test_fitted_numbers_agree_up_to_rounding() -> None:
+    fitted = {"flux": {"red": 2.2896, "blue": 1.9241}, "matrix": [[1.0, -0.01454]], "name": "mini"}
+    near = {"flux": {"red": 2.2897, "blue": 1.9241}, "matrix": [[1.0, -0.014538]], "name": "mini"}
+    assert same_values(fitted, near)
+    for wrong in (
+        {**fitted, "flux": {"red": 2.2896, "blue": 1.93}},
+        {**fitted, "flux": {"red": 2.2896}},
+        {**fitted, "matrix": [[1.0]]},
+        {**fitted, "matrix": [[1.0, -0.0146]]},
+        {**fitted, "name": "digit"},
+    ):
+        assert not same_values(fitted, wrong)
 
 
 def test_half_files_are_found(tmp_path: Path) -> None:

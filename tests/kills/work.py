@@ -46,9 +46,6 @@ NAMES_WITH_TIMES = ("run.json", "report.html", "dataset.json", "trials.sqlite")
 FITTED = ("design.yaml", "calibration.json", "calibration.html")
 """Files of a fit, whose numbers differ in their last digits: threads add up light in any order."""
 
-DIGITS = 4
-"""Significant digits to which the numbers of two fitted designs agree; they differ in the tenth."""
-
 
 @dataclass(frozen=True)
 class Work:
@@ -63,6 +60,7 @@ class Work:
             ``@CLUSTER`` stands for the address of the scheduler.
         prepare: makes what the command reads, in the folder that it runs in.
         varying: names of files whose content is another one each time, so only its form counts.
+        fits: whether the numbers of its result are fitted, and so depend on rounding.
         share: of the kills, relative to others; commands that take long get fewer.
     """
 
@@ -73,6 +71,7 @@ class Work:
     cluster: bool = False
     prepare: Callable[[Path], None] = lambda home: None
     varying: tuple[str, ...] = NAMES_WITH_TIMES
+    fits: bool = False
     share: float = 1.0
 
 
@@ -130,6 +129,7 @@ WORK: dict[str, Work] = {
         result=lambda folder: fit(folder),
         prepare=lambda home: photograph(home / "photographs"),
         varying=FITTED,
+        fits=True,
         share=0.7,
     ),
 }
@@ -158,21 +158,10 @@ def whole_files(
 
 
 def fit(folder: Path) -> dict[str, Any]:
-    """The design that was fitted, to some digits; and which values and files there are besides."""
+    """The design that was fitted, and which values and files there are besides."""
     told = json.loads((folder / "calibration.json").read_text(encoding="utf-8"))
-    design = rounded(ots.load(folder).model_dump(mode="json", exclude={"provenance"}))
+    design = ots.load(folder).model_dump(mode="json", exclude={"provenance"})
     return {"files": sorted(whole_files(folder)), "design": design, "told": sorted(told)}
-
-
-def rounded(value: Any) -> Any:
-    """Plain data with all numbers to `DIGITS`."""
-    if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
-    if isinstance(value, dict):
-        return {key: rounded(each) for key, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [rounded(each) for each in value]
-    return value
 
 
 def trials(folder: Path) -> dict[str, Any]:
