@@ -16,13 +16,9 @@ import math
 import os
 import re
 import stat
-import zipfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from optisense.errors import OptiSenseError
@@ -56,11 +52,6 @@ MOST_PROGRAM = 16 * MEBIBYTE
 
 MOST_TABLE = 512 * MEBIBYTE
 """Largest size of a CSV table, bytes: a dataset of a million samples has 300 MiB."""
-
-MOST_ARRAYS = 2048 * MEBIBYTE
-"""Largest size of the arrays of one file, unpacked, bytes: depth, normals and mask of a picture of
-100 million pixels have 1.7 GB.
-"""
 
 MOST_PICTURE = 512 * MEBIBYTE
 """Largest size of a PNG file, bytes: a picture of 100 million pixels, the largest that is made, has
@@ -103,7 +94,7 @@ def read_bytes(path: Path, most: int, error: Error, what: str = "the file") -> b
             if not stat.S_ISREG(found.st_mode):
                 kind = "a folder" if stat.S_ISDIR(found.st_mode) else "no regular file"
                 raise error(f"{what} is {kind}", where=str(path), hint="Name a file")
-            _refuse_size(found.st_size, most, path, error, what)
+            refuse_size(found.st_size, most, path, error, what)
             content = file.read(most + 1)
     except (OSError, ValueError) as failed:
         reason = failed.strerror if isinstance(failed, OSError) else None
@@ -112,7 +103,7 @@ def read_bytes(path: Path, most: int, error: Error, what: str = "the file") -> b
         ) from None
     except MemoryError:
         raise error(f"{what} does not fit into memory", where=str(path), hint=COPY_AGAIN) from None
-    _refuse_size(len(content), most, path, error, what)  # it may have grown meanwhile
+    refuse_size(len(content), most, path, error, what)  # it may have grown meanwhile
     return content
 
 
@@ -131,7 +122,7 @@ def check_size(path: Path, most: int, error: Error, what: str = "the file") -> N
         ) from None
     if not stat.S_ISREG(found.st_mode):
         raise error(f"{what} is no regular file", where=str(path), hint="Name a file")
-    _refuse_size(found.st_size, most, path, error, what)
+    refuse_size(found.st_size, most, path, error, what)
 
 
 def read_text(path: Path, most: int, error: Error, what: str = "the file") -> str:
@@ -273,84 +264,6 @@ def is_folder(path: Path) -> bool:
         return False
 
 
-def read_arrays(
-    path: Path, error: Error, most: int = MOST_ARRAYS, what: str = "the arrays"
-) -> dict[str, NDArray[Any]]:
-    """Return the arrays of an NPZ file by name; pickled objects in it are refused.
-
-    Args:
-        path: path of the file.
-        error: class of the error that is raised.
-        most: largest size of all arrays together, unpacked, bytes.
-        what: word for the arrays in messages.
-
-    Raises:
-        error: the file is missing, truncated, damaged, or too large once it is unpacked.
-    """
-    data = read_bytes(path, most, error, what)
-    try:
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            unpacked = sum(member.file_size for member in archive.infolist())
-        _refuse_size(unpacked, most, path, error, what)
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        for name, array in arrays.items():
-            if not isinstance(array, np.ndarray):  # NumPy returns other members as bytes
-                raise ValueError(f"'{brief(name)}' is no array")
-        return arrays
-    except OptiSenseError:
-        raise
-    except Exception as found:  # zipfile, zlib and NumPy raise many kinds on malformed files
-        raise _damaged(path, error, what, found) from None
-
-
-def read_array(path: Path, error: Error, most: int = MOST_ARRAYS) -> NDArray[Any]:
-    """Return the array of an NPY file; pickled objects in it are refused.
-
-    Raises:
-        error: the file is missing, truncated or damaged.
-    """
-    data = read_bytes(path, most, error, "the array")
-    try:
-        return np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-    except Exception as found:  # NumPy raises many kinds on malformed files
-        raise _damaged(path, error, "the array", found) from None
-
-
-def check_arrays(
-    arrays: Mapping[str, NDArray[Any]],
-    kinds: Mapping[str, tuple[str, int | None]],
-    size: tuple[int, int],
-    path: Path,
-    error: Error,
-) -> None:
-    """Check that all arrays of a picture exist, and have the right type and size.
-
-    Args:
-        arrays: arrays by name.
-        kinds: required arrays by name: the allowed types, as NumPy's `dtype.kind`, and the number
-            of channels (None for an array without a channel axis).
-        size: height and width.
-        path: path of their file, for messages.
-        error: class of the error that is raised.
-
-    Raises:
-        error: an array is missing, or of another type or shape.
-    """
-    for name, (types, channels) in kinds.items():
-        if name not in arrays:
-            raise error(f"the array '{name}' is missing", where=str(path), hint=COPY_AGAIN)
-        array = arrays[name]
-        wanted = (*size, *(() if channels is None else (channels,)))
-        if array.dtype.kind not in types or array.shape != wanted:
-            raise error(
-                f"the array '{name}' is of {array.dtype} and has the shape {array.shape}, not "
-                f"{wanted}",
-                where=str(path),
-                hint=COPY_AGAIN,
-            )
-
-
 def first_problem(error: ValidationError) -> str:
     """Return the first problem of values that a pydantic model refuses, with its place among
     them.
@@ -369,7 +282,8 @@ def first_problem(error: ValidationError) -> str:
     return f"'{place}'{shown}: {text}{more}"
 
 
-def _damaged(path: Path, error: Error, what: str, found: Exception) -> OptiSenseError:
+def damaged(path: Path, error: Error, what: str, found: Exception) -> OptiSenseError:
+    """Return the error for a file whose content can't be parsed."""
     return error(
         f"can't read {what}: the file is cut off or damaged ({found or type(found).__name__})",
         where=str(path),
@@ -377,7 +291,8 @@ def _damaged(path: Path, error: Error, what: str, found: Exception) -> OptiSense
     )
 
 
-def _refuse_size(size: int, most: int, path: Path, error: Error, what: str) -> None:
+def refuse_size(size: int, most: int, path: Path, error: Error, what: str) -> None:
+    """Raise an error if a size in bytes is larger than `most`."""
     if size > most:
         raise error(
             f"{what} has {size / MEBIBYTE:,.0f} MiB; at most {most // MEBIBYTE:,} MiB are read",

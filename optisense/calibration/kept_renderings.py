@@ -21,7 +21,7 @@ from optisense.design import SensorDesign
 from optisense.design.difference import fingerprint
 from optisense.errors import CalibrationError
 from optisense.geometry import Contact
-from optisense.untrusted_files import read_arrays
+from optisense.untrusted_arrays import read_arrays
 from optisense.version import __version__
 from optisense.writing import written_whole
 

@@ -23,12 +23,12 @@ from optisense.geometry import Sphere
 from optisense.geometry.contact_text import parse_indenter
 from optisense.picture_files import decode_picture
 from optisense.text import brief
+from optisense.untrusted_arrays import read_arrays
 from optisense.untrusted_files import (
     MOST_PICTURE,
     inside,
     is_file,
     is_folder,
-    read_arrays,
     read_bytes,
     read_table,
 )

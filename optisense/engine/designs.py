@@ -23,8 +23,9 @@ from optisense.library import names
 from optisense.near import near_match
 from optisense.sensors import load
 from optisense.text import brief
+from optisense.untrusted_arrays import read_array
 from optisense.untrusted_files import inside as inside_folder
-from optisense.untrusted_files import is_file, is_folder, read_array
+from optisense.untrusted_files import is_file, is_folder
 
 MOST_MESHES = 200
 """Largest number of mesh files that are kept; the one not used for longest is dropped first.

@@ -15,12 +15,11 @@ from optisense.picture_files import read_picture
 from optisense.tasks.dataset_tables import INFO, LABELS, read_failures, read_info, read_labels
 from optisense.tasks.splits import SPLITS
 from optisense.text import brief
+from optisense.untrusted_arrays import check_arrays, read_arrays
 from optisense.untrusted_files import (
     COPY_AGAIN,
-    check_arrays,
     inside,
     is_file,
-    read_arrays,
 )
 
 BACKGROUND = "background.npz"
