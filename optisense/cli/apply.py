@@ -21,12 +21,14 @@ def apply(
     out: Annotated[
         Path,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="The folder to make; it must not exist or be empty."
+            "--out", "-o", metavar="DIR", help="The folder to write; it must be new or empty."
         ),
     ],
-    trial: Annotated[str, typer.Option(metavar="best|start|NUMBER", help="Which trial.")] = "best",
+    trial: Annotated[
+        str, typer.Option(metavar="best|start|NUMBER", help="The trial whose design is written.")
+    ] = "best",
 ) -> None:
-    """Write the better design that a search has found."""
+    """Write the design that a search has found into a folder."""
     from optisense.search import Study
     from optisense.search.study.applied import design_of
     from optisense.sensors import save_design

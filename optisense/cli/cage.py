@@ -39,8 +39,9 @@ MoveOption = Annotated[
         "--point",
         "-p",
         metavar="WHICH=DX,DY,DZ",
-        help="Which points, and by how many mm: 13=0,0,6 or 1,1,2=0,0,6; a * stands for all "
-        "along an axis, as in 1,*,2=0,0,6. May be given several times.",
+        help="A control point, by its number or its indices along x, y and z, and its "
+        "displacement in mm: 13=0,0,6 or 1,1,2=0,0,6. A * stands for all points along "
+        "an axis, as in 1,*,2=0,0,6. May be given several times.",
     ),
 ]
 
@@ -51,7 +52,11 @@ def show(
     design: DesignArgument,
     cage: Annotated[
         str | None,
-        typer.Argument(metavar="[CAGE]", help="One cage, with its points.", show_default=False),
+        typer.Argument(
+            metavar="[CAGE]",
+            help="The name of a cage, whose control points are listed; all cages if left out.",
+            show_default=False,
+        ),
     ] = None,
 ) -> None:
     """List the cages of a design, or the control points of one."""
@@ -78,17 +83,24 @@ def add(
         list[str],
         typer.Option(
             metavar="PART",
-            help="What it deforms. May be given several times: parts that touch move together.",
+            help="A part that the cage deforms. May be given several times; put parts that "
+            "touch into one cage.",
         ),
     ],
     resolution: Annotated[
-        str, typer.Option(metavar="NXxNYxNZ", help="Control points along x, y and z.")
+        str, typer.Option(metavar="NXxNYxNZ", help="Number of control points along x, y and z.")
     ] = "3x3x3",
     margin: Annotated[
-        float, typer.Option(min=0.0, max=100.0, metavar="MM", help="Room around the parts.")
+        float,
+        typer.Option(
+            min=0.0,
+            max=100.0,
+            metavar="MM",
+            help="Distance between the parts and the sides of the cage, mm.",
+        ),
     ] = 0.0,
 ) -> None:
-    """Put a cage at rest around parts; it changes no shape."""
+    """Put a cage around parts. Their shapes do not change until you move its points."""
     from optisense.design.cage_edit import add_cage
     from optisense.sensors import load
 
@@ -100,7 +112,7 @@ def add(
 @cage_app.command("remove")
 @ends_well
 def remove(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
-    """Take a cage away: its parts are at rest again."""
+    """Remove a cage. Its parts get their undeformed shapes back."""
     from optisense.design.cage_edit import remove_cage
     from optisense.sensors import load
 
@@ -114,7 +126,7 @@ def refine(
     cage: CageArgument,
     out: OutOption,
     resolution: Annotated[
-        str, typer.Option(metavar="NXxNYxNZ", help="Control points along x, y and z.")
+        str, typer.Option(metavar="NXxNYxNZ", help="Number of control points along x, y and z.")
     ],
 ) -> None:
     """Give a cage more control points; the shape stays exactly the same."""
@@ -134,7 +146,10 @@ def move(
     point: MoveOption,
     of: Annotated[
         str,
-        typer.Option(metavar="points|c_min|c_max", help="Move the shape, or an end of its range."),
+        typer.Option(
+            metavar="points|c_min|c_max",
+            help="What moves: the present shape (points), or an end of its range.",
+        ),
     ] = "points",
 ) -> None:
     """Move control points. A shape that folds or cuts into other parts is not written."""
@@ -161,8 +176,8 @@ def set_range(
         typer.Option(
             "--min",
             metavar="WHICH=DX,DY,DZ",
-            help="How c_min differs from the shape as it is now, in mm. May be given several "
-            "times.",
+            help="A displacement of c_min relative to the present shape, in mm, written as for "
+            "`cage move`. May be given several times.",
             show_default=False,
         ),
     ] = None,
@@ -171,16 +186,21 @@ def set_range(
         typer.Option(
             "--max",
             metavar="WHICH=DX,DY,DZ",
-            help="How c_max differs from the shape as it is now.",
+            help="The same for c_max.",
             show_default=False,
         ),
     ] = None,
     blend: Annotated[
         float,
-        typer.Option(min=0.0, max=1.0, metavar="A", help="The shape: 0 is c_min, 1 is c_max."),
+        typer.Option(
+            min=0.0,
+            max=1.0,
+            metavar="A",
+            help="The present shape between both ends: 0 is c_min, 1 is c_max.",
+        ),
     ] = 0.0,
 ) -> None:
-    """Give a cage two ends, c_min and c_max, between which a search may choose."""
+    """Give a cage two end shapes, c_min and c_max, between which a search may vary it."""
     from optisense.design import cage_edit
     from optisense.sensors import load
 
@@ -205,7 +225,7 @@ def blend(
     ],
     out: OutOption,
 ) -> None:
-    """Set a shape between c_min and c_max, the same share for all control points."""
+    """Set the shape between c_min and c_max, with the same share for all control points."""
     from optisense.design import get_value
     from optisense.design.cage_edit import set_range
     from optisense.sensors import load
@@ -226,7 +246,7 @@ def blend(
 @cage_app.command("settle")
 @ends_well
 def settle(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
-    """Turn a blend of c_min and c_max into points of its own, to move them; the range stays."""
+    """Turn a blend of c_min and c_max into control points that can be moved; the range stays."""
     from optisense.design.cage_edit import settle_cage
     from optisense.sensors import load
 

@@ -39,9 +39,9 @@ def calibrate(
 ) -> None:
     """Fit a design to photographs of the real sensor.
 
-    Writes the fitted design, calibration.json and calibration.html into the folder. Some
-    presses are held out of the fit and only judged. Renderings are kept in the folder until the
-    end: the same command goes on where an interrupted one was.
+    Writes the fitted design, calibration.json and calibration.html into the folder. Some presses
+    are held out of the fit and test the result. If the command was interrupted, the same command
+    continues from the renderings that it kept in the folder.
     """
     with progress_line(TimedStep(LOADING, 1, 3.0), TimedStep(FITTING, 20, 100.0)) as line:
         line.begin(LOADING)

@@ -21,7 +21,7 @@ in sight.
 
 @ends_well
 def check(design: DesignArgument, contact: ContactOption = None) -> None:
-    """Check a design, and whether contacts can press its skin, without rendering."""
+    """Check a design, and whether contacts can be pressed into its skin, without rendering."""
     contacts = parse_contacts(contact)
 
     from optisense import sensors

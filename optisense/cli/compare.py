@@ -44,10 +44,11 @@ def compare(
     as_json: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Tell how far a design is from photographs of the real sensor.
+    """Measure how much a design differs from photographs of the real sensor.
 
-    Presses the balls of the photographs into the model, at the same places and as wide, and
-    compares the pictures: in the contact, in the ring around it, far away, and the background.
+    The balls of the photographs are pressed into the model, at the same places and with contacts of
+    the same size. The pictures are compared in the contact, in the ring around it, far from it, and
+    without contact.
     """
     if out is not None and out.is_dir():
         raise typer.BadParameter(f"'{out}' is a folder", param_hint="--out")

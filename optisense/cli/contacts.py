@@ -19,9 +19,9 @@ def contacts(
     *,
     options: PhotographOptions,
 ) -> None:
-    """Find the contacts in photographs of a real sensor, to correct them on a page.
+    """Find the contacts in photographs of a real sensor, and write a page to correct them on.
 
-    On the page, circles can be dragged, and its button saves presses.csv.
+    On the page you can drag the circles around the contacts, and save them as presses.csv.
     """
     if out.is_dir():
         raise typer.BadParameter(f"'{out}' is a folder", param_hint="--out")

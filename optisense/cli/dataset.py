@@ -42,7 +42,9 @@ def dataset(
     out: Annotated[Path, out_option("Folder of the dataset; a new one, or one to go on.")],
     count: Annotated[
         int,
-        typer.Option("--count", "-n", min=1, max=MOST_THINGS, metavar="N", help="Samples in all."),
+        typer.Option(
+            "--count", "-n", min=1, max=MOST_THINGS, metavar="N", help="Total number of samples."
+        ),
     ] = 100,
     *,
     options: DatasetOptions,
@@ -50,8 +52,7 @@ def dataset(
         bool,
         typer.Option(
             "--mend",
-            help="Read all samples that are there, and make those again whose files are missing or "
-            "damaged.",
+            help="Check all existing samples, and make those with missing or damaged files again.",
         ),
     ] = False,
     parquet: Annotated[
@@ -64,15 +65,17 @@ def dataset(
     licence: Annotated[
         str | None,
         typer.Option(
-            metavar="ID", help="For the card of the dataset, such as cc-by-4.0.", show_default=False
+            metavar="ID",
+            help="Licence that the card of the dataset names, such as cc-by-4.0.",
+            show_default=False,
         ),
     ] = None,
     variant: VariantOption = "auto",
 ) -> None:
     """Make a dataset of random contacts: pictures, depth, normals, masks and labels.
 
-    Stopped at any moment, the same command continues it. A folder that was begun with other
-    settings is left alone.
+    If it was stopped, the same command continues it. A folder that was begun with other settings is
+    not changed.
     """
 
     def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:

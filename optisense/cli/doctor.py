@@ -38,7 +38,7 @@ class Finding:
 
 @ends_well
 def doctor() -> None:
-    """Check that this machine has what rendering needs, and say what to do where it hasn't."""
+    """Check that this machine has what rendering needs, and say how to install what is missing."""
     ill = False
     for finding in examine():
         ill = ill or finding.state == "bad"

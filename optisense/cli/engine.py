@@ -10,7 +10,7 @@ from optisense.cli.console import EXIT_INTERRUPTED, messages
 
 
 def engine() -> None:
-    """Serve a front end at standard input and output, by lines of JSON (see docs/engine.md)."""
+    """Serve a front end on standard input and output, with lines of JSON (see docs/engine.md)."""
     if sys.stdin.isatty():
         messages.print(
             "this is for programs: they write requests to its standard input, one JSON object a "

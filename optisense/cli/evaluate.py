@@ -57,8 +57,8 @@ def evaluate(
 ) -> None:
     """Score a sensor: how well its images tell the shape of what touches it.
 
-    Objectives share images and rays. One that fails says why, the others go on, and the exit
-    code is 1.
+    Objectives share images and rays. If one fails, the output says why, the others are still
+    evaluated, and the exit code is 1.
     """
     if report and out is None:
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")

@@ -23,13 +23,13 @@ def export(
             "--format",
             "-f",
             metavar="|".join(FORMATS.names()),
-            help="Of the parts' shapes; may be given several times. STL when left out. STEP needs "
-            "the extra 'step'.",
+            help="File format of the parts' shapes; stl if left out. May be given several "
+            "times. step needs the extra 'step'.",
             show_default=False,
         ),
     ] = None,
     moulds: Annotated[
-        bool, typer.Option("--moulds", help="Also the moulds in which the gels are cast.")
+        bool, typer.Option("--moulds", help="Also write the moulds in which the gels are cast.")
     ] = False,
 ) -> None:
     """Export a design to the workshop: its parts in mm, its LEDs and a bill of materials.

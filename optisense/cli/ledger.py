@@ -41,8 +41,8 @@ def ledger(
         list[str] | None,
         typer.Option(
             metavar="U,V",
-            help="Also tell why it is bright or dark at this place of the skin, mm from the "
-            "camera's axis to the right and to the top. May be given several times.",
+            help="Also explain the light at this point of the skin, in mm from the camera's "
+            "axis to the right and to the top of the picture. May be given several times.",
             show_default=False,
         ),
     ] = None,
@@ -51,11 +51,11 @@ def ledger(
     ] = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Tell where the light of each group goes: to the skin, into which part, or out of which.
+    """Show where the light of each group goes: to the skin, into which part, or out of which.
 
-    In per cent of the power of each group, nothing pressed in. The lines add up to 100 %. With --at
-    it also tells why it is dark, or bright, at a place: which groups light it, on which ways and
-    from where.
+    The table is in per cent of the power of each group, without contacts; its lines add up to
+    100 %. --at also explains why a point of the skin is dark or bright: which groups light it, what
+    their light has met on its way, and from where it comes.
     """
     with progress_line() as line:
         line.say("loading")

@@ -40,7 +40,7 @@ def list_entries(
         typer.Argument(metavar="[KIND]", help=f"One of: {', '.join(KINDS)}.", show_default=False),
     ] = None,
 ) -> None:
-    """List what the library holds, your own parts included."""
+    """List the entries of the library, including your own."""
     from optisense import library
     from optisense.library.facts import summary
 
@@ -66,20 +66,28 @@ def list_entries(
 @library_app.command("show")
 @ends_well
 def show_entry(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="As `library list` shows it.")],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="The name of the entry, as `library list` shows it."),
+    ],
     out: Annotated[
         Path | None,
         typer.Option(
             "--out",
             "-o",
             metavar="FILE.png",
-            help="Draw it: a material's ball, a light's intensity, a camera's field.",
+            help="Also draw the entry into this file: a ball of a material or coating, the "
+            "intensity of a light by angle, or the field of view of a camera.",
             show_default=False,
         ),
     ] = None,
     as_yaml: Annotated[
         bool,
-        typer.Option("--yaml", help="Print the entry as a file to change and `library add`."),
+        typer.Option(
+            "--yaml",
+            help="Print the entry as a YAML file, which can be changed and added with `library "
+            "add`.",
+        ),
     ] = False,
 ) -> None:
     """Show an entry with the sources of its numbers, and draw it."""
@@ -126,7 +134,9 @@ def add_entry(
     kind: KindOption = None,
     name: Annotated[
         str | None,
-        typer.Option(metavar="NAME", help="What designs call it; else the file's name."),
+        typer.Option(
+            metavar="NAME", help="Name of the entry in designs; the file's name if left out."
+        ),
     ] = None,
     colour: Annotated[
         str | None,
@@ -138,10 +148,10 @@ def add_entry(
         float | None, typer.Option(metavar="MW", help="With an .ies: radiant flux in mW.")
     ] = None,
     wavelength: Annotated[
-        float | None, typer.Option(metavar="NM", help="With an .ies: dominant wavelength.")
+        float | None, typer.Option(metavar="NM", help="With an .ies: dominant wavelength in nm.")
     ] = None,
     current: Annotated[
-        float | None, typer.Option(metavar="MA", help="With an .ies: its current at this flux.")
+        float | None, typer.Option(metavar="MA", help="With an .ies: current in mA at this flux.")
     ] = None,
     window: Annotated[
         str | None,
@@ -169,22 +179,25 @@ def add_entry(
         Path | None,
         typer.Option(
             metavar="FILE.json",
-            help="libcamera's tuning file of a camera: noise, shading, colours, tone curve.",
+            help="A tuning file of libcamera, from which noise, shading, colours and tone "
+            "curve are read.",
             show_default=False,
         ),
     ] = None,
     like: Annotated[
         str | None,
         typer.Option(
-            metavar="NAME", help="With --tuning: library camera whose view and pixels it has."
+            metavar="NAME",
+            help="With --tuning: the camera of the library whose field of view and pixels the "
+            "new entry takes.",
         ),
     ] = None,
     temperature: Annotated[
         float | None,
-        typer.Option(metavar="K", help="With --tuning: colour temperature; 5000 by default."),
+        typer.Option(metavar="K", help="With --tuning: colour temperature in K; 5000 if left out."),
     ] = None,
 ) -> None:
-    """Check a part of your own and store it in your library folder.
+    """Check an entry of your own and store it in your library folder.
 
     The folder is $OPTISENSE_LIBRARY, or else optisense/library in your configuration folder.
     """

@@ -26,7 +26,7 @@ def new(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A built-in sensor, such as gelsight-mini; left out with --from-meshes.",
+            help="A built-in sensor, such as gelsight-mini. Leave it out with --from-meshes.",
             show_default=False,
         ),
     ],
@@ -34,7 +34,7 @@ def new(
         Path | None,
         typer.Argument(
             metavar="DIR",
-            help="The folder to make; it must not exist or be empty.",
+            help="The folder to write; it must be new or empty.",
             show_default=False,
         ),
     ] = None,
@@ -53,7 +53,8 @@ def new(
         str | None,
         typer.Option(
             metavar="|".join(UNITS),
-            help="With --from-meshes: of files that don't know their units; mm when left out.",
+            help="With --from-meshes: unit of the files that do not contain one (STL, OBJ, "
+            "PLY); mm if left out.",
             show_default=False,
         ),
     ] = None,
@@ -70,11 +71,11 @@ def new(
         bool,
         typer.Option(
             "--overwrite",
-            help="Write a design that is in DIR anew: design.yaml, its meshes and recipe.",
+            help="Overwrite the design in DIR: design.yaml, its meshes and its recipe.",
         ),
     ] = False,
 ) -> None:
-    """Start a design of your own from a built-in sensor, or from CAD files."""
+    """Make a design of your own from a built-in sensor, or from CAD files."""
     if from_meshes is None:
         if units is not None or yes:
             raise typer.BadParameter("goes with --from-meshes", param_hint="--units, --yes")

@@ -46,13 +46,14 @@ VariantOption = Annotated[
     str,
     typer.Option(
         metavar="auto|llvm|cuda",
-        help="Render on the processor (llvm) or a GPU (cuda).",
+        help="Where to render: on the processor (llvm), on an NVIDIA GPU (cuda), or on a "
+        "GPU if there is one (auto).",
         callback=parse_variant,
     ),
 ]
 
 WorkersOption = Annotated[
-    int, typer.Option(min=1, max=1024, metavar="N", help="Processes on this machine.")
+    int, typer.Option(min=1, max=1024, metavar="N", help="Number of processes on this machine.")
 ]
 
 

@@ -44,7 +44,7 @@ def render(
     """Render what the sensor's camera sees, with or without contacts.
 
     Writes image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr, run.json and
-    report.html into the folder. Ctrl-C stops early and writes what there is.
+    report.html into the folder. Ctrl-C stops early and writes the result so far.
     """
     size = options.resolution
     if options.noise is not None and options.seconds is not None:

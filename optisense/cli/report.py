@@ -48,23 +48,37 @@ def report(
     *,
     options: BeforeAndAfterOptions,
     pictures: Annotated[
-        bool, typer.Option(help="Render the sensor as it was and as it is best, and trials.")
+        bool,
+        typer.Option(
+            help="Render pictures of the sensor before and after the search, and of some trials."
+        ),
     ] = True,
     trial_pictures: Annotated[
         int,
         typer.Option(
-            metavar="N", min=0, max=MOST_PICTURES, help="Trials whose pictures a click shows."
+            metavar="N",
+            min=0,
+            max=MOST_PICTURES,
+            help="Number of trials whose pictures the page shows on a click.",
         ),
     ] = FEW_PICTURES,
     watch: Annotated[
         bool,
-        typer.Option("--watch", help="Serve the page on this machine, and keep it up to date."),
+        typer.Option(
+            "--watch", help="Serve the page on this machine, and update it while the search runs."
+        ),
     ] = False,
     port: Annotated[
-        int, typer.Option(metavar="N", min=0, max=65535, help="For --watch; 0 takes a free one.")
+        int,
+        typer.Option(
+            metavar="N",
+            min=0,
+            max=65535,
+            help="With --watch: the port to serve at; 0 takes a free one.",
+        ),
     ] = 0,
 ) -> None:
-    """Write a study as one HTML page: how the search went, what it found, and the trials.
+    """Write an HTML page about a search: its course, its result, and the trials.
 
     A search may still be running: the page shows the trials so far.
     """

@@ -54,20 +54,19 @@ def search(
         str | None,
         typer.Option(
             metavar="ADDRESS",
-            help="A Dask scheduler whose workers do the trials, such as tcp://192.0.2.7:8786.",
+            help="The address of a Dask scheduler whose workers run the trials, such as "
+            "tcp://192.0.2.7:8786.",
             show_default=False,
         ),
     ] = None,
     out: Annotated[Path | None, out_option("The study's folder.", "STUDY")] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the study in --out.")
-    ] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the study in --out.")] = False,
     trust: Annotated[
         bool,
         typer.Option(
             "--trust",
-            help="With --resume: run the Python files that the study names, also where it was not "
-            "begun by you on this machine and you don't name them again.",
+            help="With --resume: run the Python files that the study names, even if you did "
+            "not begin it on this machine and do not name them again.",
         ),
     ] = False,
     variant: VariantOption = "auto",
@@ -75,9 +74,9 @@ def search(
         bool | None,
         typer.Option(
             "--verify/--no-verify",
-            help="Whether to tell at the end, with `optisense verify --quick`, if the best design "
-            f"reads better than the start; when left out, after {VERIFIED_FROM / 60:.0f} minutes "
-            "of searching or more.",
+            help="Whether to run `optisense verify --quick` at the end, which tests whether the "
+            "best design reads better than the start; if left out, only after "
+            f"{VERIFIED_FROM / 60:.0f} minutes of searching or more.",
             show_default=False,
         ),
     ] = None,
@@ -88,8 +87,8 @@ def search(
 ) -> None:
     """Search for a better design.
 
-    Every trial is kept in the study's folder as it finishes. A search that was stopped, or killed,
-    goes on with --resume exactly as it would have without.
+    Every finished trial is saved in the study's folder. With --resume, a search that was stopped or
+    killed continues with exactly the same trials.
     """
     if methods:
         _print_methods()

@@ -32,7 +32,7 @@ def studio(
         str | None,
         typer.Argument(
             metavar="[DESIGN]",
-            help="A built-in sensor's name or the folder of a design, to open at once.",
+            help="A built-in sensor's name or the folder of a design, which Blender opens.",
             show_default=False,
         ),
     ] = None,
@@ -40,7 +40,8 @@ def studio(
         Path | None,
         typer.Option(
             metavar="PATH",
-            help="Blender's executable; else the search path and the usual places are looked in.",
+            help="Blender's executable; if left out, it is looked for on the search path and "
+            "in the usual places.",
             show_default=False,
         ),
     ] = None,
@@ -55,7 +56,7 @@ def studio(
     ] = None,
     start: Annotated[bool, typer.Option(help="Start Blender after installing.")] = True,
 ) -> None:
-    """Install the extension in Blender, and start Blender with it."""
+    """Install the extension in Blender, and start Blender."""
     if archive is not None:
         if archive.suffix.lower() != ".zip":
             raise typer.BadParameter(f"'{archive}' must end in .zip", param_hint="--zip")

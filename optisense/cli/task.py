@@ -37,7 +37,7 @@ RESULT = "result.json"
 FIGURE = "figure.png"
 
 task_app = typer.Typer(
-    help="Press known things into a sensor and see how well its pictures tell them.",
+    help="Measure how well angles, radii, forces or shapes can be read from a sensor's pictures.",
     no_args_is_help=True,
 )
 
@@ -76,14 +76,21 @@ def misalignment(
     design: DesignArgument,
     angle: Annotated[
         float,
-        typer.Option("--range", min=0.1, max=44.0, metavar="DEGREES", help="The largest angle."),
+        typer.Option(
+            "--range", min=0.1, max=44.0, metavar="DEGREES", help="The largest angle, degrees."
+        ),
     ] = 10.0,
     depth: Annotated[
-        float, typer.Option(min=0.01, metavar="MM", help="Of the plane, in the middle.")
+        float, typer.Option(min=0.01, metavar="MM", help="Depth of the plane in the middle, mm.")
     ] = 0.8,
     crop: Annotated[
         float,
-        typer.Option(min=0.01, max=1.0, metavar="PART", help="Of the picture that is averaged."),
+        typer.Option(
+            min=0.01,
+            max=1.0,
+            metavar="PART",
+            help="Share of the picture's width and height whose colours are averaged.",
+        ),
     ] = 0.25,
     *,
     options: SampleOptions,
@@ -91,7 +98,7 @@ def misalignment(
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """The angle between the sensor and a plane, from the mean colour in the middle."""
+    """Estimate the angle between the sensor and a plane, from the mean colour in the middle."""
 
     def task() -> PerceptionTask:
         return tasks.Misalignment(range=angle, depth=depth, crop=crop)
@@ -103,14 +110,16 @@ def misalignment(
 @ends_well
 def cylinder_radius(
     design: DesignArgument,
-    depth: Annotated[float, typer.Option(min=0.01, metavar="MM", help="The same for all.")] = 0.5,
+    depth: Annotated[
+        float, typer.Option(min=0.01, metavar="MM", help="Depth of all presses, mm.")
+    ] = 0.5,
     *,
     options: CylinderOptions,
     out: OutOption = None,
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """The radius of a touching cylinder, from the spread of colours in the contact."""
+    """Estimate the radius of a cylinder, from the standard deviation of colours in the contact."""
     least, most = options.radius
 
     def task() -> PerceptionTask:
@@ -123,9 +132,14 @@ def cylinder_radius(
 @ends_well
 def force(
     design: DesignArgument,
-    ball: Annotated[float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball.")] = 3.0,
+    ball: Annotated[
+        float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball, mm.")
+    ] = 3.0,
     depth: Annotated[
-        float, typer.Option(min=0.11, metavar="MM", help="The deepest press; the least is 0.1 mm.")
+        float,
+        typer.Option(
+            min=0.11, metavar="MM", help="The largest depth of a press, mm; the smallest is 0.1 mm."
+        ),
     ] = 1.0,
     *,
     options: SampleOptions,
@@ -133,7 +147,7 @@ def force(
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """The force on a pressing ball, from the spread of colours in the picture."""
+    """Estimate the force on a pressed ball, from the standard deviation of the colours."""
 
     def task() -> PerceptionTask:
         return tasks.BallForce(radius=ball, most=depth)
@@ -145,12 +159,20 @@ def force(
 @ends_well
 def shear(
     design: DesignArgument,
-    ball: Annotated[float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball.")] = 3.0,
+    ball: Annotated[
+        float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball, mm.")
+    ] = 3.0,
     depth: Annotated[
-        float, typer.Option(min=0.41, metavar="MM", help="The deepest press; the least is 0.4 mm.")
+        float,
+        typer.Option(
+            min=0.41, metavar="MM", help="The largest depth of a press, mm; the smallest is 0.4 mm."
+        ),
     ] = 1.0,
     drag: Annotated[
-        float, typer.Option(min=0.01, metavar="MM", help="The longest way that it is dragged.")
+        float,
+        typer.Option(
+            min=0.01, metavar="MM", help="The largest distance by which the ball is dragged, mm."
+        ),
     ] = 0.4,
     *,
     options: SampleOptions,
@@ -158,7 +180,7 @@ def shear(
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """The shear force of a dragged ball, from the motion of the markers in the picture."""
+    """Estimate the shear force on a dragged ball, from the motion of the markers in the picture."""
 
     def task() -> PerceptionTask:
         return tasks.BallShear(radius=ball, most=depth, farthest=drag)
@@ -176,7 +198,7 @@ def snr(
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """The signal-to-noise ratio of both tasks' samples: how well colours tell, with no model."""
+    """Compute the signal-to-noise ratio of the samples of angle and radius, without a model."""
     both: dict[str, Callable[[], PerceptionTask]] = {
         "misalignment": lambda: tasks.Misalignment(),
         "cylinder-radius": lambda: tasks.CylinderRadius(),
@@ -204,7 +226,7 @@ def reconstruction(
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Shapes from pictures: errors of normals (degrees) and depth (mm) on unseen objects."""
+    """Reconstruct shapes of objects: errors of normals (degrees) and depth (mm)."""
     contacts = dict(zip(thing or [], parse_contacts(thing), strict=True)) or None
 
     count = options.presses + (len(contacts) if contacts is not None else USUAL_OBJECTS)

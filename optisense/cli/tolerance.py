@@ -47,17 +47,18 @@ def tolerance(
     workers: WorkersOption = 1,
     out: Annotated[Path | None, out_option("Folder for tolerance.json.")] = None,
     report: Annotated[
-        bool, typer.Option("--report", help="Also write tolerance.html, with figures, into it.")
+        bool,
+        typer.Option("--report", help="Also write tolerance.html, with figures, into the folder."),
     ] = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print JSON with every score instead of tables.")
     ] = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Tell how a design's score spreads when sensors come out a little other than designed.
+    """Compute how much manufacturing errors change a design's scores.
 
-    P10 is what nine of ten sensors reach. Each error's share in the variance tells which one
-    matters most.
+    P10 is the score that nine of ten manufactured sensors reach. The share of each error in the
+    variance says which error matters most.
     """
     if report and out is None:
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")

@@ -57,7 +57,7 @@ def verify(
         ),
     ] = None,
     trial: Annotated[
-        str, typer.Option(metavar="best|NUMBER", help="Which trial of a study.")
+        str, typer.Option(metavar="best|NUMBER", help="With a study: the trial that is compared.")
     ] = "best",
     *,
     options: VerifyOptions,
@@ -65,10 +65,10 @@ def verify(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Tell whether a sensor reads better than another, by objects that no score has seen.
+    """Test whether a sensor reads better than another, on objects that no score uses.
 
-    Both are calibrated with balls, and screws, coins, letters and other things are then pressed
-    into both at the same places. The errors of what is read of them decide.
+    Both sensors are calibrated with presses of balls. Then screws, coins, letters and other objects
+    are pressed into both at the same places, and the errors of the normals and depth decide.
     """
     compared = compare(first, second, trial, options, out, variant)
     if as_json:

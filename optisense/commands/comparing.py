@@ -20,19 +20,23 @@ class PhotographOptions(CommandOptions):
     """Options of how photographs are read."""
 
     ball: Annotated[float, Ge(0.01), Le(LARGEST_BALL), Written("MM")] | None = Field(
-        None, description="Diameter of the ball, where the photographs' folder does not say it."
+        None,
+        description="Diameter of the ball in mm; needed if the folder of photographs does not say "
+        "it.",
     )
     as_labelled: bool = Field(
         False,
-        description="Take labelled contacts as they are, instead of looking for them near their "
-        "labels.",
+        description="Use labelled contacts as they are; by default they are searched for near "
+        "their labels.",
     )
 
 
 class CompareOptions(PhotographOptions):
     """Options of a comparison of a design with photographs."""
 
-    photons: Photons = Field(PICTURE_PHOTONS, description="Photons to trace for the pictures.")
+    photons: Photons = Field(
+        PICTURE_PHOTONS, description="Photons to trace for the pictures of the model."
+    )
     seed: Seed = Field(0, description="The same seed gives the same light.")
 
 
@@ -41,28 +45,28 @@ class CalibrateOptions(PhotographOptions):
 
     keep: Annotated[list[str], Written("NAME")] = Field(
         [],
-        description="What stays as it is: powers, colours, tone, black, shading or view. May be "
-        "given several times.",
+        description="What the fit does not change: powers, colours, tone, black, shading or view. "
+        "May be given several times.",
     )
     also: Annotated[list[str], Written("NAME")] = Field(
         [],
-        description="What may change besides: lights, emission, edges, coating, gel or indices. "
+        description="What the fit also changes: lights, emission, edges, coating, gel or indices. "
         "May be given several times.",
     )
     fit: Annotated[list[str], Written("PATH=LO:HI")] = Field(
         [],
-        description="A further number of the design that may change, and its range. May be given "
-        "several times.",
+        description="Another number of the design that the fit changes, and its range, such as "
+        "coating.specularity=0:0.4. May be given several times.",
     )
     hold_out: Annotated[list[str], Written("PRESS")] = Field(
         [],
-        description="A press that is held out of the fit and only judged, by its file's name; "
-        "every third one if none is named. May be given several times.",
+        description="The file name of a press that the fit does not use, and that tests the "
+        "result; every third press if none is named. May be given several times.",
     )
     rounds: Annotated[int, Ge(1), Le(20), Written("N")] = Field(
-        3, description="Rounds of rendering and fitting."
+        3, description="Number of rounds of rendering and fitting."
     )
-    photons: Photons = Field(300_000, description="Photons to trace for each round.")
+    photons: Photons = Field(300_000, description="Photons to trace in each round.")
     seed: Seed = Field(0, description="The same seed gives the same light.")
 
 

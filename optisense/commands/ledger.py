@@ -11,5 +11,7 @@ from optisense.quality import PICTURE_PHOTONS
 class LedgerOptions(CommandOptions):
     """Options of the photons that are followed."""
 
-    photons: Photons = Field(PICTURE_PHOTONS, description="Photons to follow, of all lights.")
+    photons: Photons = Field(
+        PICTURE_PHOTONS, description="Photons to trace, of all lights together."
+    )
     seed: Seed = Field(0, description="The same seed gives the same photons.")

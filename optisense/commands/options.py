@@ -163,8 +163,8 @@ Exposure = Annotated[
 
 Skin = Annotated[str, AfterValidator(one_of(SKINS)), Written("|".join(SKINS))]
 SKIN_HELP = (
-    "How the skin follows what presses: as a gel does, or taking its shape where both overlap "
-    "and staying flat around it."
+    "How the skin deforms: as an elastic gel (elastic), or taking the shape of "
+    "the indenter and staying flat around it (conforming)."
 )
 
 Range = Annotated[

@@ -27,21 +27,25 @@ class RenderOptions(CommandOptions):
 
     resolution: Resolution | None = Field(
         None,
-        description="Pixels of the picture, as 320x240. The camera's own when left out.",
+        description="Width and height of the picture in pixels, such as 320x240; those of the "
+        "camera if left out.",
     )
     photons: Photons | None = Field(
-        None, description="Photons to trace: normal, 1 million, when no limit is given."
+        None,
+        description="Photons to trace: a number, draft (60,000), normal (1 million) or fine (5 "
+        "million). Normal if no other limit is given.",
     )
     noise: Annotated[float, Ge(0.01), Le(100.0), Written("PERCENT")] | None = Field(
-        None, description="Stop when the noise has come down to this."
+        None,
+        description="Trace photons until the noise of the light is at most this many per cent.",
     )
     seconds: Annotated[float, Ge(0.01), Le(LONGEST_RENDER), Written("S")] | None = Field(
-        None, description="Stop after this time."
+        None, description="Trace photons for this many seconds."
     )
     seed: Seed = Field(0, description="The same seed gives the same picture.")
     exposure: Exposure = Field(
         "auto",
-        description="Brightness of the picture: a factor on the radiance, or found by itself.",
+        description="Brightness of the picture: a factor on the radiance, or automatic.",
     )
     skin: Skin = Field(ELASTIC, description=SKIN_HELP)
 

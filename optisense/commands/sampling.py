@@ -29,18 +29,21 @@ GelSight Mini.
 """
 
 CameraNoise = Annotated[float, Ge(0.0), Le(255.0), Written("LEVELS")]
-NOISE_HELP = "Noise of the camera to add, of 255; a real GelSight Mini shows 1.1 to 1.9."
+NOISE_HELP = "Camera noise to add to the pictures: its standard deviation in levels of "
+"255; a real GelSight Mini has 1.1 to 1.9."
 
 
 class PictureOptions(CommandOptions):
     """Options of the pictures of a task."""
 
-    seed: Seed = Field(0, description="The same seed, the same contacts.")
+    seed: Seed = Field(
+        0, description="Seed of the random numbers; the same seed gives the same contacts."
+    )
     camera_noise: CameraNoise = Field(NOISE, description=NOISE_HELP)
     resolution: Resolution | None = Field(
         None,
-        description="Pixels of the pictures; those of the camera, or what the task needs, when "
-        "left out.",
+        description="Width and height of the pictures in pixels; if left out, those of the "
+        "camera, or those that the task needs.",
     )
     photons: Photons = Field(
         SAMPLE_PHOTONS, description="Photons of the light that all pictures share."
@@ -52,7 +55,9 @@ class EstimatorOptions(PictureOptions):
     """Options of pictures that either estimator can render."""
 
     estimator: Annotated[str, Written("|".join(ESTIMATORS))] = Field(
-        RADIANCE_CACHE, description="sppm is slow, and exact where plates cover the gel."
+        RADIANCE_CACHE,
+        description="How the light is computed: from a radiance cache, or by progressive photon "
+        "mapping (sppm), which is slow, and exact also where plates cover the gel.",
     )
 
 
@@ -60,10 +65,12 @@ class SampleOptions(EstimatorOptions):
     """Options of the samples of a perception task."""
 
     samples: Annotated[int, Ge(10), Le(MOST_THINGS), Written("N", ("--samples", "-n"))] = Field(
-        200, description="Random contacts."
+        200, description="Number of random contacts."
     )
     neighbours: Annotated[int, Ge(2), Le(MOST_THINGS), Written("K")] = Field(
-        5, description="Neighbours of the signal-to-noise ratio."
+        5,
+        description="Number of nearest neighbours from which the signal-to-noise ratio is "
+        "computed.",
     )
 
     def settings(self) -> dict[str, Any]:
@@ -77,7 +84,9 @@ class SampleOptions(EstimatorOptions):
 class CylinderOptions(SampleOptions):
     """Options of the samples of the task that reads the radius of a cylinder."""
 
-    radius: Range = Field("1:6", validate_default=True, description="mm.")
+    radius: Range = Field(
+        "1:6", validate_default=True, description="Range of the cylinder's radius, mm."
+    )
 
 
 class DatasetOptions(EstimatorOptions):
@@ -85,31 +94,37 @@ class DatasetOptions(EstimatorOptions):
 
     indenter: Annotated[list[str], Written("KIND:SIZE")] = Field(
         ["sphere:1.5"],
-        description="What presses: sphere:1.5, cylinder:2,6, plane or mesh:FILE. Given several "
-        "times, each is as likely as the others.",
+        description="What presses (sizes in mm): sphere:1.5, cylinder:2,6, plane or mesh:FILE. "
+        "May be given several times; all are equally likely.",
     )
     depth: Range = Field(
-        "0.3:1", validate_default=True, description="How deep, mm; drawn evenly in between."
+        "0.3:1",
+        validate_default=True,
+        description="Range of the depth of presses, mm; depths are uniformly distributed.",
     )
     rotation: Range = Field(
-        "0:360", validate_default=True, description="Degrees about the surface normal."
+        "0:360",
+        validate_default=True,
+        description="Range of the rotation about the surface normal, degrees.",
     )
     tilt: Annotated[float, Ge(0.0), Le(89.0), Written("DEGREES")] = Field(
-        0.0, description="The most it tilts, about 2 axes."
+        0.0, description="Largest tilt about each of two axes, degrees."
     )
     margin: Annotated[float, Ge(0.0), Le(49.0), Written("PERCENT")] = Field(
         2.0,
-        description="Of the picture's width that stays free between a contact and the picture's "
-        "edge; 0 lets the edge cut contacts.",
+        description="Distance between a contact and the edge of the picture, per cent of the "
+        "picture's width; with 0 the edge may cut contacts.",
     )
-    seed: Seed = Field(0, description="Of places, depths and noise.")
+    seed: Seed = Field(0, description="Seed of the random places, depths and noise.")
     camera_noise: CameraNoise = Field(0.0, description=NOISE_HELP)
     exposure: Exposure = Field(
-        "auto", description="One for all pictures; auto suits the untouched sensor."
+        "auto",
+        description="Exposure of all pictures: a factor on the radiance; auto suits the untouched "
+        "sensor.",
     )
     hold_out: Annotated[list[str], Written("KIND:SIZE")] = Field(
         default_factory=list,
-        description="An --indenter that is in the test split only; may be given several times.",
+        description="An --indenter that only the test split contains. May be given several times.",
     )
     radiance: bool = Field(False, description="Also write linear radiance as EXR files.")
 
@@ -131,15 +146,18 @@ class ReconstructionOptions(PictureOptions):
     """Options of reconstructions, which read the shape of an object from colours."""
 
     method: Annotated[str, Written("network|table")] = Field(
-        "network", description="What colours are read with."
+        "network",
+        description="What estimates normals from colours: a neural network or a lookup table.",
     )
     presses: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] = Field(
-        40, description="Balls that it is fitted to."
+        40, description="Number of ball presses that calibrate the reader of normals."
     )
     radius: Annotated[float, Ge(0.01), Written("MM")] = Field(
-        1.5, description="Radius of these balls."
+        1.5, description="Radius of these balls, mm."
     )
-    depth: Range = Field("0.2:0.6", validate_default=True, description="How deep they press, mm.")
+    depth: Range = Field(
+        "0.2:0.6", validate_default=True, description="Range of the depth of these presses, mm."
+    )
 
 
 ALL_OBJECTS = 12
@@ -172,28 +190,34 @@ PRESSES, QUICK_PRESSES = 40, 20
 class VerifyOptions(CommandOptions):
     """Options of a comparison of two sensors on objects that no score has used."""
 
-    quick: bool = Field(False, description="Six objects, small pictures and few photons.")
+    quick: bool = Field(
+        False,
+        description="Use six objects, small pictures and few photons; faster and less certain.",
+    )
     objects: Annotated[list[str], Written("NAME", ("--object",), "all twelve")] = Field(
         [],
-        description="What presses: screw-head, coin, nut, ... May be given several times.",
+        description="An object to press: screw-head, coin, nut, ... May be given several times.",
     )
     places: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N", usual="3, quick 2")] | None = Field(
-        None, description="Presses of each object."
+        None, description="Number of presses of each object."
     )
     presses: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N", usual="40, quick 20")] | None = (
-        Field(None, description="Balls that the readers are fitted to.")
+        Field(None, description="Number of ball presses that calibrate the reader of each sensor.")
     )
-    seed: Seed = Field(0, description="Of places, presses and noise.")
+    seed: Seed = Field(0, description="Seed of the random places, presses and noise.")
     camera_noise: CameraNoise = Field(NOISE, description=NOISE_HELP)
     resolution: Resolution | None = Field(
-        None, description="Pixels of the pictures; 320 across, quick 160, when left out."
+        None,
+        description="Width and height of the pictures in pixels; if left out, 320 wide, or 160 "
+        "with --quick.",
     )
     photons: Annotated[Photons, Written("N", usual="fine, quick 500,000", is_text=True)] | None = (
         Field(None, description="Photons of the light that all pictures of a sensor share.")
     )
     skin: Skin = Field(ELASTIC, description=SKIN_HELP)
     method: Annotated[str, Written("network|table")] = Field(
-        "network", description="What colours are read with."
+        "network",
+        description="What estimates normals from colours: a neural network or a lookup table.",
     )
 
     def wanted_photons(self) -> int:

@@ -42,7 +42,8 @@ class ScoreOptions(CommandOptions):
     )
     resolution: Resolution | None = Field(
         None,
-        description="Pixels of images and rays. 640 across, in the camera's shape, when left out.",
+        description="Width and height of the grid of pixels and rays; if left out, 640 wide, in "
+        "the camera's aspect ratio.",
     )
     photons: ScorePhotons | None = Field(None, description="Photons to trace.")
 
@@ -66,7 +67,7 @@ class EvaluateOptions(ScoreOptions):
     )
     seed: Seed = Field(0, description="The same seed gives the same scores.")
     seeds: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] = Field(
-        1, description="Score with so many seeds, and tell the spread."
+        1, description="Number of seeds to score with; from 2 on the standard deviation is printed."
     )
 
 
@@ -80,11 +81,12 @@ class ToleranceOptions(ScoreOptions):
     )
     errors: Annotated[list[str], Written("PATH=SIZE", ("--error",), "usual ones")] = Field(
         [],
-        description="What may be off, and its standard deviation (mm, degrees, or the value's own "
-        "unit); PATH=+-LIMIT for any error up to a limit. lights.position and lights.angle mean "
-        "each light by itself. May be given several times.",
+        description="A value with a manufacturing error, and the error's standard deviation (mm, "
+        "degrees, or the value's own unit), or PATH=+-LIMIT for an error uniformly "
+        "distributed up to a limit. lights.position and lights.angle mean each light "
+        "by itself. May be given several times.",
     )
     sensors: Annotated[int, Ge(8), Le(MOST_THINGS), Written("N")] = Field(
-        120, description="About how many manufactured sensors to try."
+        120, description="Approximate number of manufactured sensors to simulate."
     )
     seed: Seed = Field(0, description="The same seed gives the same sensors.")

@@ -23,30 +23,30 @@ class SearchOptions(CommandOptions):
 
     vary: Annotated[list[str], Written("PATH=LO:HI[:N]")] = Field(
         [],
-        description="What may change: between two bounds (N values of it for a grid), or around "
-        "what it is now as PATH=+-REACH, or one of several as PATH=NAME,NAME. May be given several "
-        "times.",
+        description="A value that may change, between two bounds (N values for a grid); "
+        "PATH=+-REACH varies it around its present value, and PATH=NAME,NAME chooses "
+        "one of several. May be given several times.",
     )
     objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"))] = Field(
         [],
-        description="What to maximise: rgb2normal, normdiff, aoap, 2to3pw, another objective, your "
-        "own as FILE.py:FUNCTION, or arithmetic such as 'aoap + 0.5*coverage'. Given several "
-        "times, the first is maximised and the others are told, or all are weighed by --method "
-        "pareto.",
+        description="What to maximise: rgb2normal, normdiff, aoap, 2to3pw, another objective, "
+        "your own as FILE.py:FUNCTION, or arithmetic such as 'aoap + 0.5*coverage'. "
+        "If it is given several times, the first is maximised and the others are only "
+        "reported; --method pareto optimises all of them.",
     )
     require: Annotated[list[str], Written("CONDITION", ("--require",))] = Field(
         [],
         description="A condition that the best design must meet, such as 'coverage>=0.55' or "
-        "'distortion<=1.5': any objective, or one of its numbers as in "
+        "'distortion<=1.5': any objective, or one of its parts, such as "
         "'aoap.coverage_by_area>=0.5'. May be given several times.",
     )
     method: Annotated[str, Written("NAME", usual="cma-es")] | None = Field(
-        None, description="How to search; --methods lists them."
+        None, description="The search method; --methods lists all."
     )
     budget: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] | None = Field(
         None,
-        description="Trials in all; the method's own idea when left out. With --resume, trials "
-        "including those that are finished.",
+        description="Total number of trials, including the finished ones with --resume; if left "
+        "out, the method chooses it.",
     )
     seed: Annotated[Seed, Written("N", usual="0")] | None = Field(
         None, description="The same seed gives the same search."
@@ -59,21 +59,22 @@ class SearchOptions(CommandOptions):
     )
     rules: Annotated[list[str], Written("FILE.py:FUNCTION", ("--rule",))] = Field(
         [],
-        description="A function of a design that returns False, or why, for one that must not be. "
-        "May be given several times.",
+        description="A function of a design that returns False, or the reason as text, if the "
+        "design is not allowed. May be given several times.",
     )
     may_cross: bool = Field(
         False,
-        description="Let parts cut through one another, leave those on which they rest, and "
-        "outgrow the sensor.",
+        description="Allow parts that cut through one another, lose contact with the parts on "
+        "which they rest, or make the sensor much larger.",
     )
     errors: Annotated[list[str], Written("PATH=SIZE", ("--error",))] = Field(
         [],
-        description="A manufacturing error (standard deviation). With one or more, what nine of "
-        "ten manufactured sensors reach is maximised.",
+        description="A manufacturing error, as in `optisense tolerance`: a value and the standard "
+        "deviation of its error. The search then maximises the score that nine of ten "
+        "manufactured sensors reach. May be given several times.",
     )
     samples: Annotated[int, Ge(2), Le(MOST_THINGS), Written("N", usual="8")] | None = Field(
-        None, description="Manufactured sensors a trial, with --error."
+        None, description="With --error: number of manufactured sensors simulated for each trial."
     )
 
     def plan(self) -> Plan:
