@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +12,10 @@ from step_extra import needs_step
 
 from optisense import sensors
 from optisense.design import SensorDesign
+from optisense.sensors.digit import CORNERS
+from optisense.sensors.half_round import HalfRound
+from optisense.workshop.domes import dome
+from optisense.workshop.exact_shapes import _through
 from optisense.workshop.shapes import Shape, shapes
 
 SAME_VOLUME = 1e-4
@@ -82,3 +88,57 @@ class TestExactVolumes:
             angle = 2.0 * math.asin(chord / 2.0 / 28.05)
             volume += 36.0 * angle / 2.0 * (28.15**2 - 28.05**2)
         assert exact_volume(made) == pytest.approx(volume, rel=SAME_VOLUME)
+
+    def test_a_dome_over_a_half_round(self) -> None:
+        """DIGIT: a wall, an edge whose sections are parabolas, and a paraboloid."""
+        made = parts(sensors.digit())
+        acrylic = HalfRound(18.3, 15.85, CORNERS[1], 0.0)
+        assert exact_volume(made["acrylic"]) == pytest.approx(6.15 * area(acrylic), rel=SAME_VOLUME)
+        gel, inset = HalfRound(18.4, 15.85, CORNERS[0], 3.325), 0.6
+        low, high, rise = 1.35, 4.07 - 1.94, 1.94  # of the edge, from the foot of the gel
+        foot, rim = gel.points(0.6), gel.inset(inset).like(gel, 0.6)
+        slope = 2.0 * rise * np.linalg.norm(foot - rim, axis=1) / np.linalg.norm(rim, axis=1)
+        bend = high - float(slope.mean())
+        volume = low * area(gel) + (high - low + 0.5 * rise) * area(gel.inset(inset))
+        t, weights = np.polynomial.legendre.leggauss(20)
+        for share, weight in zip(0.5 * (t + 1.0), 0.5 * weights, strict=True):
+            level = (1 - share) ** 2 * low + 2 * share * (1 - share) * bend + share**2 * high
+            near = [area(gel.inset(inset * (share + step) ** 2)) for step in (-1e-4, 1e-4)]
+            volume += weight * (level - low) * (near[0] - near[1]) / 2e-4
+        found = dome(made["gel"].mesh)
+        assert found is not None
+        below = volume_below(_through(found)) - found.foot * area(gel)
+        assert below == pytest.approx(volume, rel=SAME_VOLUME)
+
+    def test_what_cages_bend(self) -> None:
+        """A point that moves by 9 mm has the weight 2 u (1 - u) each way, 1/3 in the mean."""
+        made = parts(sensors.gelsight_mini_spherical())
+        flat, bulge = 25.25 * 20.75 * 4.25, 25.25 * 20.75 * 9.0 / 9.0
+        assert exact_volume(made["gel"]) == pytest.approx(flat + bulge, rel=SAME_VOLUME)
+
+
+def area(outline: HalfRound) -> float:
+    """mm2: a half round, a rectangle, and the lack of two rounded corners."""
+    lack = (2.0 - 0.5 * math.pi) * outline.corner**2
+    return 0.5 * math.pi * outline.radius**2 + outline.width * outline.straight - lack
+
+
+def volume_below(surface: Any) -> float:
+    """mm3 between a B-spline surface and z = 0, by Gauss's rule in each of its spans."""
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    def rule(count: int, knot: Callable[[int], float]) -> tuple[np.ndarray, np.ndarray]:
+        knots = np.array([knot(k + 1) for k in range(count)])
+        at, weights = np.polynomial.legendre.leggauss(4)
+        half = 0.5 * np.diff(knots)[:, None]
+        return (knots[:-1, None] + half * (at + 1.0)).ravel(), (half * weights).ravel()
+
+    along, up = rule(surface.NbUKnots(), surface.UKnot), rule(surface.NbVKnots(), surface.VKnot)
+    total = 0.0
+    place, by_u, by_v = gp_Pnt(), gp_Vec(), gp_Vec()
+    for v, weight_v in zip(*up, strict=True):
+        for u, weight_u in zip(*along, strict=True):
+            surface.D1(u, v, place, by_u, by_v)
+            turned = by_u.X() * by_v.Y() - by_u.Y() * by_v.X()
+            total += weight_u * weight_v * place.Z() * turned
+    return total
