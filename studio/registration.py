@@ -1,9 +1,9 @@
-"""Brings modules of the extension into Blender and takes them out again, by what they define.
+"""Registration of the extension's modules with Blender, according to the names that they define.
 
-A module may have classes whose names begin with ``OPTISENSE_``; ``PROPERTIES``, the property groups
-by the type of Blender that holds them and by the name of the property; ``HOOKS``, pairs of a list
-of functions that somebody calls and a function of the module; and functions ``register`` and
-``unregister`` for whatever else it needs.
+A module may define classes whose names begin with ``OPTISENSE_``; ``PROPERTIES``, property groups
+by the Blender type that holds them and the name of the property; ``HOOKS``, pairs of a list of
+callbacks and a function of the module; and functions ``register`` and ``unregister`` for everything
+else.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import bpy
 
 
 def add(module: ModuleType) -> None:
-    """Register a module; its classes in the order in which they are defined."""
+    """Register a module, its classes in the order of their definition."""
     for each in _classes(module):
         bpy.utils.register_class(each)
     for owner, groups in getattr(module, "PROPERTIES", {}).items():
-        # What a window holds is of the moment, and in no file.
+        # Properties of the window manager hold the state of the session, and belong in no file.
         options = {"SKIP_SAVE"} if owner == "WindowManager" else set()
         for name, group in groups.items():
             held = bpy.props.PointerProperty(type=group, options=options)
@@ -30,7 +30,7 @@ def add(module: ModuleType) -> None:
 
 
 def remove(module: ModuleType) -> None:
-    """Take a module out again."""
+    """Unregister a module."""
     if hasattr(module, "unregister"):
         module.unregister()
     for called, function in getattr(module, "HOOKS", ()):

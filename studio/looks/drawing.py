@@ -16,20 +16,23 @@ from ..scene.lamps import lamp_colour, window
 from .section import plane
 
 LINE = (0.62, 0.68, 0.75)
-"""Red, green and blue of outlines: as bright as the rims of glass."""
+"""Colour of outlines (red, green, blue): as bright as the rims of glass."""
 
 BEAM, WIDEST_BEAM = 3.0, 25.0
-"""mm and degrees: how long and how wide the beam of a lamp is drawn at most; a wider one would hide
-the sensor."""
+"""Largest length in mm and half angle in degrees with which a beam is drawn; larger ones would hide
+the sensor.
+"""
 
 BEAM_OPACITY, OUTLINE_OPACITY = 0.3, 0.35
-"""Opacity of a beam at its lamp, and of an outline; 1 hides what is behind."""
+"""Opacities, 0 to 1, of a beam at its lamp and of an outline."""
 
 WINDOW_OPACITY = 0.8
 """Opacity of a lit window of a lamp: parts behind it stay visible."""
 
 MOST_FACES = 200_000
-"""Faces of a part above which it is drawn without outlines: they would take longer than a frame."""
+"""Number of faces above which a part is drawn without outlines: they would take longer than a
+frame.
+"""
 
 _edges: dict[str, tuple[tuple[int, int, int], NDArray[np.int64]]] = {}
 """Numbers of vertices, edges and faces of each present part, and the edges of its outline."""
@@ -37,11 +40,11 @@ _edges: dict[str, tuple[tuple[int, int, int], NDArray[np.int64]]] = {}
 _handle: Any = None
 
 when_drawing: list[Callable[[bpy.types.Scene], None]] = []
-"""Called to draw more in a 3D view."""
+"""Callbacks that draw more in a 3D view."""
 
 
 def outline(part: bpy.types.Object) -> NDArray[np.float32]:
-    """(2 n, 3) mm: the ends of the edges to draw of a part, where they are in the world."""
+    """Return the ends of the edges to draw of a part, (2 n, 3) mm in the world."""
     mesh = part.data
     size = (len(mesh.vertices), len(mesh.edges), len(mesh.polygons))
     if size[2] == 0 or size[2] > MOST_FACES:
@@ -70,7 +73,7 @@ def _feature_edges(mesh: bpy.types.Mesh) -> NDArray[np.int64]:
 
 
 def in_world(points: NDArray[np.float32], matrix: Matrix) -> NDArray[np.float32]:
-    """(n, 3) points of an object in the world."""
+    """Return points of an object, (n, 3), in the world."""
     world = np.array(matrix, dtype=np.float32)
     return points @ world[:3, :3].T + world[:3, 3]
 
@@ -99,7 +102,7 @@ def _draw() -> None:
 
 
 def _draw_lamps(scene: bpy.types.Scene) -> None:
-    """Lit windows and beams: all of a group at once."""
+    """Draw lit windows and beams, all lamps of a group at once."""
     import gpu
 
     found = plane(scene)
@@ -134,7 +137,7 @@ def _draw_lamps(scene: bpy.types.Scene) -> None:
 
 
 def draw_lines(ends: NDArray[np.float32], colour: tuple[float, ...], *, width: float = 1.2) -> None:
-    """Draw lines between pairs of points (2 n, 3), `width` pixels wide."""
+    """Draw lines between pairs of points, (2 n, 3) mm, `width` pixels wide."""
     if not len(ends):
         return
     import gpu
@@ -150,7 +153,7 @@ def draw_lines(ends: NDArray[np.float32], colour: tuple[float, ...], *, width: f
 
 
 def draw_faces(corners: NDArray[np.float32], colours: NDArray[np.float32]) -> None:
-    """Draw triangles of corners (3 n, 3) in colours (3 n, 4), unlit."""
+    """Draw unlit triangles with corners (3 n, 3) in mm and colours (3 n, 4)."""
     if not len(corners):
         return
     import gpu
@@ -164,7 +167,7 @@ def draw_faces(corners: NDArray[np.float32], colours: NDArray[np.float32]) -> No
 
 
 def cut_lines(scene: bpy.types.Scene, ends: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(2 m, 3): the lines that the section plane of a scene leaves whole."""
+    """Return the lines that lie entirely on the shown side of a scene's section plane, (2 m, 3)."""
     found = plane(scene)
     if found is None or not len(ends):
         return ends

@@ -1,4 +1,4 @@
-"""The camera's footprint: what it sees of the skin, outlined, and the rest of the skin in red."""
+"""Footprint of the camera on the skin: the visible part is outlined, the rest is drawn in red."""
 
 from __future__ import annotations
 
@@ -20,24 +20,26 @@ from . import drawing, section
 KINDS = ("PART", "CAMERA", "CAGE")
 
 SEEN, UNSEEN, BORDER = (0.1, 0.8, 0.45, 0.22), (0.9, 0.08, 0.05, 0.45), (0.1, 1.0, 0.5, 1.0)
-"""Red, green, blue and opacity of the skin that is seen, that is not, and of the line between."""
+"""Colours (red, green, blue, opacity) of the visible skin, of the rest, and of the line between."""
 
 LIFT, UNSEEN_LIFT = 0.06, 0.02
-"""mm: how far beside the skin the seen part and the red are drawn, on both sides: so the former
-hides the latter, neither is hidden by the skin, and both still lie on it."""
+"""Distances from the skin in mm at which the visible part and the red are drawn, on both sides: the
+former hides the latter, neither is hidden by the skin, and both still seem to lie on it.
+"""
 
 BORDER_WIDTH = 2.5
-"""Pixels: wide enough to be told from the outlines of parts."""
+"""Width of the border in pixels: distinguishable from the outlines of parts."""
 
 _shown: dict[str, Any] = {}
-"""The footprint that is drawn: `seen` and `border`, arrays of corners (n, 3) in mm, and the sensing
-surface that it is `of`."""
+"""Footprint that is drawn: `seen` and `border`, arrays of corners (n, 3) in mm, and `of`, the
+sensing surface that they belong to.
+"""
 
 _request = LatestRequest()
 
 
 class OPTISENSE_PG_footprint(bpy.types.PropertyGroup):
-    """What there is to tell of the footprint; never saved."""
+    """Text about the footprint; never saved."""
 
     text: StringProperty(description="How much the camera sees", options={"SKIP_SAVE"})
 
@@ -48,7 +50,9 @@ def is_on(scene: bpy.types.Scene | None) -> bool:
 
 
 def wanted() -> None:
-    """Something changed that the camera sees, or the footprint was switched on or off."""
+    """Schedule a new footprint: something that the camera sees changed, or the footprint was
+    switched.
+    """
     _request.want()
     if not is_on(bpy.context.scene):
         _leave()
@@ -91,19 +95,19 @@ def _take(result: dict[str, Any]) -> None:
 
 
 def is_current(scene: bpy.types.Scene) -> bool:
-    """Whether what is known is of the sensor in a scene, and not of one that was open before."""
+    """Whether the known footprint belongs to the sensor of a scene, and not to an earlier one."""
     surface = sensing_surface(scene)
     return surface is not None and _shown.get("of") == surface.as_pointer()
 
 
 def told(scene: bpy.types.Scene) -> str:
-    """What there is to tell of the footprint in a scene."""
+    """Return the text about the footprint in a scene; empty if it is outdated."""
     text = str(bpy.context.window_manager.optisense_footprint.text)
     return text if is_current(scene) or not _shown else ""
 
 
 def words(result: dict[str, Any]) -> str:
-    """How much the camera sees, in words."""
+    """Return the visible share of the skin in words."""
     skin, picture = 100 * result["skin"], 100 * result["picture"]
     text = f"The camera sees {skin:.0f} % of the skin"
     return text if picture > 99.5 else f"{text}; {picture:.0f} % of its pixels see skin"
@@ -143,7 +147,9 @@ def _draw_faces(
 
 
 def cut_faces(scene: bpy.types.Scene, corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(3 m, 3): the triangles that the section plane of a scene leaves whole."""
+    """Return the triangles that lie entirely on the shown side of a scene's section plane, (3 m,
+    3).
+    """
     found = section.plane(scene)
     if found is None or not len(corners):
         return corners
@@ -153,7 +159,7 @@ def cut_faces(scene: bpy.types.Scene, corners: NDArray[np.float32]) -> NDArray[n
 
 
 def skin_triangles(surface: bpy.types.Object) -> NDArray[np.float32]:
-    """(3 n, 3) mm: the corners of the sensing surface's triangles in the world."""
+    """Return the corners of the sensing surface's triangles, (3 n, 3) mm in the world."""
     mesh = surface.data
     mesh.calc_loop_triangles()
     corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
@@ -164,14 +170,14 @@ def skin_triangles(surface: bpy.types.Object) -> NDArray[np.float32]:
 
 
 def face_normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """(n, 3) unit normals of triangles of corners (3 n, 3); 0 where one has no area."""
+    """Return unit normals of triangles with corners (3 n, 3), (n, 3); zero for one without area."""
     one, two, three = np.moveaxis(corners.reshape(-1, 3, 3), 1, 0)
     found = np.cross(two - one, three - one)
     return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
 
 
 def _leave() -> None:
-    """Draw no footprint any more."""
+    """Remove the footprint."""
     _request.leave()
     _shown.clear()
     bpy.context.window_manager.optisense_footprint.text = ""

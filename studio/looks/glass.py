@@ -1,7 +1,7 @@
 """Gloss on parts: bright rims and highlights on gel and acrylic, reflections on mirrors.
 
-Blender's solid mode draws the colours and opacities; this lies over them, and works with software
-OpenGL, as all of that mode does.
+Blender's solid mode draws the colours and opacities; the gloss is drawn over them and, like all of
+that mode, works with software OpenGL.
 """
 
 from __future__ import annotations
@@ -25,13 +25,17 @@ GLOSS = {
     "blocker": (0.55, 0.6, 0.7, 0.3),
     "mirror": (1.0, 1.0, 1.0, 0.8),
 }
-"""Colour of the rim (0 to 1) and its opacity by role; that of a mirror is of what it reflects."""
+"""Colour of the rim and its opacity by role, each 0 to 1; the rim of a mirror takes the colour of
+what it reflects.
+"""
 
 METAL = ("mirror",)
-"""Roles that reflect."""
+"""Roles of parts that reflect."""
 
 KEY = (-0.4, 0.7, 0.6)
-"""The direction of the light of highlights: right, up and towards the viewer."""
+"""Direction to the light that makes the highlights: components to the right, up and towards the
+viewer.
+"""
 
 VERTEX = """
 void main() {
@@ -63,11 +67,13 @@ void main() {
 
 _shader: Any = None
 _batches: dict[str, tuple[tuple[Any, ...], Any]] = {}
-"""State of each present part's mesh, and its triangles on the graphics card, by the part's name."""
+"""State of each present part's mesh, and its triangles on the graphics card, by the name of the
+part.
+"""
 
 
 def draw(scene: bpy.types.Scene) -> None:
-    """Draw the gloss of all parts of a scene that are seen; while a 3D view is drawn."""
+    """Draw the gloss of all visible parts of a scene; called while a 3D view is drawn."""
     import gpu
 
     view = bpy.context.region_data
@@ -95,7 +101,7 @@ def draw(scene: bpy.types.Scene) -> None:
 
 
 def _made() -> Any:
-    """The shader, which is compiled once."""
+    """Return the shader, which is compiled once."""
     global _shader
     if _shader is None:
         import gpu
@@ -139,8 +145,9 @@ def _batch(part: bpy.types.Object) -> Any:
 
 
 def triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """(3 n, 3) mm, corners of the triangles of a mesh, and (3 n, 3) its unit normals there, which
-    are smooth but across sharp edges."""
+    """Return the corners of a mesh's triangles, (3 n, 3) mm, and unit normals there, (3 n, 3),
+    smooth except across sharp edges.
+    """
     mesh.calc_loop_triangles()
     count = len(mesh.loop_triangles)
     loops = np.empty(3 * count, dtype=np.int32)

@@ -1,4 +1,6 @@
-"""Markers, the dots that are printed on the skin: drawn on it, and changed as numbers."""
+"""Markers, the dots printed on the skin: their drawing in 3D views, and operators to change
+them.
+"""
 
 from __future__ import annotations
 
@@ -21,20 +23,22 @@ from . import drawing, footprint, section
 KINDS = ("PART", "CAGE")
 
 INK = (0.02, 0.02, 0.025, 0.9)
-"""Red, green, blue and opacity of a drawn dot: nearly black, as most inks are."""
+"""Colour of a drawn dot (red, green, blue, opacity): nearly black, as most inks are."""
 
 SIDES = 20
-"""Corners of a drawn dot, which looks round."""
+"""Number of corners of a drawn dot: it looks round."""
 
 LIFT = 0.03
-"""mm: how far beside the skin dots are drawn, on both sides, so that it does not hide them."""
+"""Distance from the skin in mm at which dots are drawn, on both sides, so that the skin does not
+hide them.
+"""
 
 _shown: dict[str, Any] = {}
 _request = LatestRequest()
 
 
 def of_design(scene: bpy.types.Scene) -> dict[str, Any] | None:
-    """The markers of a scene's design as its file has them; None where it has none."""
+    """Return the markers of a scene's design as in its file; None if it has none."""
     text = scene.optisense.document
     return json.loads(text).get("markers") if text else None
 
@@ -50,7 +54,9 @@ def is_on(scene: bpy.types.Scene | None) -> bool:
 
 
 def wanted() -> None:
-    """Something changed that markers depend on; asked at the next look at the engine."""
+    """Schedule a request for the markers at the next poll of the engine: something that they depend
+    on changed.
+    """
     _request.want()
     if not is_on(bpy.context.scene):
         _shown.clear()
@@ -76,7 +82,9 @@ def _take(result: dict[str, Any]) -> None:
 def discs(
     points: NDArray[np.float32], normals: NDArray[np.float32], radius: float
 ) -> NDArray[np.float32]:
-    """(3 n, 3) mm, corners of triangles that fill a disc at each point (k, 3), on both sides."""
+    """Return the corners of triangles that fill a disc at each point (k, 3), on both sides, (3 n,
+    3) mm.
+    """
     helper = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     one = np.cross(normals, helper)
     one /= np.maximum(np.linalg.norm(one, axis=1, keepdims=True), 1e-9)

@@ -1,4 +1,4 @@
-"""A plane that cuts the sensor open in 3D views, moved by one slider."""
+"""Section plane that cuts the sensor open in 3D views, moved by one slider."""
 
 from __future__ import annotations
 
@@ -18,17 +18,19 @@ AXES = [
 ]
 
 NOWHERE = (0.0, 0.0, 0.0, 1.0)
-"""A plane of Blender's that cuts nothing off: x, y and z do not count, and 1 is above 0."""
+"""Clipping plane of Blender that cuts nothing off: its normal is zero, and its offset positive."""
 
 MARGIN = 1e-3
-"""mm: at the slider's ends the plane lies so far beyond the sensor, and cuts nothing or all off."""
+"""Distance in mm of the plane from the sensor at the ends of the slider, where it cuts nothing or
+all off.
+"""
 
 
 when_markers_asked: list[Callable[[], None]] = []
-"""Called when the markers are shown or hidden."""
+"""Callbacks for the markers being shown or hidden."""
 
 when_footprint_asked: list[Callable[[], None]] = []
-"""Called when the camera's footprint is switched on or off."""
+"""Callbacks for the camera's footprint being switched on or off."""
 
 
 def _changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -46,7 +48,7 @@ def _markers_asked(values: bpy.types.PropertyGroup, context: bpy.types.Context) 
 
 
 class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
-    """How a sensor is drawn."""
+    """Settings of how a sensor is drawn."""
 
     cut: BoolProperty(
         name="Section", description="Cut the sensor open in 3D views", update=_changed
@@ -73,7 +75,7 @@ class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
 
 
 def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector] | None:
-    """The lowest and highest x, y, z of the parts, mm; None where there is none."""
+    """Return the lowest and highest x, y, z of all parts, mm; None if there are no parts."""
     corners = [
         each.matrix_world @ Vector(corner)
         for each in objects_of(scene, "PART")
@@ -89,7 +91,9 @@ def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector] | None:
 
 
 def plane(scene: bpy.types.Scene) -> tuple[float, float, float, float] | None:
-    """The section as (a, b, c, d): shown is where a x + b y + c z + d > 0; None without one."""
+    """Return the section plane as (a, b, c, d): points with a x + b y + c z + d > 0 are shown; None
+    without one.
+    """
     looks = scene.optisense_looks
     found = bounds(scene) if looks.cut else None
     if found is None:
@@ -102,7 +106,7 @@ def plane(scene: bpy.types.Scene) -> tuple[float, float, float, float] | None:
 
 
 def show(scene: bpy.types.Scene) -> None:
-    """Cut, or no longer, in all 3D views of a scene."""
+    """Switch the section on or off in all 3D views of a scene."""
     found = plane(scene)
     for window in bpy.context.window_manager.windows:
         if window.scene != scene:
@@ -119,9 +123,9 @@ def show(scene: bpy.types.Scene) -> None:
 
 
 def _prepare(window: bpy.types.Window, area: bpy.types.Area) -> None:
-    """Let a view cut: Blender wants its own tool for that used once, here around all of the view.
+    """Prepare a view for clipping: use Blender's clipping tool once, around the whole view.
 
-    Without, the planes are kept and nothing is cut off.
+    Without this, Blender stores the planes but cuts nothing off.
     """
     region = next(each for each in area.regions if each.type == "WINDOW")
     with bpy.context.temp_override(window=window, area=area, region=region):

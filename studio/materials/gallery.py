@@ -1,4 +1,4 @@
-"""Pictures of what the library holds, drawn by the engine when they are first asked for."""
+"""Pictures of the entries of the library, drawn by the engine when they are first requested."""
 
 from __future__ import annotations
 
@@ -11,16 +11,20 @@ from ..simulate.picture import file_icon
 _files: dict[tuple[str, str], str] = {}
 _asked: set[tuple[str, str]] = set()
 _items: dict[str, tuple[catalogue.Items, list[tuple[Any, ...]]]] = {}
-"""Choices of each kind, and the list that they were made for."""
+"""Choices of each kind, and the list of which they were made."""
 
 _numbers: dict[str, dict[str, int]] = {}
-"""What Blender keeps of a choice: each entry has its own, wherever it is in the list."""
+"""Number of each entry by kind and name, which Blender stores for a choice; it does not depend on
+the place in the list.
+"""
 
 
 def items(kind: str) -> list[tuple[Any, ...]]:
-    """A kind of the library as choices of a menu, with those pictures that are drawn."""
+    """Return the entries of a kind of the library as choices of a menu, with their pictures if
+    drawn.
+    """
     plain = catalogue.items(kind)
-    # Kept, as Blender asks for, and made anew for another list or picture only: this is asked for
+    # Kept alive, as Blender requires, and rebuilt only for another list or picture: this is called
     # at each drawing of the panel.
     made_for, found = _items.get(kind, (None, []))
     if made_for is not plain:
@@ -47,23 +51,23 @@ def _numbered(kind: str, names: list[str]) -> dict[str, int]:
 
 
 def picture(kind: str, name: str) -> str:
-    """The file of an entry's picture; empty while there is none."""
+    """Return the file of an entry's picture; empty if there is none yet."""
     return _files.get((kind, name), "")
 
 
 def is_begun(kind: str) -> bool:
-    """Whether a picture of this kind is drawn."""
+    """Whether at least one picture of a kind is drawn."""
     return any(each == kind for each, _ in _files)
 
 
 def missing(kind: str) -> list[str]:
-    """Entries of this kind that have no picture, and none on its way."""
+    """Return the entries of a kind whose picture is neither drawn nor requested."""
     names = [row["name"] for row in catalogue.entries(kind)]
     return [name for name in names if (kind, name) not in _asked]
 
 
 def draw_missing(kind: str) -> None:
-    """Ask for the pictures that are missing; each is shown when it is there."""
+    """Request the missing pictures; each is shown when it arrives."""
     for name in missing(kind):
         _asked.add((kind, name))
 
@@ -82,12 +86,12 @@ def draw_missing(kind: str) -> None:
 
 
 def waiting(kind: str) -> int:
-    """How many pictures are on their way."""
+    """Return the number of pictures of a kind that are requested and not yet drawn."""
     return sum(each == kind for each, _ in _asked - _files.keys())
 
 
 def forget(kind: str, name: str) -> None:
-    """The entry has changed: its picture is of the one before."""
+    """Forget the picture of an entry that has changed."""
     _files.pop((kind, name), None)
     _items.pop(kind, None)
     _asked.discard((kind, name))

@@ -16,7 +16,7 @@ from ..scene.gather import coating_values, free_name, material_values
 from . import gallery
 
 KEEPING = "Keeping the material"
-"""What messages are about, so that they are told beside the button that was pressed."""
+"""Title under which messages are shown beside the button that was pressed."""
 
 
 def _materials(values: Any, context: bpy.types.Context | None) -> catalogue.Items:
@@ -28,7 +28,7 @@ def _coatings(values: Any, context: bpy.types.Context | None) -> catalogue.Items
 
 
 class OPTISENSE_PG_material_choice(bpy.types.PropertyGroup):
-    """What is chosen in the library."""
+    """Chosen entry of the library, and its preview."""
 
     kind: EnumProperty(
         name="For",
@@ -50,7 +50,7 @@ class OPTISENSE_PG_material_choice(bpy.types.PropertyGroup):
 
     @property
     def entry(self) -> str:
-        """The library's name of what is chosen; empty while the library is not loaded."""
+        """Name of the chosen entry in the library; empty while the library is not loaded."""
         name = self.material if self.kind == "material" else self.coating
         return "" if name == "NONE" else name
 
@@ -63,12 +63,14 @@ _chosen = polls.needing(lambda c: _choice(c).entry, "The library is not loaded y
 
 
 def _is_for_a_coating(context: bpy.types.Context) -> bool:
-    """The sensing surface is selected, or what is chosen is no coating."""
+    """Whether the sensing surface is selected, or the chosen entry is no coating."""
     return _choice(context).kind != "coating" or any(_are_coated(context))
 
 
 def _is_for_a_material(context: bpy.types.Context) -> bool:
-    """Any other part is selected, or what is chosen is no material."""
+    """Whether a part other than the sensing surface is selected, or the chosen entry is no
+    material.
+    """
     return _choice(context).kind != "material" or not all(_are_coated(context))
 
 
@@ -78,7 +80,7 @@ def _are_coated(context: bpy.types.Context) -> list[bool]:
 
 
 def _part(context: bpy.types.Context) -> bpy.types.PropertyGroup | None:
-    """The active part."""
+    """Return the properties of the active part, or None."""
     active = context.active_object
     is_part = active is not None and active.optisense.kind == "PART"
     return active.optisense if is_part else None

@@ -1,4 +1,4 @@
-"""Whether a search can succeed, and how long it takes: told before it begins."""
+"""Advice before a search: whether it can succeed, and how long it takes."""
 
 from __future__ import annotations
 
@@ -13,14 +13,18 @@ from ..engine import session
 from ..scene.paths import objective
 
 BY_RAYS, BY_PICTURES = "aoap", "rgb2normal"
-"""The objectives that a search begins with: where rays go, and what the picture tells of shapes."""
+"""Objectives that a new search is set to: for parameters that move rays, and for those that change
+brightness and colours only.
+"""
 
 BRIGHTNESS = re.compile(r"coating\.|lights\.[^.]+\.(flux|colour)|materials\.[^.]+\.reflectance")
-"""Begins the paths that change brightness and colours only; the engine knows all of them."""
+"""Pattern of the paths that change brightness and colours only; the engine knows all such paths."""
 
 
 def choose_objective(search: bpy.types.PropertyGroup) -> None:
-    """Let the usual objective fit what varies; one that the user has chosen stays."""
+    """Set the default objective that suits the parameters; an objective chosen by the user
+    stays.
+    """
     texts = vary.texts_of(search.vary)
     if search.objective in (BY_RAYS, BY_PICTURES) and texts:
         bright = all(BRIGHTNESS.match(text) for text in texts)
@@ -28,10 +32,10 @@ def choose_objective(search: bpy.types.PropertyGroup) -> None:
 
 
 def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict[str, Any]) -> str:
-    """How long a search takes, in words.
+    """Return the number of trials and the usual duration of a search, in words.
 
     Raises:
-        EngineError: it can't succeed, or there is no engine.
+        EngineError: the search can't succeed, or there is no engine.
     """
     told = session.ask_and_wait(
         "advise",
@@ -48,7 +52,7 @@ def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict
 
 
 def duration(seconds: float) -> str:
-    """About how long, in words."""
+    """Return an approximate duration in words."""
     for unit, name in ((3600.0, "hours"), (60.0, "minutes")):
         if seconds >= 1.5 * unit:
             return f"{seconds / unit:.0f} {name}"
@@ -56,10 +60,11 @@ def duration(seconds: float) -> str:
 
 
 def is_flat(scores: list[float]) -> bool:
-    """Whether all trials of a search scored alike, so that nothing is to be found."""
+    """Whether all trials of a search scored alike, so that the parameters have no effect."""
     return len(scores) >= LEAST and max(scores) - min(scores) <= ALIKE * max(map(abs, scores))
 
 
 LEAST, ALIKE = 5, 1e-6
-"""Trials after which alike scores are told, and the part of a score up to which they are alike: the
-rounding of single precision."""
+"""Number of trials after which equal scores are reported, and the relative difference up to which
+scores are equal: the rounding error of single precision.
+"""

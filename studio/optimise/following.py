@@ -16,21 +16,21 @@ from ..simulate import picture
 
 CURVE = "OptiSense search"
 CURVE_SIZE = (220, 150)
-"""Width and height in pixels of the picture of a search's curve, as wide as the sidebar."""
+"""Width and height of the picture of a search's curve, pixels; as wide as the sidebar."""
 GHOSTS = "Best so far"
 COLOUR = (0.1, 0.85, 0.95, 0.4)
-"""Colour of ghosts; no light, no part and no outline has it."""
+"""Colour of ghosts (red, green, blue, opacity); no light, part or outline has it."""
 
 SAME_PLACE = 1e-3
-"""mm: what is nearer to its place in the scene is not drawn."""
+"""Distance in mm below which a vertex counts as unmoved and is not drawn."""
 
 
 _curve: dict[int, float | None] = {}
-"""The score of each trial by its number: trials may be told twice."""
+"""Score of each trial by its number; trials may be reported twice."""
 
 
 def begin() -> None:
-    """Forget the search before."""
+    """Clear the results of the search before."""
     _curve.clear()
     found = bpy.context.window_manager.optisense_found
     found.best = found.values = found.start = found.ended = found.offer = found.conditions = ""
@@ -38,7 +38,7 @@ def begin() -> None:
 
 
 def take(event: dict[str, Any]) -> None:
-    """An event of a search: a trial is finished."""
+    """Handle an event of a search: show a trial that is finished."""
     if event.get("event") != "trial":
         return
     scores = event.get("scores") or {}
@@ -66,7 +66,7 @@ def take(event: dict[str, Any]) -> None:
 
 
 def take_curve(rows: list[dict[str, Any]]) -> None:
-    """All trials of a study at once."""
+    """Show all trials of a study at once."""
     begin()
     best = None
     for row in rows:
@@ -78,7 +78,7 @@ def take_curve(rows: list[dict[str, Any]]) -> None:
 
 
 def show_ghosts(scene: bpy.types.Scene, shapes: dict[str, Any]) -> None:
-    """Draw what is not as in the scene of the parts of the best design so far, see-through."""
+    """Draw those parts of the best design so far that differ from the scene, transparent."""
     clear_ghosts(scene)
     for name, files in shapes.items():
         vertices, faces = np.load(files["vertices"]), np.load(files["faces"])
@@ -97,7 +97,7 @@ def show_ghosts(scene: bpy.types.Scene, shapes: dict[str, Any]) -> None:
 
 
 def _moved(scene: bpy.types.Scene, name: str, vertices: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """(n,) which vertices of a part are elsewhere in the scene."""
+    """Return which vertices of a part lie elsewhere in the scene, (n,) bool."""
     part = object_of(scene, "PART", name)
     if part is None or len(part.data.vertices) != len(vertices):
         return np.ones(len(vertices), dtype=bool)
@@ -106,7 +106,7 @@ def _moved(scene: bpy.types.Scene, name: str, vertices: NDArray[np.float64]) -> 
 
 
 def clear_ghosts(scene: bpy.types.Scene) -> None:
-    """Remove what `show_ghosts` drew."""
+    """Remove the objects of `show_ghosts`."""
     for each in objects_of(scene, "SHOWN"):
         if each.optisense.key.startswith("ghost "):
             mesh = each.data
@@ -120,17 +120,17 @@ def has_trials() -> bool:
 
 
 def known_scores() -> list[float]:
-    """The scores of the trials so far; those that failed have none."""
+    """Return the scores of the trials so far, without failed trials."""
     return [score for score in _curve.values() if score is not None]
 
 
 def finished(result: dict[str, Any]) -> None:
-    """The search is over."""
+    """Show that the search is over, and why."""
     found = bpy.context.window_manager.optisense_found
     done = result.get("done")
     why = "stopped" if result.get("interrupted") else result.get("ended") or "finished"
     found.ended = f"{done} trials: {why}"
-    if result.get("interrupted"):  # given up: what is drawn is as it was before
+    if result.get("interrupted"):  # the scene stays as before the search
         clear_ghosts(bpy.context.scene)
     notes = [str(note) for note in result.get("notes") or []]
     session.state().note = "; ".join(notes)

@@ -1,4 +1,6 @@
-"""A study that was not over when Blender was closed: found again when its sensor is opened."""
+"""Recovery of a study that was not over when Blender was closed, when its sensor is opened
+again.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +16,17 @@ from ..sensor import opening
 from . import following
 
 NOT_OVER = (None, "", "interrupted")
-"""Why a study ended that can go on: it was stopped, or nobody lived to say."""
+"""Reasons for the end of a study that can continue: it was stopped, or nothing recorded its end."""
 
 
 def study_of(scene: bpy.types.Scene) -> str:
-    """The folder of the scene's study as an absolute path; empty where none is named."""
+    """Return the folder of the scene's study as an absolute path; empty if the scene names none."""
     text = scene.optisense_search.study
     return str(absolute(text)) if text else ""
 
 
 def studies_beside(folder: Path) -> list[Path]:
-    """Where the searches of a design's folder are kept, the last one at the end."""
+    """Return the folders of the searches beside a design's folder, the latest last."""
     found: list[Path] = []
     while (study := folder.with_name(f"{folder.name}-search-{len(found) + 1}")).exists():
         found.append(study)
@@ -32,15 +34,15 @@ def studies_beside(folder: Path) -> list[Path]:
 
 
 def new_study(folder: Path) -> Path:
-    """A folder beside the design's that is not there yet."""
+    """Return a folder beside the design's folder that does not exist yet."""
     return folder.with_name(f"{folder.name}-search-{len(studies_beside(folder)) + 1}")
 
 
 def offer(scene: bpy.types.Scene) -> None:
-    """Show how far the sensor's study is, where it is not over, and that it can go on.
+    """Show the progress of the sensor's study if it is not over, and offer to continue it.
 
-    It is the study that the scene names, or else the last one beside the design's folder: a .blend
-    file may have been saved before the search began, or never.
+    The study is the one that the scene names, otherwise the last one beside the design's folder:
+    the .blend file may have been saved before the search began, or never.
     """
     following.begin()
     design, study = scene.optisense, study_of(scene)
@@ -73,7 +75,7 @@ def offer(scene: bpy.types.Scene) -> None:
         session.redraw()
 
     def unreadable(_: EngineError) -> None:
-        """That is said when the user asks for this study."""
+        """Ignore an unreadable study; the error is shown when the user asks for this study."""
 
     session.ask("study", known, unreadable, study=study)
 

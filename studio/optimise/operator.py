@@ -1,4 +1,4 @@
-"""Choose what may vary, search, look, apply."""
+"""Operators of a search: choose parameters, search, inspect, apply."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ from .suggesting import suggestions
 
 TITLE = "Searching"
 WIDEST = 72
-"""Number of characters of an entry of the menu Vary; longer ones do not fit beside the sidebar."""
+"""Number of characters above which an entry of the menu Vary is shortened: it would not fit beside
+the sidebar.
+"""
 
 
 class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):
@@ -82,7 +84,7 @@ class OPTISENSE_OT_vary_remove(polls.Checked, bpy.types.Operator):
 
 
 def _is_taken(folder: Path) -> bool:
-    """Whether something is in a folder; what can't be looked into, the engine tells of."""
+    """Whether a folder is not empty; False for an unreadable one, which the engine reports."""
     try:
         return folder.is_dir() and any(folder.iterdir())
     except OSError:
@@ -90,7 +92,7 @@ def _is_taken(folder: Path) -> bool:
 
 
 def wait_property() -> Any:
-    """A property by which scripts wait until the search is over."""
+    """Return the property with which scripts wait until the search is over."""
     return BoolProperty(
         name="Wait",
         description="Return when the search is over; a click never waits",
@@ -159,7 +161,7 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
 
 
 class _WithStudy(polls.Checked):
-    """Operators that need a study that was begun."""
+    """Base of operators that need a study that was begun."""
 
     checks = (
         *polls.ASKING,

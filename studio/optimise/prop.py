@@ -17,7 +17,7 @@ _objective_items: catalogue.Items = []
 
 
 def _objectives(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> catalogue.Items:
-    """The engine's objectives, and the one of the user's own that is named under Evaluate."""
+    """Return the engine's objectives, and the user's own objective that is named under Evaluate."""
     global _objective_items
     own = bpy.context.window_manager.optisense_evaluation.own.strip()
     row = [("OWN", "Your own", f"As under Evaluate: {own}")] if own else []
@@ -30,7 +30,7 @@ def _methods(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> cat
 
 
 class OPTISENSE_PG_vary(bpy.types.PropertyGroup):
-    """A parameter of the search; its name is a label."""
+    """Parameter of the search; its name is a label."""
 
     active: BoolProperty(name="Vary", description="The search changes it", default=True)
     text: StringProperty(
@@ -39,7 +39,9 @@ class OPTISENSE_PG_vary(bpy.types.PropertyGroup):
 
 
 class OPTISENSE_PG_search(bpy.types.PropertyGroup):
-    """The search of a scene; kept in the .blend file, so that it can go on another day."""
+    """Settings of the search of a scene; kept in the .blend file, so that it can be continued
+    later.
+    """
 
     vary: CollectionProperty(type=OPTISENSE_PG_vary)
     vary_index: IntProperty(options={"HIDDEN"})
@@ -93,7 +95,7 @@ def _method_chosen(found: bpy.types.PropertyGroup, context: bpy.types.Context) -
 
 
 class OPTISENSE_PG_found(bpy.types.PropertyGroup):
-    """What the running search has found; never saved."""
+    """Results of the running search; never saved."""
 
     objective_choice: EnumProperty(
         name="Objective", items=_objectives, options={"SKIP_SAVE"},

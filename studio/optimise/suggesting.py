@@ -1,4 +1,4 @@
-"""Parameters of the selected object that a search may change."""
+"""Suggestions for parameters of the selected object that a search may change."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..scene.gather import part_names
 
 
 def suggestions(context: bpy.types.Context) -> list[vary.Suggestion]:
-    """What a search may change of the active object."""
+    """Return suggestions for parameters of the active object."""
     active = context.active_object
     own = None if active is None else active.optisense
     if own is None:
@@ -29,7 +29,7 @@ def suggestions(context: bpy.types.Context) -> list[vary.Suggestion]:
 
 
 def _names(kind: str) -> list[str]:
-    """What the library has of a kind; empty until the engine has told."""
+    """Return the names of the library's entries of a kind; empty until the engine has answered."""
     return [row["name"] for row in catalogue.entries(kind)]
 
 

@@ -12,7 +12,7 @@ from .following import CURVE, has_trials, known_scores
 
 
 class OPTISENSE_UL_vary(bpy.types.UIList):
-    """What may vary: tick, label, range."""
+    """List of the parameters of a search: tick, label, range."""
 
     def draw_item(self, context, layout, data, item, icon, active_data, active_property) -> None:
         row = layout.row(align=True)

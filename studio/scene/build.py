@@ -1,4 +1,4 @@
-"""The scene of a design."""
+"""Construction of the scene of a design."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .meshes import new_mesh
 from .properties import USUAL_COATING
 
 MILLIMETRE = 0.001
-"""Metres in a millimetre, which is the length of a unit of the scene."""
+"""Length of a millimetre in metres, the unit length of the scene."""
 
 
 def build(
@@ -28,13 +28,13 @@ def build(
     *,
     keep_others: bool = False,
 ) -> None:
-    """Put a design into a scene, in place of the one that was there.
+    """Put a design into a scene, in place of the design in it.
 
     Args:
-        scene: what else is in it stays.
-        document: what `design.yaml` holds.
-        meshes: the parts at rest, by name, mm.
-        keep_others: the contacts of the design before press on this one, and its references stay.
+        scene: scene to fill; objects that belong to no design stay.
+        document: contents of `design.yaml`.
+        meshes: meshes of the parts at rest by name, mm.
+        keep_others: keep the contacts, which then press on the new sensor, and the references.
     """
     clear(scene, *(["CONTACT", "REFERENCE"] if keep_others else []))
     scene.unit_settings.system = "METRIC"
@@ -71,14 +71,14 @@ def _coating(coating: bpy.types.PropertyGroup, values: dict[str, Any]) -> None:
 
 
 def set_coating(scene: bpy.types.Scene, values: dict[str, Any]) -> None:
-    """Coat the sensing surface with something else, such as a library coating."""
+    """Replace the coating of the sensing surface, for example by one of the library."""
     _coating(scene.optisense.coating, values)
 
 
 def add_material(
     design: bpy.types.PropertyGroup, name: str, values: dict[str, Any]
 ) -> bpy.types.PropertyGroup:
-    """A material, or the one of that name with other values."""
+    """Add a material, or replace the values of the one with that name."""
     material = design.materials.get(name) or design.materials.add()
     material.name = name
     material.fill(values["kind"], values)
@@ -88,7 +88,7 @@ def add_material(
 def add_part(
     scene: bpy.types.Scene, key: str, values: dict[str, Any], mesh: Mesh
 ) -> bpy.types.Object:
-    """An object for a part."""
+    """Add an object for a part."""
     part = bpy.data.objects.new(key, new_mesh(key, mesh))
     own = part.optisense
     own.order = next_order(scene, "PART")
@@ -106,7 +106,7 @@ def add_part(
 def add_light_group(
     design: bpy.types.PropertyGroup, name: str, values: dict[str, Any]
 ) -> bpy.types.PropertyGroup:
-    """A light group without its lights."""
+    """Add a light group without lights."""
     group = design.light_groups.add()
     group.name = name
     group.model = values["model"]

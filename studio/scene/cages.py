@@ -18,20 +18,20 @@ from .collections import CAGES, collection, next_order, object_of, objects_of
 from .meshes import REST, remembered, show_vertices, shown_vertices
 
 MOST_KEPT = 32
-"""Number of cages whose weights are kept, so that bending one again needs no new ones."""
+"""Number of cages whose weights are cached, so that bending one again needs no new ones."""
 _weights: dict[tuple[bytes, bytes, tuple[int, int, int]], NDArray[np.float32]] = {}
 
 when_bent: list[Callable[[], None]] = []
-"""Called when parts took the shape that a cage gives them."""
+"""Callbacks for parts that took the shape of their cage."""
 
 
 def add_cage(scene: bpy.types.Scene, key: str, values: dict[str, Any]) -> bpy.types.Object:
-    """An object for a cage; its parts take their shape from it.
+    """Add an object for a cage; its parts follow it.
 
     Args:
-        scene: where to.
-        key: its name in the design.
-        values: the cage as the design file holds it.
+        scene: scene of the design.
+        key: name of the cage in the design.
+        values: cage as in the design file.
     """
     points = current_points(values)
     mesh = bpy.data.meshes.new(f"cage {key}")
@@ -56,13 +56,13 @@ def add_cage(scene: bpy.types.Scene, key: str, values: dict[str, Any]) -> bpy.ty
 
 
 def lock(part: bpy.types.Object, locked: bool) -> None:
-    """A part in a cage is shaped by it, and not moved by itself."""
+    """Lock or unlock a part: a part in a cage is shaped by the cage, and not moved by itself."""
     part.lock_location = part.lock_rotation = part.lock_scale = (locked,) * 3
     part.optisense.is_caged = locked
 
 
 def release(scene: bpy.types.Scene) -> None:
-    """Let parts be moved whose cage was deleted, and copies, which are in none."""
+    """Unlock parts whose cage was deleted, and copies of parts, which are in no cage."""
     cages = objects_of(scene, "CAGE")
     bent = {name for cage in cages for name in cage_data(cage)["parts"]}
     for part in objects_of(scene, "PART"):
@@ -73,13 +73,13 @@ def release(scene: bpy.types.Scene) -> None:
 
 
 def cage_data(cage: bpy.types.Object) -> dict[str, Any]:
-    """The cage as it was read, or last set by an operator."""
+    """Return the cage as it was read from the file, or last set by an operator."""
     values: dict[str, Any] = json.loads(cage.optisense.data)
     return values
 
 
 def current_points(values: dict[str, Any]) -> NDArray[np.float64]:
-    """(N, 3) mm: where a cage's control points are."""
+    """Return the positions of a cage's control points, (N, 3) mm."""
     blend = values.get("blend")
     if blend is None:
         return as_array(values["points"])
@@ -88,17 +88,17 @@ def current_points(values: dict[str, Any]) -> NDArray[np.float64]:
 
 
 def as_array(points: list[dict[str, float]]) -> NDArray[np.float64]:
-    """(N, 3) of a list of points of the design file."""
+    """Convert a list of points of the design file to an array, (N, 3)."""
     return np.array([(p["x"], p["y"], p["z"]) for p in points], dtype=np.float64).reshape(-1, 3)
 
 
 def as_points(array: NDArray[np.float64]) -> list[dict[str, float]]:
-    """A list of points for the design file."""
+    """Convert an array of points, (N, 3), to a list for the design file."""
     return [{"x": x, "y": y, "z": z} for x, y, z in array.tolist()]
 
 
 def shown_points(cage: bpy.types.Object) -> NDArray[np.float32]:
-    """(N, 3) mm: the control points as drawn, also while they are being edited."""
+    """Return the control points as drawn, (N, 3) mm, also while they are being edited."""
     if cage.mode == "EDIT":
         mesh = bmesh.from_edit_mesh(cage.data)
         return np.array([vertex.co for vertex in mesh.verts], dtype=np.float32).reshape(-1, 3)
@@ -106,7 +106,7 @@ def shown_points(cage: bpy.types.Object) -> NDArray[np.float32]:
 
 
 def cage_values(cage: bpy.types.Object) -> dict[str, Any]:
-    """The cage as the design file holds it, with the points as they are now.
+    """Return the cage as for the design file, with its present control points.
 
     Raises:
         SceneError: control points were added or removed.
@@ -133,7 +133,7 @@ def cage_values(cage: bpy.types.Object) -> dict[str, Any]:
 
 
 def show_blend(cage: bpy.types.Object) -> None:
-    """Draw a cage with two ends at its present blend, and let its parts follow."""
+    """Draw a cage with bounds at its present blend, and let its parts follow."""
     if cage.optisense.kind != "CAGE":
         return
     values = cage_data(cage)
@@ -159,7 +159,7 @@ def set_points(cage: bpy.types.Object, points: NDArray[np.float64]) -> None:
 
 
 def follow(scene: bpy.types.Scene, cage: bpy.types.Object) -> None:
-    """Give the parts of a cage the shape that its control points say."""
+    """Deform the parts of a cage according to its control points."""
     values = cage_data(cage)
     points = shown_points(cage)
     resolution = tuple(values["resolution"])
@@ -172,7 +172,7 @@ def follow(scene: bpy.types.Scene, cage: bpy.types.Object) -> None:
             continue
         try:
             weights = _kept_weights(rest, np.array(values["box"]), resolution)
-        except ValueError:  # the engine's check says so in words
+        except ValueError:  # The engine's check reports the error in words.
             continue
         show_vertices(part.data, weights @ points)
     for each in when_bent:
@@ -207,10 +207,10 @@ def _moved(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 
 def show_idle(scene: bpy.types.Scene) -> None:
-    """Draw and select by clicks only the cage that is worked at: it would hide the lights.
+    """Show and make selectable only the cage that is in use: others would hide the lights.
 
-    That is the active one, those that are selected, or the one around the active part; of others
-    the box is drawn.
+    A cage is in use if it is active or selected, or contains the active part; others are drawn as
+    boxes.
     """
     layer = bpy.context.view_layer
     active = None if layer is None else layer.objects.active

@@ -16,22 +16,23 @@ from .collections import OPTICAL_SYSTEM, collection, objects_of
 from .lamps import place
 
 DRAWN_SIZE = 5.0
-"""The drawn size (mm) of the camera's pyramid."""
+"""Drawn size of the camera's pyramid, mm."""
 
 VIEW = ("model", "projection", "fov", "resolution")
 POSE = ("position", "direction", "up")
-"""What properties and the object hold of a camera."""
+"""Fields of a camera that Blender's properties and the object's pose hold."""
 
 FACTS = ("pixel_size", "focal_length", "f_number")
-"""What the library says of a camera that is no part of designs."""
+"""Fields of a library camera that are not part of designs."""
 
 WIDEST_DRAWN = 170.0
-"""Largest field of view in degrees that a frustum is drawn with, as Blender's pinhole cameras see
-less than 180."""
+"""Largest field of view in degrees that a frustum is drawn with, as Blender's pinhole cameras have
+less than 180.
+"""
 
 
 def add_camera(scene: bpy.types.Scene, values: dict[str, Any]) -> bpy.types.Object:
-    """An object for the design's camera; it becomes the scene's."""
+    """Add an object for the design's camera; it becomes the camera of the scene."""
     camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
     own = camera.optisense
     own.data = json.dumps(values)
@@ -53,7 +54,7 @@ def add_camera(scene: bpy.types.Scene, values: dict[str, Any]) -> bpy.types.Obje
 
 
 def show(camera: bpy.types.Object) -> None:
-    """Let Blender's camera see what the sensor's does, as far as a pinhole can."""
+    """Adapt Blender's camera to the sensor's, as far as a pinhole camera can."""
     if not isinstance(camera.data, bpy.types.Camera):
         return
     values = camera.optisense
@@ -64,10 +65,10 @@ def show(camera: bpy.types.Object) -> None:
 
 
 def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
-    """The camera as the design file holds it; None where there is none.
+    """Return the camera as for the design file; None if there is no camera.
 
     Raises:
-        SceneError: there is more than one.
+        SceneError: there is more than one camera.
     """
     cameras = objects_of(scene, "CAMERA")
     if not cameras:
@@ -92,6 +93,8 @@ def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
 
 
 def imaging(values: dict[str, Any]) -> dict[str, Any]:
-    """What a camera has besides its view: what its lens, its sensor and its processor do."""
+    """Return the fields of a camera besides its view and pose: lens, image sensor and
+    processing.
+    """
     others = (*VIEW, *POSE, *FACTS)
     return {name: value for name, value in values.items() if name not in others and value}

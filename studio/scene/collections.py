@@ -1,4 +1,4 @@
-"""The collections that a sensor design lives in."""
+"""Collections of Blender that hold the objects of a sensor design."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ALL = (REFERENCE, OPTICAL_SYSTEM, CAGES, CONTACTS)
 
 
 def collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
-    """The scene's collection of that name; made where there is none."""
+    """Return the scene's collection with a name; create it if it does not exist."""
     for child in scene.collection.children_recursive:
         if child.name.split(".")[0] == name:
             return child
@@ -25,13 +25,13 @@ def collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def objects_of(scene: bpy.types.Scene, *kinds: str) -> list[bpy.types.Object]:
-    """The scene's objects of some kinds, in the order of the design file."""
+    """Return the scene's objects of some kinds, in the order of the design file."""
     found = [each for each in scene.objects if each.optisense.kind in kinds]
     return sorted(found, key=lambda each: (each.optisense.order, each.name))
 
 
 def is_edited(depsgraph: bpy.types.Depsgraph, *kinds: str) -> bool:
-    """Whether an update of Blender's dependency graph is of an object of some kinds."""
+    """Whether an update of Blender's dependency graph concerns an object of some kinds."""
     items = (update.id.original for update in depsgraph.updates)
     return any(
         isinstance(item, bpy.types.Object) and item.optisense.kind in kinds for item in items
@@ -39,16 +39,17 @@ def is_edited(depsgraph: bpy.types.Depsgraph, *kinds: str) -> bool:
 
 
 def object_of(scene: bpy.types.Scene, kind: str, key: str) -> bpy.types.Object | None:
-    """The object of a kind that stands for the part, cage or group member called `key`."""
+    """Return the object of a kind that represents the part, cage or group member called `key`."""
     return next((each for each in objects_of(scene, kind) if each.optisense.key == key), None)
 
 
 def select_only(*chosen: bpy.types.Object) -> None:
-    """Select nothing but these, the last of them active; those that the view does not have, not.
+    """Select only the given objects, and make the last one active; objects outside the view are
+    skipped.
 
-    Cages that no click finds are selected, too.
+    Cages that can't be selected by a click are selected, too.
     """
-    layer = bpy.context.view_layer  # a timer's context knows no selected objects
+    layer = bpy.context.view_layer  # The context of a timer has no selected objects.
     for each in layer.objects:
         each.select_set(False)
     for each in chosen:
@@ -59,13 +60,13 @@ def select_only(*chosen: bpy.types.Object) -> None:
 
 
 def next_order(scene: bpy.types.Scene, kind: str) -> int:
-    """An order behind all objects of a kind."""
+    """Return an order number greater than those of all objects of a kind."""
     return max((each.optisense.order for each in objects_of(scene, kind)), default=-1) + 1
 
 
 def clear(scene: bpy.types.Scene, *but: str) -> None:
-    """Remove the design from a scene: its objects, all but those of some kinds, and what only they
-    used.
+    """Remove the design from a scene: its objects, except those of some kinds, and data that only
+    they used.
     """
     for each in [one for one in _ours(scene) if one.optisense.kind not in but]:
         data = each.data

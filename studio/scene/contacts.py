@@ -1,4 +1,4 @@
-"""Contacts: what presses on the sensing surface, drawn where and as deep as it does."""
+"""Contacts: objects that press on the sensing surface, drawn at their place and depth."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from .meshes import mesh_of
 from .paths import absolute
 
 COLOUR = (0.48, 0.37, 0.07, 1.0)
-"""Colour of contacts in the 3-D view (red, green, blue, alpha, 0 to 1); no part has it."""
+"""Colour of contacts in the 3D view (red, green, blue, alpha, 0 to 1); no part has it."""
 
 file_meshes: dict[str, Mesh] = {}
-"""Meshes of indenter files, by path, in the files' own units; those that are known."""
+"""Known meshes of indenter files by path, in the files' own units."""
 
 when_file_unknown: list[Callable[[str], None]] = []
-"""Called with the path of an indenter's file whose mesh has to be drawn and is not known."""
+"""Callbacks with the path of an indenter's file whose mesh has to be drawn and is not known."""
 
 
 def add_contact(
     scene: bpy.types.Scene, point: tuple[float, float, float], outward: tuple[float, float, float]
 ) -> bpy.types.Object:
-    """An object for a ball that presses at a point of the sensing surface.
+    """Add an object for a ball that presses at a point of the sensing surface.
 
     It stays on the surface when it is moved.
 
     Args:
-        scene: where to.
-        point: (3,) mm.
-        outward: (3,) the surface's normal, out of the sensor.
+        scene: scene of the design.
+        point: point of contact, (3,) mm.
+        outward: normal of the surface, (3,), out of the sensor.
     """
     contact = bpy.data.objects.new("contact", bpy.data.meshes.new("contact"))
     values = contact.optisense
     values.order = next_order(scene, "CONTACT")
     values.kind = "CONTACT"
     contact.color = COLOUR
-    # The surface says how it lies, and its own values how large it is and how it is turned.
+    # Its rotation follows the surface, and its size its own properties.
     contact.lock_rotation = contact.lock_scale = (True, True, True)
     turn = Vector(outward).to_track_quat("Z", "Y").to_matrix().to_4x4()
     contact.matrix_world = Matrix.Translation(point) @ turn
@@ -55,7 +55,7 @@ def add_contact(
 
 
 def stay_on_surface(scene: bpy.types.Scene, contact: bpy.types.Object) -> None:
-    """Hold a contact on the sensing surface that the scene has now, at the nearest place."""
+    """Constrain a contact to the nearest point of the scene's present sensing surface."""
     contact.constraints.clear()
     surface = sensing_surface(scene)
     if surface is not None:
@@ -68,13 +68,13 @@ def stay_on_surface(scene: bpy.types.Scene, contact: bpy.types.Object) -> None:
 
 
 def sensing_surface(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The object of the sensing surface."""
+    """Return the object of the sensing surface, or None."""
     parts = objects_of(scene, "PART")
     return next((each for each in parts if each.optisense.role == "sensing_surface"), None)
 
 
 def redraw(contact: bpy.types.Object) -> None:
-    """Draw the indenter: its own z points outward, its lowest point lies at -depth."""
+    """Draw the indenter: its z axis points outward, and its lowest point lies at -depth."""
     values = contact.optisense
     if values.kind != "CONTACT" or not isinstance(contact.data, bpy.types.Mesh):
         return
@@ -119,13 +119,13 @@ def redraw(contact: bpy.types.Object) -> None:
 
 
 def absolute_file(values: bpy.types.PropertyGroup) -> str:
-    """The absolute path of a contact's mesh file."""
+    """Return the absolute path of a contact's mesh file."""
     return str(absolute(values.file))
 
 
 def _add_file_mesh(shape: bmesh.types.BMesh, mesh: Mesh, scale: float, depth: float) -> None:
-    """Add the mesh of a file as the engine presses it: the middle of its lowest points at the
-    contact's place.
+    """Add the mesh of a file as the engine presses it: the middle of its lowest points lies at the
+    place of the contact.
     """
     points = np.asarray(mesh.vertices) * scale
     bottom = points[:, 2].min()
@@ -143,12 +143,12 @@ def _add_file_mesh(shape: bmesh.types.BMesh, mesh: Mesh, scale: float, depth: fl
 def contact_values(
     contact: bpy.types.Object, depsgraph: bpy.types.Depsgraph, write: Callable[[Mesh], str]
 ) -> dict[str, Any]:
-    """A contact as the engine reads it.
+    """Return a contact as the engine reads it.
 
     Args:
-        contact: the object.
-        depsgraph: evaluated, for where the surface holds it.
-        write: gives the path of a file that holds a mesh.
+        contact: object of the contact.
+        depsgraph: evaluated dependency graph, for the pose on the surface.
+        write: function that returns the path of a file with the given mesh.
     """
     values = contact.optisense
     held = contact.evaluated_get(depsgraph).matrix_world
@@ -184,12 +184,12 @@ def contact_values(
 
 
 def pressing(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """The contacts that are not hidden, in the order in which the engine is told of them."""
+    """Return the visible contacts in the order in which the engine receives them."""
     return [each for each in objects_of(scene, "CONTACT") if each.visible_get()]
 
 
 def contact_list(
     scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph, write: Callable[[Mesh], str]
 ) -> list[dict[str, Any]]:
-    """All contacts of the scene that press, as `contact_values`."""
+    """Return the values of all visible contacts, as `contact_values`."""
     return [contact_values(each, depsgraph, write) for each in pressing(scene)]

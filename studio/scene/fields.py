@@ -1,4 +1,4 @@
-"""The numbers of a lamp, material or coating of any kind, which the engine describes."""
+"""Property groups for the fields of lamps, materials and coatings, as the engine describes them."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from ..core.numbers import kept, kept_list
 Items = list[tuple[str, str, str]]
 
 NOT_FIELDS = ("kind", "library")
-"""What values hold besides the fields of their kind."""
+"""Entries of a value that are not fields of its kind."""
 
 NUMBERS = ("pair", "triple", "colour")
-"""Properties that hold several numbers."""
+"""Names of the properties that hold several numbers."""
 
 WHAT = "A number of the lamp, material or coating; the button beside it says which"
 
 _filling = False
 MOST_LISTS = 256
-"""Lists of choices that are kept at once: far more than one panel of Blender shows."""
+"""Number of lists of choices that are kept alive: far more than one panel of Blender shows."""
 
 _items: dict[Any, Items] = {}
-"""Choices of menus; Blender needs their texts to be kept."""
+"""Choices of menus; Blender requires their strings to be kept alive."""
 
 
 @contextmanager
 def _quietly() -> Iterator[None]:
-    """Nobody is told of changes meanwhile."""
+    """Suppress the callbacks for changes within the context."""
     global _filling
     before, _filling = _filling, True
     try:
@@ -63,7 +63,7 @@ def _changed(field: bpy.types.PropertyGroup, context: bpy.types.Context) -> None
 
 
 def kept_items(items: Items) -> Items:
-    """The same choices as an object that stays, as Blender asks for."""
+    """Return equal choices as an object that is kept alive, as Blender requires."""
     while len(_items) > MOST_LISTS:
         _items.pop(next(iter(_items)))
     return _items.setdefault(tuple(items), items)
@@ -93,7 +93,7 @@ def _recolour(field: bpy.types.PropertyGroup, colour: Any) -> None:
 
 
 class OPTISENSE_PG_field(bpy.types.PropertyGroup):
-    """A field of a kind, by its name; `holder` says which of the properties below holds it."""
+    """Field of a kind, identified by its name; `holder` names the property that holds its value."""
 
     noun: StringProperty(options={"HIDDEN"})
     kind: StringProperty(options={"HIDDEN"})
@@ -122,12 +122,12 @@ class OPTISENSE_PG_field(bpy.types.PropertyGroup):
 
     @property
     def row(self) -> schema.Row | None:
-        """What the engine says of the field; None where no engine has told."""
+        """Description of the field by the engine; None if no engine has described it."""
         return schema.fields(self.noun, self.kind).get(self.name)
 
     @property
     def value(self) -> Any:
-        """The value as a design holds it, its numbers in single precision."""
+        """Value as in a design, with numbers in single precision."""
         if self.holder in NUMBERS:
             return list(self.pair if self.holder == "pair" else self.triple)
         if self.holder == "data":
@@ -136,14 +136,14 @@ class OPTISENSE_PG_field(bpy.types.PropertyGroup):
 
     @property
     def is_default(self) -> bool:
-        """Whether it says what a file says that leaves it out."""
+        """Whether the value equals the default of a field that a file may omit."""
         row = self.row
         if row is None or row["required"] or row["absent"]:
             return False
         return bool(self.value == row["start"])
 
     def put(self, value: Any) -> None:
-        """Hold another value of the same type."""
+        """Set another value of the same type."""
         if self.holder in ("choice", "data"):
             self.text = value if self.holder == "choice" else json.dumps(value)
         else:
@@ -162,7 +162,7 @@ class OPTISENSE_OT_reset_field(bpy.types.Operator):
 
     @classmethod
     def description(cls, context: bpy.types.Context, properties: Any) -> str:
-        """What the field is: the button beside a field explains it."""
+        """Return the help text of the field, for the button beside it."""
         return f"{properties.help}. Press to reset it" if properties.help else cls.__doc__
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -175,41 +175,41 @@ class OPTISENSE_OT_reset_field(bpy.types.Operator):
 
 
 class HasFields:
-    """What a lamp, material and coating have in common, each a property group with `fields`."""
+    """Mixin of the property groups of lamps, materials and coatings: a kind and its `fields`."""
 
     noun = ""
     kind_name: str
     fields: Any
 
     def fields_changed(self) -> None:
-        """Called when the user has changed a field."""
+        """Callback for a change of a field by the user."""
 
     def value(self, name: str) -> Any:
-        """The value of a field.
+        """Return the value of a field.
 
         Raises:
-            KeyError: this kind has no such field.
+            KeyError: the kind has no such field.
         """
         return self.fields[name].value
 
     def field_values(self) -> dict[str, Any]:
-        """The values of all fields that have one, in single precision."""
+        """Return the values of all fields that are given, in single precision."""
         return {field.name: field.value for field in self.fields if field.given}
 
     def field_rows(self) -> dict[str, schema.Row]:
-        """What the engine says of the fields of this kind."""
+        """Return the engine's descriptions of the fields of this kind."""
         return schema.fields(self.noun, self.kind_name)
 
     def put(self, name: str, value: Any) -> None:
-        """Change a field as the user does.
+        """Change a field as the user would.
 
         Raises:
-            KeyError: this kind has no such field.
+            KeyError: the kind has no such field.
         """
         self.fields[name].put(value)
 
     def fill(self, kind: str, values: dict[str, Any]) -> None:
-        """Become of a kind with these values; fields without one get a value to begin with."""
+        """Set kind and values; fields without a value get their initial value."""
         with _quietly():
             self.kind_name = kind
             self.fields.clear()
@@ -227,17 +227,17 @@ class HasFields:
         self.fields_changed()
 
     def become(self, kind: str) -> None:
-        """Become of another kind; fields that both have keep their values."""
+        """Change the kind; fields that both kinds have keep their values."""
         if kind != self.kind_name:
             self.fill(kind, self.field_values())
 
     def gathered(self, was: dict[str, Any]) -> dict[str, Any]:
-        """The values as the design file holds them, each number as it was read unless changed.
+        """Return the values as for the design file; unchanged numbers stay as they were read.
 
-        What was left out, and is as it was then, stays left out.
+        Fields that were omitted in the file and still have their initial value stay omitted.
 
         Args:
-            was: the values that were read; they count where they are of the same kind.
+            was: values that were read from the file; they are ignored if they are of another kind.
         """
         if was.get("kind", self.kind_name) != self.kind_name:
             was = {}
@@ -256,7 +256,7 @@ class HasFields:
         return found
 
     def draw(self, layout: bpy.types.UILayout) -> None:
-        """Show the fields, with their units; the button beside each says what it is."""
+        """Draw the fields with their units, and a button with the help text beside each."""
         for field in self.fields:
             row = field.row
             if row is None:
@@ -275,7 +275,7 @@ class HasFields:
 
 
 def _holder(value: Any, row: schema.Row | None) -> str:
-    """Which property holds a value."""
+    """Return the name of the property that holds a value."""
     if row is not None and row["type"] in ("choice", "file", "text", "data"):
         return row["type"]
     if isinstance(value, bool):
@@ -292,7 +292,7 @@ def _holder(value: Any, row: schema.Row | None) -> str:
 
 
 def kind_menu(noun: str, first: Items = ()) -> Any:
-    """A menu of all kinds of a noun that stores the name of what is chosen in `kind_name`.
+    """Return properties of a menu of all kinds of a noun; it stores the chosen name in `kind_name`.
 
     Args:
         noun: `emitter` or `material`.

@@ -1,4 +1,4 @@
-"""The design of a scene, each number as it was read unless it was changed."""
+"""Conversion of a scene to its design; unchanged numbers stay as they were read."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ HAVE_FACES = ("elastomer", "support")
 
 
 def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
-    """The design of a scene: what `design.yaml` holds, and the parts at rest by name.
+    """Return the design of a scene: the contents of `design.yaml`, and the meshes of the parts at
+    rest by name.
 
     Raises:
-        SceneError: the scene holds no design, or one that can't be written down.
+        SceneError: the scene holds no design, or one that can't be written.
     """
     document = gather_document(scene)
     caged = caged_parts(document)
@@ -38,15 +39,15 @@ def gather(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, Mesh]]:
 
 
 def caged_parts(document: dict[str, Any]) -> set[str]:
-    """The parts that cages bend."""
+    """Return the names of the parts that are in cages."""
     return {name for cage in document["cages"].values() for name in cage["parts"]}
 
 
 def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
-    """The design of a scene without the meshes of its parts: what `design.yaml` holds.
+    """Return the contents of `design.yaml` for a scene, without the meshes of the parts.
 
     Raises:
-        SceneError: the scene holds no design, or one that can't be written down.
+        SceneError: the scene holds no design, or one that can't be written.
     """
     design = scene.optisense
     if not design.is_open:
@@ -83,7 +84,9 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
 
 
 def _cages(scene: bpy.types.Scene) -> dict[str, Any]:
-    """The cages; copies made in Blender would bend the same parts twice."""
+    """Return the cages; copies made in Blender are refused, as they would bend the same parts
+    twice.
+    """
     cages: dict[str, Any] = {}
     for each in objects_of(scene, "CAGE"):
         key = each.optisense.key
@@ -94,7 +97,7 @@ def _cages(scene: bpy.types.Scene) -> dict[str, Any]:
 
 
 def _own_files(values: dict[str, Any], parts: dict[str, bpy.types.Object]) -> None:
-    """Parts whose meshes are different objects do not share a file."""
+    """Give parts whose meshes are different objects different files."""
     owners: dict[str, str] = {}
     for name in parts:
         file = values[name]["mesh"]
@@ -106,7 +109,7 @@ def _own_files(values: dict[str, Any], parts: dict[str, bpy.types.Object]) -> No
 
 
 def part_names(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
-    """The parts by their names in the design; a copy made in Blender gets one of its own."""
+    """Return the parts by their names in the design; a copy made in Blender gets a new name."""
     found: dict[str, bpy.types.Object] = {}
     for part in objects_of(scene, "PART"):
         name = part.optisense.key
@@ -117,12 +120,12 @@ def part_names(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
 
 
 def free_name(wanted: str, taken: Any, instead: str = "part") -> str:
-    """A name as the design file allows it that is not taken yet.
+    """Return a name that the design file allows and that is not taken.
 
     Args:
-        wanted: of any letters.
-        taken: names, to ask `in` of.
-        instead: where nothing of it is allowed.
+        wanted: desired name, of any characters.
+        taken: names in use, any container that supports `in`.
+        instead: name to use if no character of `wanted` is allowed.
     """
     base = re.sub(r"[^A-Za-z0-9_-]+", "-", wanted).strip("-_")[:58] or instead
     name, number = base, 2
@@ -140,7 +143,7 @@ def _coating(coating: bpy.types.PropertyGroup, before: dict[str, Any]) -> dict[s
 
 
 def coating_values(scene: bpy.types.Scene) -> dict[str, Any]:
-    """The coating of a scene's design as the design file holds it."""
+    """Return the coating of a scene's design as for the design file."""
     before = json.loads(scene.optisense.document)["coating"]
     return _coating(scene.optisense.coating, before)
 
@@ -148,12 +151,12 @@ def coating_values(scene: bpy.types.Scene) -> dict[str, Any]:
 def material_values(
     material: bpy.types.PropertyGroup, before: dict[str, Any] | None = None
 ) -> dict[str, Any]:
-    """A material as the design file holds it."""
+    """Return a material as for the design file."""
     return {"kind": material.kind_name, **material.gathered(before or {})}
 
 
 def _part(name: str, part: bpy.types.Object, before: dict[str, Any]) -> dict[str, Any]:
-    """A part; its thickness, and frosted and painted faces, are as the design file had them."""
+    """Return a part; its thickness, and frosted and painted faces, are as in the design file."""
     own = part.optisense
     values: dict[str, Any] = {"role": own.role, "mesh": own.mesh_file}
     if name != own.key or not own.mesh_file:
@@ -202,7 +205,7 @@ def _lights(scene: bpy.types.Scene, before: dict[str, Any]) -> dict[str, Any]:
 
 
 def _pose(light: bpy.types.Object, number: int) -> dict[str, Any]:
-    """The pose of a light, which has this number in its group."""
+    """Return the pose of a light with a given number in its group."""
     try:
         return light_pose(light)
     except ValueError as error:
@@ -213,7 +216,7 @@ def _pose(light: bpy.types.Object, number: int) -> dict[str, Any]:
 def emitter_values(
     group: bpy.types.PropertyGroup, was: dict[str, Any] | None = None
 ) -> dict[str, Any] | None:
-    """A group's own emitter as the design file holds it; None where it has the library's."""
+    """Return a group's own emitter as for the design file; None if it uses the library's."""
     if group.kind_name == "library":
         return None
     return {"kind": group.kind_name, **group.gathered(was or {})}

@@ -1,4 +1,4 @@
-"""The words of the design file as choices in a menu."""
+"""Keywords of the design file as choices of menus."""
 
 from __future__ import annotations
 
@@ -68,5 +68,6 @@ LOOKS: dict[str, tuple[float, float, float, float]] = {
     "interface": (0.47, 0.38, 0.92, 0.3),
     "indenter": (0.48, 0.37, 0.07, 1.0),
 }
-"""Colour and opacity of each role, linear: gel and acrylic are glassy and housings fade, so that
-lights and what they shine at are seen."""
+"""Colour (linear red, green, blue) and opacity of each role: gel and acrylic look like glass and
+housings fade, so that lights and the lit parts are visible.
+"""

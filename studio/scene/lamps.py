@@ -1,4 +1,4 @@
-"""Lights in the viewport: the emitting window in its real size."""
+"""Lights in the viewport, drawn as the emitting window in its real size."""
 
 from __future__ import annotations
 
@@ -15,24 +15,24 @@ from ..core.pose import matrix_of, pose_of
 from .collections import OPTICAL_SYSTEM, collection, next_order, objects_of
 
 MOST_POSES = 4096
-"""Number of poses of lights that are kept, so that a drawn lamp need not be made again."""
+"""Number of cached poses of lights; most lights stand still while one is moved."""
 
 USUAL_HALF_ANGLE = 60.0
-"""Degrees: that of a flat LED, for a lamp of which nothing is known yet."""
+"""Half angle in degrees of a lamp that is not known yet: that of a flat LED."""
 
 POINT_SIZE = (0.6, 0.6)
-"""The drawn size (mm) of a lamp that is a point or whose size is not known."""
+"""Drawn size in mm of a point lamp, or of one whose size is not known."""
 
 
 def add_light(
     scene: bpy.types.Scene, group: bpy.types.PropertyGroup, pose: dict[str, Any]
 ) -> bpy.types.Object:
-    """An object for one light.
+    """Add an object for one light.
 
     Args:
-        scene: where to.
-        group: its light group.
-        pose: `position`, `direction` and maybe `up`, as in the design file.
+        scene: scene of the design.
+        group: light group of the light.
+        pose: `position`, `direction` and optionally `up`, as in the design file.
     """
     light = bpy.data.objects.new(group.name, _mesh(group))
     values = light.optisense
@@ -49,13 +49,13 @@ def add_light(
 
 
 def place(item: bpy.types.Object, pose: dict[str, Any]) -> None:
-    """Put a light or camera where the design says."""
+    """Move a light or camera to the pose in the design."""
     matrix = matrix_of(pose["position"], pose["direction"], pose.get("up"))
     item.matrix_world = Matrix(matrix.tolist())
 
 
 def light_pose(light: bpy.types.Object) -> dict[str, Any]:
-    """The pose of a light as the design file holds it."""
+    """Return the pose of a light as for the design file."""
     matrix = tuple(tuple(row) for row in light.matrix_world)
     found = _pose(matrix, light.optisense.data)
     return {name: list(values) for name, values in found.items()}
@@ -63,12 +63,14 @@ def light_pose(light: bpy.types.Object) -> dict[str, Any]:
 
 @lru_cache(maxsize=MOST_POSES)
 def _pose(matrix: tuple[tuple[float, ...], ...], data: str) -> dict[str, list[float]]:
-    """The pose of a light by its matrix and as it was read; most lights stand still."""
+    """Return the pose of a light from its matrix and the pose as read; cached, as most lights stand
+    still.
+    """
     return pose_of(np.array(matrix), json.loads(data) if data else {}, up=False)
 
 
 def redraw(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
-    """Draw the lights of a group anew, after a change of the group."""
+    """Redraw the lights of a group after a change of the group."""
     lights = [each for each in objects_of(scene, "LIGHT") if each.optisense.group == group.name]
     if lights:
         mesh = _mesh(group)
@@ -78,14 +80,14 @@ def redraw(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
 
 
 def lamp_colour(group: bpy.types.PropertyGroup) -> tuple[float, float, float, float]:
-    """The colour of a group, as bright as can be drawn."""
+    """Return the colour of a group at the greatest brightness that can be drawn."""
     brightest = max(*group.colour, 1e-6)
     red, green, blue = (0.12 + 0.88 * channel / brightest for channel in group.colour)
     return red, green, blue, 1.0
 
 
 def window(group: bpy.types.PropertyGroup) -> tuple[str, tuple[float, float], float]:
-    """Shape, size (mm) and half angle (degrees) in which a group's lamps are drawn."""
+    """Return shape, size (mm) and half angle (degrees) with which a group's lamps are drawn."""
     known = json.loads(group.drawn) if group.drawn else {}
     face = known.get("window") or {"shape": "disc", "size": POINT_SIZE}
     return face["shape"], tuple(face["size"]), known.get("half_angle", USUAL_HALF_ANGLE)
@@ -104,7 +106,9 @@ def _mesh(group: bpy.types.PropertyGroup) -> bpy.types.Mesh:
 def lamp_drawing(
     shape: str, size: tuple[float, float]
 ) -> tuple[list[tuple[float, ...]], list[tuple[int, int]], list[list[int]]]:
-    """Vertices (mm), edges and faces of a lamp that shines along -z, its height along y."""
+    """Return vertices (mm), edges and faces of a lamp that shines along -z, with its height along
+    y.
+    """
     width, height = size[0] / 2, size[1] / 2
     if shape == "rectangle":
         rim = [(-width, -height), (width, -height), (width, height), (-width, height)]

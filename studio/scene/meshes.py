@@ -1,4 +1,4 @@
-"""Meshes of parts in Blender, with their shape at rest in full precision beside what is shown."""
+"""Meshes of parts in Blender: the drawn shape, and the shape at rest in full precision."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from ..core.mesh_file import Mesh
 from ..core.numbers import joined, kept_array, split
 
 SHARP = math.radians(30.0)
-"""Angle between two faces from which the edge between them is drawn: a cylinder of 13 sides or more
-is drawn round."""
+"""Smallest angle in radians between two faces for which their common edge is sharp; a cylinder of
+13 sides or more is shaded round.
+"""
 
 REST = "optisense_rest"
 NORMAL = "optisense_normal"
 
 
 def new_mesh(name: str, mesh: Mesh) -> bpy.types.Mesh:
-    """A Blender mesh that shows the mesh at rest and remembers it exactly."""
+    """Create a Blender mesh that shows a mesh at rest and stores it exactly."""
     made = bpy.data.meshes.new(name)
     made.from_pydata(mesh.vertices.tolist(), [], mesh.faces.tolist(), shade_flat=False)
     remember(made, REST, mesh.vertices)
@@ -32,7 +33,7 @@ def new_mesh(name: str, mesh: Mesh) -> bpy.types.Mesh:
 
 
 def remember(mesh: bpy.types.Mesh, name: str, values: ArrayLike) -> None:
-    """Keep (n, 3) numbers at the vertices, exactly; undo and .blend files keep them too."""
+    """Store numbers (n, 3) at the vertices exactly; undo and .blend files keep them."""
     for number, part in enumerate(split(values)):
         attribute = mesh.attributes.get(f"{name}_{number}")
         if attribute is None:
@@ -41,7 +42,9 @@ def remember(mesh: bpy.types.Mesh, name: str, values: ArrayLike) -> None:
 
 
 def remembered(mesh: bpy.types.Mesh, name: str) -> NDArray[np.float64] | None:
-    """What `remember` kept, or None."""
+    """Return the numbers that `remember` stored, or None if there are none for the present
+    vertices.
+    """
     parts = []
     for number in range(3):
         attribute = mesh.attributes.get(f"{name}_{number}")
@@ -54,9 +57,9 @@ def remembered(mesh: bpy.types.Mesh, name: str) -> NDArray[np.float64] | None:
 
 
 def shown_vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
-    """(n, 3) where the vertices are drawn."""
+    """Return the drawn positions of the vertices, (n, 3) in mm."""
     values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    # Blender hands attributes out in one piece, a hundred times as fast as one by one.
+    # Attributes are read as one block, a hundred times as fast as vertex by vertex.
     stored = mesh.attributes.get("position")
     if stored is not None and len(stored.data) == len(mesh.vertices):
         stored.data.foreach_get("vector", values)
@@ -66,7 +69,9 @@ def shown_vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
 
 def corners_of(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """(m,) the vertex at each corner of the faces, one face after the other."""
+    """Return the index of the vertex at each corner of the faces, (m,), one face after the
+    other.
+    """
     values = np.empty(len(mesh.loops), dtype=np.int32)
     stored = mesh.attributes.get(".corner_vert")
     if stored is not None and len(stored.data) == len(mesh.loops):
@@ -77,23 +82,25 @@ def corners_of(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
 
 
 def show_vertices(mesh: bpy.types.Mesh, vertices: ArrayLike) -> None:
-    """Draw the vertices (n, 3) somewhere else."""
+    """Move the drawn vertices to other positions (n, 3), mm."""
     flat = np.ascontiguousarray(vertices, dtype=np.float32).ravel()
     mesh.attributes["position"].data.foreach_set("vector", flat)
     mesh.update()
 
 
 def mesh_of(mesh: bpy.types.Mesh) -> Mesh:
-    """What `new_mesh` made a Blender mesh of, or whatever a Blender mesh is."""
+    """Return a Blender mesh as triangles; positions unchanged since `new_mesh` have full
+    precision.
+    """
     return Mesh(kept_array(remembered(mesh, REST), shown_vertices(mesh)), _triangles(mesh))
 
 
 def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
-    """The mesh of a part at rest, in the design's frame.
+    """Return the mesh of a part at rest, in the frame of the design.
 
     Args:
-        part: a mesh object.
-        caged: whether a cage bends it, so that what is shown is not its shape at rest.
+        part: mesh object.
+        caged: whether a cage deforms the part, so that its drawn shape is not that at rest.
     """
     if part.mode == "EDIT":
         part.update_from_editmode()
@@ -111,7 +118,7 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
 
 
 def _modified(part: bpy.types.Object) -> Mesh:
-    """A part as its modifiers shape it, in its own frame."""
+    """Return a part as its modifiers shape it, in its own frame."""
     shown = part.evaluated_get(bpy.context.evaluated_depsgraph_get())
     data = shown.to_mesh()
     mesh = Mesh(shown_vertices(data).astype(np.float64), _triangles(data))
@@ -120,7 +127,9 @@ def _modified(part: bpy.types.Object) -> Mesh:
 
 
 def _placed(mesh: Mesh, world: NDArray[np.float64]) -> Mesh:
-    """A mesh where its object is; one that is mirrored keeps its outside."""
+    """Transform a mesh by the matrix of its object; faces of a mirrored one are reversed, so that
+    they still face outward.
+    """
     if np.array_equal(world, np.eye(4)):
         return mesh
     mirrored = np.linalg.det(world[:3, :3]) < 0.0

@@ -40,7 +40,7 @@ def _blend_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) 
 
 
 class OPTISENSE_PG_object(bpy.types.PropertyGroup):
-    """An object's place in the design."""
+    """Role of an object in the design, and its properties."""
 
     kind: EnumProperty(
         name="Kind", items=kinds.OBJECT_KINDS, description="What it is to the sensor"

@@ -1,4 +1,4 @@
-"""The objects that an error is about."""
+"""Lookup of the objects that an error is about."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from .gather import part_names
 def offending(
     scene: bpy.types.Scene, path: str, part: str, contact: int | None = None
 ) -> list[bpy.types.Object]:
-    """Objects that stand for a place in the design; empty where none does.
+    """Return the objects at a place in the design; empty if there are none.
 
     Args:
-        scene: that holds the design.
-        path: dotted, as in `lights.red.lights[0].position`; may be empty.
-        part: the part that the error names; may be empty.
-        contact: which of the contacts that press, the first is 0; None if it is about none.
+        scene: scene that holds the design.
+        path: dotted path, such as `lights.red.lights[0].position`; may be empty.
+        part: name of the part in the error; may be empty.
+        contact: number of the visible contact, from 0; None if the error is about none.
     """
     if contact is not None:
         return pressing(scene)[contact:][:1]
@@ -44,9 +44,9 @@ def offending(
 
 
 def select(found: list[bpy.types.Object]) -> list[bpy.types.Object]:
-    """Select nothing but these where any can be seen; those that are selected then.
+    """Select only these objects if any of them is visible, and return those that were selected.
 
-    Those that are hidden one by one, to look behind them, are shown again.
+    Objects that were hidden individually are shown again.
     """
     there = set(bpy.context.view_layer.objects)
     for each in found:

@@ -1,4 +1,4 @@
-"""Blender files of before kinds came from the engine: lamps and materials had fixed properties.
+"""Conversion of Blender files of older versions, in which lamps and materials had fixed properties.
 
 Blender keeps such values in the file, as numbers and texts without a description.
 """
@@ -12,7 +12,7 @@ import bpy
 
 EMITTERS = ("library", "area", "ies", "spot")
 MATERIALS = ("dielectric", "conductor", "diffuse", "absorber")
-"""The kinds of then, in the order of their numbers in the file."""
+"""Kinds of those versions, in the order of their numbers in the file."""
 
 FIELDS: dict[str, dict[str, Any]] = {
     "area": {"shape": 0, "size": [2.0, 2.0]},
@@ -24,13 +24,13 @@ FIELDS: dict[str, dict[str, Any]] = {
     "absorber": {},
     "flake": {"reflectance": [0.5] * 3, "eta": [1.0] * 3, "k": [0.0] * 3, "specularity": 0.0},
 }
-"""The properties of then, and the values of those that were never changed."""
+"""Properties of those versions, with the values of properties that were never changed."""
 
 SHAPES = ("disc", "rectangle")
 
 
 def bring_up_to_date(scene: bpy.types.Scene) -> None:
-    """Turn the fixed properties of a scene's design into fields of its kinds."""
+    """Convert the fixed properties of a scene's design to fields of its kinds."""
     design = scene.optisense
     if not design.is_open or design.coating.fields:
         return

@@ -8,14 +8,14 @@ from pathlib import Path
 import bpy
 
 LONGEST = 100
-"""Characters of a file's name that is made of a sensor's."""
+"""Largest number of characters of a file name made of a sensor's name."""
 
 
 def absolute(text: str) -> Path:
-    """The path that a text names, which may be relative to the .blend file, with `//` or without.
+    """Return the path for a text, relative to the .blend file, with `//` or without, or absolute.
 
-    While there is no .blend file yet it is relative to the user's own folder, not to whichever one
-    Blender was started in.
+    Without a .blend file it is relative to the user's home folder, not to the folder in which
+    Blender was started.
     """
     blend = bpy.data.filepath
     base = Path(blend).parent if blend else Path.home()
@@ -23,10 +23,11 @@ def absolute(text: str) -> Path:
 
 
 def chosen(operator: bpy.types.Operator, what: str) -> Path | None:
-    """The path that a file selector gave an operator; where it gave none, the user is told so.
+    """Return the path that an operator's file selector returned; without one, tell the user and
+    return None.
 
     Args:
-        operator: has a `filepath`.
+        operator: operator with a `filepath`.
         what: a file or a folder, in words.
     """
     if not operator.filepath.strip():
@@ -36,11 +37,13 @@ def chosen(operator: bpy.types.Operator, what: str) -> Path | None:
 
 
 def suggested(scene: bpy.types.Scene, end: str = "") -> str:
-    """A path for a file or folder that is named after a scene's sensor."""
+    """Return a path in the home folder that is named after a scene's sensor."""
     name = re.sub(r'[\\/:*?"<>|\x00-\x1f]+', "-", scene.optisense.title).strip(" .-")[:LONGEST]
     return str(Path.home() / f"{name or 'sensor'}{end}")
 
 
 def objective(text: str) -> str:
-    """An objective as the engine names it; of `FILE.py:FUNCTION` with the whole path."""
+    """Return an objective as the engine names it; the file of `FILE.py:FUNCTION` becomes
+    absolute.
+    """
     return str(absolute(text)) if ".py" in text else text.strip()

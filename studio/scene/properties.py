@@ -20,16 +20,16 @@ from bpy.props import (
 from .fields import HasFields, OPTISENSE_PG_field, kind_menu
 
 USUAL_COATING = "flake"
-"""The kind of a coating whose file names none."""
+"""Kind of a coating whose file names none."""
 
 
 def rgb(name: str, description: str, **limits: Any) -> Any:
-    """Three numbers for red, green and blue."""
+    """Return a property of three numbers for red, green and blue."""
     return FloatVectorProperty(name=name, description=description, size=3, precision=4, **limits)
 
 
 class OPTISENSE_PG_coating(HasFields, bpy.types.PropertyGroup):
-    """The coating of the sensing surface."""
+    """Coating of the sensing surface."""
 
     noun = "coating"
     library: StringProperty(name="Library", description="The library coating it started from")
@@ -38,7 +38,7 @@ class OPTISENSE_PG_coating(HasFields, bpy.types.PropertyGroup):
 
 
 class OPTISENSE_PG_material(HasFields, bpy.types.PropertyGroup):
-    """An optical material of parts; its name is what parts refer to."""
+    """Optical material of parts; parts refer to its name."""
 
     noun = "material"
     kind: EnumProperty(name="Kind", description="What it does with light", **kind_menu("material"))
@@ -52,10 +52,10 @@ def _relight(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None
 
 
 when_relit: list[Callable[[], None]] = []
-"""Called when the flux or colour of a light group changes."""
+"""Callbacks for a change of a light group's flux or colour."""
 
 when_reshaped: list[Callable[[bpy.types.Scene, bpy.types.PropertyGroup], None]] = []
-"""Called when the kind or a number of the lamps of a light group changes."""
+"""Callbacks for a change of the kind or a number of a light group's lamps."""
 
 
 def _show(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -65,7 +65,7 @@ def _show(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
 
 
 when_group_hidden: list[Callable[[bpy.types.Scene, bpy.types.PropertyGroup], None]] = []
-"""Called when the light of a group is hidden or shown again."""
+"""Callbacks for the light of a group being hidden or shown."""
 
 
 def _recolour(group: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
@@ -80,7 +80,7 @@ def _redraw_group(group: bpy.types.PropertyGroup, context: bpy.types.Context) ->
 
 
 class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
-    """Lights of one type and colour; its name is what lights refer to."""
+    """Lights of one type and colour; lights refer to its name."""
 
     noun = "emitter"
     model: StringProperty(name="Model", description="A light of the library")
@@ -112,7 +112,7 @@ class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
     )
 
     def fields_changed(self) -> None:
-        """Draw its lamps anew."""
+        """Redraw the lamps."""
         for each in when_reshaped:
             each(self.id_data, self)
 
@@ -123,11 +123,11 @@ def _select_group(design: bpy.types.PropertyGroup, context: bpy.types.Context) -
 
 
 when_group_chosen: list[Callable[[bpy.types.Scene, int], None]] = []
-"""Called with the index of a light group that is chosen in the list."""
+"""Callbacks with the index of the light group that was chosen in the list."""
 
 
 class OPTISENSE_PG_design(bpy.types.PropertyGroup):
-    """The design of a scene."""
+    """Design of a scene."""
 
     document: StringProperty(
         description="The design file as it was read, with its numbers in full", options={"HIDDEN"}

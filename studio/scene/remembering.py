@@ -9,14 +9,16 @@ import bpy
 from .collections import objects_of
 
 Name = tuple[str, str, int]
-"""What an object is: its kind, its name or that of its group, and its number among those."""
+"""Identity of an object: its kind, its name or that of its group, and its number among objects with
+both in common.
+"""
 
 KINDS = ("PART", "LIGHT", "CAMERA", "CAGE", "CONTACT", "REFERENCE")
 
 
 @dataclass
 class Looks:
-    """What was selected, active and hidden."""
+    """Selection, active object and hidden objects, by their names in the design."""
 
     selected: set[Name] = field(default_factory=set)
     hidden: set[Name] = field(default_factory=set)
@@ -24,7 +26,7 @@ class Looks:
 
 
 def looks_of(scene: bpy.types.Scene) -> Looks:
-    """How the objects of a scene's design are shown."""
+    """Return the selection and visibility of the objects of a scene's design."""
     layer, found = bpy.context.view_layer, Looks()
     for name, item in _named(scene).items():
         if item.name not in layer.objects:
@@ -39,9 +41,9 @@ def looks_of(scene: bpy.types.Scene) -> Looks:
 
 
 def restore(scene: bpy.types.Scene, looks: Looks) -> None:
-    """Show the objects of a scene's design as those before were."""
+    """Restore selection and visibility for the objects of a scene's design."""
     layer = bpy.context.view_layer
-    layer.update()  # it does not know new objects before
+    layer.update()  # The layer does not know new objects before the update.
     for name, item in _named(scene).items():
         if item.name not in layer.objects:
             continue

@@ -1,4 +1,4 @@
-"""The cube, lamp and camera that Blender starts with: they are in a sensor's way."""
+"""Removal of the cube, lamp and camera of Blender's startup file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ NAMES = {"Camera", "Cube", "Light"}
 
 
 def clear_startup(scene: bpy.types.Scene) -> None:
-    """Remove what Blender's startup file holds, where nobody has touched it."""
+    """Remove the objects of Blender's startup file if they are unchanged."""
     found = {each.name: each for each in scene.objects}
     if bpy.data.filepath or found.keys() != NAMES:
         return

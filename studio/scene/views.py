@@ -1,4 +1,4 @@
-"""3D views that show a sensor: its colours, and all of it."""
+"""Setup of the 3D views that show a sensor: colours, and the whole sensor in view."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from mathutils import Vector
 from ..core.fitting import fitted
 
 SENSOR = 72.0
-"""mm: the larger side of a 3D view's picture behind a lens of `space.lens`, as Blender takes it."""
+"""Width in mm of the larger side of the image plane that Blender assumes behind `space.lens`."""
 
 
 def show_design(scene: bpy.types.Scene) -> None:
-    """Let every 3D view of the scene show the roles' colours and the whole sensor."""
+    """Set up all 3D views of a scene: colours of the roles, and the whole sensor in view."""
     bpy.context.view_layer.update()  # new objects have no size before
     for window in bpy.context.window_manager.windows:
         if window.scene != scene:
@@ -23,7 +23,7 @@ def show_design(scene: bpy.types.Scene) -> None:
             space = area.spaces.active
             space.shading.color_type = "OBJECT"
             space.shading.show_backface_culling = False
-            # Parts touch: outlines would be drawn wherever two faces at one place alternate.
+            # Parts touch: outlines would flicker where two faces coincide.
             space.shading.show_object_outline = False
             space.shading.light = "STUDIO"
             space.shading.show_specular_highlight = True
@@ -38,7 +38,7 @@ def show_design(scene: bpy.types.Scene) -> None:
 def _view_all(area: bpy.types.Area, region: bpy.types.Region) -> None:
     """Show the whole scene in the part of a view that the sidebar leaves free."""
     looks = bpy.context.preferences.view
-    smooth, looks.smooth_view = looks.smooth_view, 0  # else it would go on moving after this
+    smooth, looks.smooth_view = looks.smooth_view, 0  # the view must not move later
     try:
         bpy.ops.view3d.view_all()
     finally:
@@ -55,7 +55,7 @@ def _view_all(area: bpy.types.Area, region: bpy.types.Region) -> None:
 
 
 def _fit(space: bpy.types.SpaceView3D, region: bpy.types.Region, free: tuple[float, float]) -> None:
-    """Let what a perspective view shows fill it between two places, pixels from its left."""
+    """Fit a perspective view to the visible objects, between two places in pixels from its left."""
     view = space.region_3d
     corners = [
         each.matrix_world @ Vector(corner)

@@ -1,4 +1,4 @@
-"""A sensor of the user's CAD files: what each body is, in one table to confirm."""
+"""Sensor from the user's CAD files: a table with the use of each body, which the user confirms."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ UNITS = [
 
 
 class OPTISENSE_PG_body(bpy.types.PropertyGroup):
-    """A body of the files; its name is that of the part that it becomes."""
+    """Body of the files; its name is that of the part that it becomes."""
 
     use: EnumProperty(name="Use", items=USES, description="What this body is to the sensor")
     size: StringProperty(description="Its size in words", options={"HIDDEN"})
 
 
 class OPTISENSE_PG_cad(bpy.types.PropertyGroup):
-    """The files that a sensor is to be made of; never saved."""
+    """Files of which a sensor is to be made; never saved."""
 
     bodies: CollectionProperty(type=OPTISENSE_PG_body)
     files: StringProperty(description="Their paths, one a line", options={"HIDDEN"})
@@ -54,12 +54,12 @@ class OPTISENSE_PG_cad(bpy.types.PropertyGroup):
 
 
 def now() -> bpy.types.PropertyGroup:
-    """The files that are being looked at."""
+    """Return the files in the table."""
     return bpy.context.window_manager.optisense_cad
 
 
 class ChoosingFiles:
-    """Operators that ask for one CAD file or several of a folder, or for the folder itself."""
+    """Base of operators that ask for one or several CAD files of a folder, or for the folder."""
 
     filepath: StringProperty(name="File", description="A CAD file", subtype="FILE_PATH")
     directory: StringProperty(name="Folder", description="Of the files", subtype="DIR_PATH")
@@ -73,7 +73,7 @@ class ChoosingFiles:
         return {"RUNNING_MODAL"}
 
     def paths(self) -> list[str]:
-        """The absolute paths that were chosen."""
+        """Return the absolute paths that were chosen."""
         names = [each.name for each in self.files if each.name]
         if self.directory and names:
             return [str(absolute(str(Path(self.directory) / name))) for name in names]
@@ -161,7 +161,7 @@ class OPTISENSE_OT_forget_cad(bpy.types.Operator):
 
 
 def draw(layout: bpy.types.UILayout) -> None:
-    """The table: each body with its size in the files' units, and what it is."""
+    """Draw the table: each body with its size in the units of the files, and its use."""
     show_job(layout, READING, MAKING)
     found = now()
     if not found.bodies or session.is_busy():

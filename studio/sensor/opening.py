@@ -1,4 +1,4 @@
-"""The scene of a design folder that the engine wrote."""
+"""Opening of design folders that the engine wrote."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from ..scene.views import show_design
 from .warming import warm_up
 
 when_opened: list[Callable[[bpy.types.Scene], None]] = []
-"""Called when a built-in sensor or the user's folder is open."""
+"""Callbacks for a built-in sensor or a folder of the user being opened."""
 
 
 def new_stage() -> Path:
-    """A folder of the engine's, not there yet, for a design on its way.
+    """Return a folder that does not exist yet, inside the engine's folder, for a design in
+    transfer.
 
     Raises:
         EngineError: there is no engine.
@@ -32,13 +33,14 @@ def new_stage() -> Path:
 
 
 def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool) -> bool:
-    """Open a built-in sensor or the user's folder, as the job that the panels show.
+    """Open a built-in sensor or a folder of the user as the job that the panels show; return
+    whether it ended well, or still runs.
 
     Args:
-        scene: where to.
-        source: as the engine names designs.
-        folder: the user's folder; empty for a built-in sensor, which is not saved yet.
-        wait: until it is there.
+        scene: scene to fill.
+        source: design in the engine's notation, such as `builtin:gelsight-mini`.
+        folder: folder of the user; empty for a built-in sensor, which is not saved yet.
+        wait: block until the sensor is open.
 
     Raises:
         EngineError: there is no engine.
@@ -54,7 +56,7 @@ def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool)
         for each in when_opened:
             each(scene)
 
-    # Written out first: the engine reads what users have, and writes what this reads.
+    # The engine reads all formats that users have, and writes the one that the extension reads.
     done = session.start_job(
         "Opening the sensor", "save", written, wait=wait, design=source, to=str(stage)
     )
@@ -70,16 +72,16 @@ def open_stage(
     keep_others: bool = False,
     then: Callable[[bpy.types.Scene], None] | None = None,
 ) -> bool:
-    """Open what the engine wrote into a stage, as the job that the panels show.
+    """Open the design that the engine wrote into a folder, as the job that the panels show; return
+    whether it ended well, or still runs.
 
     Args:
-        scene: where to.
-        stage: the folder.
-        wait: until it is there.
-        folder: the user's own folder of it; empty where it is not saved.
-        keep_others: the contacts and references of the sensor before stay, and so do the view and
-            what is selected and hidden.
-        then: called when it is open.
+        scene: scene to fill.
+        stage: folder that the engine wrote.
+        wait: block until the sensor is open.
+        folder: the user's own folder of the design; empty if it is not saved.
+        keep_others: keep the contacts and references, the view, and the selection and visibility.
+        then: called with the scene when the sensor is open.
     """
     name = scene.name
 
@@ -116,7 +118,7 @@ def open_stage(
 
 
 def open_empty(scene: bpy.types.Scene, document: dict[str, Any]) -> None:
-    """Show a sensor that has no parts yet in place of the one before; references stay."""
+    """Replace the sensor by one without parts; references stay."""
     clear_startup(scene)
     picture_is_old()
     build(scene, document, {}, keep_others=True)
@@ -127,7 +129,7 @@ def open_empty(scene: bpy.types.Scene, document: dict[str, Any]) -> None:
 
 
 def picture_is_old() -> None:
-    """What is shown is no picture of the sensor that opens, whose lights do not relight it.
+    """Mark picture and scores as those of the sensor before; its picture can't be relit any more.
 
     The scores are not of that sensor either.
     """

@@ -16,7 +16,7 @@ from .opening import open_empty, open_source
 
 
 class _Opens:
-    """What new and open have in common."""
+    """Base of the operators that open a sensor."""
 
     def _open(
         self, context: bpy.types.Context, source: str, folder: str, *, wait: bool
@@ -102,7 +102,7 @@ class OPTISENSE_OT_open(polls.Replacing, _Opens, ChoosingFile, bpy.types.Operato
 
 
 class _Saves:
-    """What save and save as have in common."""
+    """Base of the operators that save a sensor."""
 
     def _save(self, context: bpy.types.Context, folder: str) -> set[str]:
         scene = context.scene

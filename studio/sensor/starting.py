@@ -17,13 +17,15 @@ from .opening import open_source, picture_is_old
 from .warming import warm_up
 
 SOON = 0.5
-"""Seconds after Blender's start at which the extension begins its work, when the window stands."""
+"""Delay in seconds after Blender's start before the extension begins its work; then the window
+exists.
+"""
 ENVIRONMENT = "OPTISENSE_OPEN"
-"""Names the design that `optisense studio DESIGN` was asked to open."""
+"""Environment variable with the design that `optisense studio DESIGN` was asked to open."""
 
 
 _hidden = False
-"""Whether the greeting was switched off here."""
+"""Whether this module has switched Blender's splash screen off."""
 
 
 def _start() -> None:
@@ -46,7 +48,7 @@ def _start() -> None:
 
 @bpy.app.handlers.persistent
 def _loaded(*_: Any) -> None:
-    """A .blend file was opened, with a sensor or without: the picture is of another one."""
+    """Mark the picture as outdated after a .blend file was opened, and warm the engine up."""
     picture_is_old()
     scene = bpy.context.scene
     if not bpy.app.background and scene.optisense.is_open and session.running() is not None:
@@ -54,7 +56,9 @@ def _loaded(*_: Any) -> None:
 
 
 def _splash(is_shown: bool) -> None:
-    """Hide Blender's greeting while a design is on its way, or let the next start have it again."""
+    """Hide Blender's splash screen while a design is being opened, or enable it for the next
+    start.
+    """
     global _hidden
     preferences = bpy.context.preferences
     if _hidden == (not is_shown):

@@ -1,4 +1,4 @@
-"""A first tour: five steps from nothing to a picture under other light and its score."""
+"""Introductory tour: five steps from nothing to a picture under other light and its score."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..scene.collections import objects_of
 
 
 class Step(NamedTuple):
-    """What to do, and whether it is done."""
+    """Step of the tour: an instruction, and the condition under which it is done."""
 
     text: str
     is_done: Callable[[bpy.types.Context], bool]
@@ -41,19 +41,21 @@ STEPS = (
         lambda c: bool(c.window_manager.optisense_evaluation.scores),
     ),
 )
-"""The steps in their order."""
+"""Steps of the tour in their order."""
 
 OVER = "That was the tour. The question mark in the head of a panel tells all about it."
 
 
 class OPTISENSE_PG_tour(bpy.types.PropertyGroup):
-    """Where the tour is; never saved."""
+    """State of the tour; never saved."""
 
     is_on: BoolProperty(name="Tour", description="Show the next step", options={"SKIP_SAVE"})
 
 
 def step_now(context: bpy.types.Context) -> int:
-    """The number of the first step that is not done; as many as there are when all are."""
+    """Return the number of the first step that is not done, from 0; the number of steps if all are
+    done.
+    """
     return next(
         (number for number, step in enumerate(STEPS) if not step.is_done(context)), len(STEPS)
     )
@@ -73,7 +75,7 @@ class OPTISENSE_OT_tour(bpy.types.Operator):
 
 
 def draw(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """The step that comes next, or the button that begins the tour where no sensor is open."""
+    """Draw the next step, or the button that starts the tour if no sensor is open."""
     if not context.window_manager.optisense_tour.is_on:
         if not context.scene.optisense.is_open:
             layout.operator("optisense.tour", text="Take the Tour", icon="INFO")

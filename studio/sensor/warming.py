@@ -1,4 +1,4 @@
-"""While the user looks at an opened sensor, the engine gets ready to simulate it."""
+"""Preparation of the engine to simulate a sensor, while the user looks at it."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ _open: Request | None = None
 
 
 def warm_up(scene: bpy.types.Scene) -> Request | None:
-    """Let the engine build the scene's sensor and compile what a picture needs; nobody waits.
+    """Let the engine build the scene's sensor and compile the code for a picture, without waiting.
 
-    A picture that is asked for meanwhile is made as soon as that is done, which is no later than
-    without. Only the sensor opened last is of interest.
+    A picture requested meanwhile is made right after that, no later than without this. The request
+    for an earlier sensor is cancelled.
     """
     global _open
     try:
@@ -22,6 +22,6 @@ def warm_up(scene: bpy.types.Scene) -> Request | None:
         if _open is not None:
             engine.cancel(_open)
         _open = engine.send("warm", design=handing.design(scene), contacts=True, drafts=True)
-    except EngineError:  # simulating will say it
+    except EngineError:  # Simulating will show the error.
         return None
     return _open

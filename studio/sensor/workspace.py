@@ -1,4 +1,4 @@
-"""The workspace OptiSense: the bench beside a picture that always fits, and nothing else."""
+"""The workspace OptiSense: the 3D view beside a picture that always fits, and nothing else."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from ..scene.views import show_design
 from ..simulate import editors, picture
 
 SHARE = 0.62
-"""The share of the window's width that the bench takes; the picture has the rest."""
+"""Share of the window's width that the 3D view takes; the picture takes the rest."""
 
 
 def show(context: bpy.types.Context) -> bool:
-    """Show the workspace in the first window, which is made where there is none; whether it is."""
+    """Show the workspace in the first window, creating it if needed; return whether there is a
+    window.
+    """
     windows = context.window_manager.windows
     if not windows:
         return False
@@ -24,15 +26,15 @@ def show(context: bpy.types.Context) -> bool:
         return True
     with context.temp_override(window=window):
         bpy.ops.workspace.duplicate()
-    # The copy is shown a moment later, when Blender has handled what it was told.
+    # Blender switches to the copy a moment later, after it has handled its events.
     bpy.app.timers.register(_arrange, first_interval=editors.WAIT)
     return True
 
 
 def _arrange() -> float | None:
-    """Leave a 3D view and an Image Editor in the workspace that was just made.
+    """Leave only a 3D view and an Image Editor in the new workspace.
 
-    Closing an editor may make others anew: one is closed at a time, and all are looked up again.
+    Closing an area may create others: one is closed at a time, and all are looked up again.
     """
     window = bpy.context.window_manager.windows[0]
     if window.workspace.name != TAB:
@@ -60,7 +62,7 @@ def _largest_view(screen: bpy.types.Screen) -> bpy.types.Area | None:
 
 
 def _fill() -> None:
-    """The right half of the workspace shows the picture, the left one the bench."""
+    """Show the picture in the right half of the workspace, and the sensor in the left one."""
     window = bpy.context.window_manager.windows[0]
     areas = sorted(window.screen.areas, key=lambda each: each.x)
     if window.workspace.name != TAB or len(areas) != 2:
@@ -80,7 +82,7 @@ def _fill() -> None:
 
 
 def _open_tab() -> None:
-    """Open the sidebar's tab, once the sidebar has been drawn."""
+    """Open the extension's tab in the sidebar, once the sidebar has been drawn."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "VIEW_3D":

@@ -1,4 +1,4 @@
-"""Cages: make, bend, bound, remove."""
+"""Operators for cages: create, edit, set bounds, remove."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from ..scene.meshes import REST, part_mesh, remembered, show_vertices
 
 
 def _cage(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The active cage, or the one around the active part."""
+    """Return the active cage, or the one around the active part."""
     active = context.active_object
     if active is not None and active.optisense.kind == "CAGE":
         return active
@@ -51,22 +51,22 @@ def _has_bounds(context: bpy.types.Context) -> bool:
 
 
 def _are_free(context: bpy.types.Context) -> bool:
-    """No selected part is in a cage."""
+    """Whether no selected part is in a cage."""
     caged = {n for c in objects_of(context.scene, "CAGE") for n in cage_data(c)["parts"]}
     return not any(each.optisense.key in caged for each in polls.picked(context, "PART"))
 
 
 class _OfCage(polls.Checked):
-    """Operators on a cage: the active one, or the one around the active part."""
+    """Base of operators on a cage: the active one, or the one around the active part."""
 
     checks = (_has_cage,)
 
 
 def _end_editing(cage: bpy.types.Object) -> None:
-    """Leave edit mode, as a step of its own in the undo history.
+    """Leave edit mode, as a separate step of the undo history.
 
-    Blender's undo in edit mode knows of a mesh's points only, and not of what an object is: bounds
-    and the blend would stay while the points go back.
+    In edit mode Blender's undo restores only the vertices of a mesh, not the object's properties:
+    bounds and blend would stay while the points go back.
     """
     if cage.mode == "EDIT":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -239,7 +239,7 @@ class OPTISENSE_OT_remove_cage(polls.Checked, bpy.types.Operator):
 
 
 def active_cage(context: bpy.types.Context) -> tuple[bpy.types.Object, dict[str, Any]] | None:
-    """The cage that the panel shows, with its values."""
+    """Return the cage that the panel shows, with its values; None without one."""
     active = context.active_object
     cages = objects_of(context.scene, "CAGE")
     for cage in cages:

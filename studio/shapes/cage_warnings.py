@@ -1,4 +1,4 @@
-"""Findings of the engine's check about a cage, shown beside it once the cage is at rest."""
+"""Results of the engine's check about a cage, shown beside it once the cage is at rest."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from ..engine.latest import LatestRequest
 from ..scene import cages
 
 REST = 0.3
-"""Seconds without a change after which it is looked at: drafts of what is moved go first."""
+"""Time without a change after which a cage is checked, s: drafts of moved objects come first."""
 
 _request = LatestRequest(REST)
 _found: dict[str, list[dict[str, Any]]] = {}
 
 
 def warnings_of(key: str) -> list[dict[str, Any]]:
-    """What is wrong with a cage, as the engine tells it: `severity`, `message`, `hint`."""
+    """Return the engine's warnings about a cage, each with `severity`, `message` and `hint`."""
     return _found.get(key, [])
 
 

@@ -1,4 +1,6 @@
-"""Cages are chosen in a list, or by a click on a part: clicks on lights must not find them."""
+"""Selection of cages in a list; cages can't be clicked in the view, where they would cover
+lights.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bring in meshes, and say what they are for."""
+"""Operators that read meshes, and assign their use."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from ..scene.meshes import new_mesh, part_mesh
 from ..sensor.cad import ChoosingFiles
 
 READING = "Reading the mesh"
-"""What messages are about, so that they are told beside the button that was pressed."""
+"""Title under which messages are shown beside the button that was pressed."""
 
 PLACES = ("camera", "light")
-"""References that lights and the camera are placed by; the others become parts."""
+"""References at which lights and the camera are placed; the other references become parts."""
 
 FIRST_MATERIAL: dict[str, tuple[str, dict[str, Any]]] = {
     "elastomer": ("silicone", {"kind": "dielectric", "ior": 1.41, "roughness": 0.0}),
@@ -40,8 +40,9 @@ FIRST_MATERIAL: dict[str, tuple[str, dict[str, Any]]] = {
         },
     ),
 }
-"""What a new part is made of until the user chooses: silicone (1.41), PMMA (1.491), and
-aluminium (the index of the diffuse-grey coating's flake); a blocker absorbs."""
+"""Material of a new part by role, until the user chooses one: silicone (1.41), PMMA (1.491), and
+aluminium (the index of the diffuse-grey coating's flake); a blocker absorbs.
+"""
 
 
 class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFiles, bpy.types.Operator):
@@ -137,7 +138,7 @@ class OPTISENSE_OT_set_reference(polls.Checked, ChoosingProperties, bpy.types.Op
 
 
 def _meshes(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The selected meshes that are no part of the sensor."""
+    """Return the selected meshes that are not part of the sensor."""
     found = polls.picked(context, "NONE", "REFERENCE")
     return [each for each in found if each.type == "MESH"]
 
@@ -152,7 +153,7 @@ def _into(scene: bpy.types.Scene, item: bpy.types.Object, name: str) -> None:
 
 
 def make_part(scene: bpy.types.Scene, item: bpy.types.Object, role: str) -> bpy.types.Object:
-    """A part of the sensor in the shape of a reference, made of what is usual for its role."""
+    """Add a part of the sensor with the shape of a reference and the usual material of its role."""
     design = scene.optisense
     key = free_name(item.name, part_names(scene))
     values: dict[str, Any] = {"role": role, "mesh": f"meshes/{key}.obj"}
@@ -165,7 +166,7 @@ def make_part(scene: bpy.types.Scene, item: bpy.types.Object, role: str) -> bpy.
 
 
 def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types.Object) -> None:
-    """A contact in the shape of a mesh, as it is now; it is pressed in along its own z axis."""
+    """Add a contact with the present shape of a mesh; it is pressed in along the mesh's z axis."""
     surface = sensing_surface(scene)
     if surface is None:
         operator.report({"WARNING"}, "There is no sensing surface to press on")

@@ -1,4 +1,4 @@
-"""Make a sensing surface of a gel in one press."""
+"""Operator that makes the sensing surface of a gel."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ROLES = ("elastomer",)
 
 
 def _gel(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The gel that is active, or the only one of the sensor."""
+    """Return the active gel, or the only gel of the sensor; otherwise None."""
     active = context.active_object
     if active is not None and active.optisense.kind == "PART" and active.optisense.role in ROLES:
         return active
@@ -30,8 +30,9 @@ def _gel(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def outward(scene: bpy.types.Scene, gel: bpy.types.Object) -> NDArray[np.float64]:
-    """(3,) from the rest of the sensor to the gel, along the axis that is nearest; up where the gel
-    stands by itself."""
+    """Return the coordinate direction, (3,), nearest to that from the rest of the sensor to the
+    gel; +z for a gel by itself.
+    """
     others = [each for each in objects_of(scene, "PART", "CAMERA", "LIGHT") if each != gel]
     if not others:
         return np.array((0.0, 0.0, 1.0))
@@ -48,7 +49,7 @@ def _middle(item: bpy.types.Object) -> Vector:
 
 
 def _chosen(gel: bpy.types.Object) -> NDArray[np.int64]:
-    """The triangles of the faces that are selected in edit mode."""
+    """Return the indices of the triangles of the faces that are selected in edit mode."""
     edited = bmesh.from_edit_mesh(gel.data)
     edited.faces.ensure_lookup_table()
     picked = np.array([face.select for face in edited.faces], dtype=bool)

@@ -1,4 +1,4 @@
-"""Draft mode: a small picture follows while lights, the camera, cages or contacts are moved."""
+"""Draft mode: a small picture is updated while lights, the camera, cages or contacts are moved."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ NONE = "No draft: "
 KINDS = ("PART", "LIGHT", "CAMERA", "CAGE", "CONTACT")
 
 MOST_OPEN = 3
-"""Drafts: one that is made, one that waits, and the one that this took the place of, until the
-engine has answered it."""
+"""Largest number of open drafts: one in progress, one waiting, and one that was replaced and not
+yet answered.
+"""
 RENEWED = 0.05
-"""Seconds after which a draft that waits for another to be made gives way to a newer one."""
+"""Time after which a waiting draft is replaced by a newer one, s."""
 REST = 0.3
-"""Seconds without a change after which a draft that took things over is made once more, anew."""
+"""Time without a change after which a draft that reused earlier results is made anew, s."""
 
 _open: list[Request] = []
 _wanted = False
 _sent = 0.0
 _again: float | None = None
-"""When to ask once more, if nothing changes before."""
+"""Time of one more draft if nothing changes before; None for none."""
 
 
 def wanted() -> None:
-    """Something changed that a picture would show: ask as soon as Blender is done with it."""
+    """Schedule a draft: something that a picture would show changed."""
     global _wanted, _again
     _wanted, _again = True, None
     if session.running() is not None and not bpy.app.timers.is_registered(_soon):
@@ -41,13 +42,16 @@ def wanted() -> None:
 
 
 def _soon() -> None:
-    """Once, instead of at the next look at the engine, which may be a twentieth second away."""
+    """Run `_ask` at once, not at the next poll of the engine up to a twentieth of a second
+    later.
+    """
     _ask()
 
 
 def _ask() -> None:
-    """Ask for a draft if one is wanted: one is made, and the newest waits behind it, so that the
-    engine goes from one to the next at once."""
+    """Request a draft if one is wanted. The newest waits behind the one in progress, so that the
+    engine never idles between them.
+    """
     global _wanted, _sent, _again
     scene = bpy.context.scene
     if scene is None or not scene.optisense_simulation.draft or session.is_busy():
@@ -84,7 +88,7 @@ def _ask() -> None:
 
 
 def _take(result: dict[str, Any]) -> None:
-    """Show a draft, and see to it that one that took things over does not stay."""
+    """Show a draft, and schedule a complete one if it reused earlier results."""
     global _again
     requests.take(result, draft=True)
     if session.state().note.startswith(NONE):
@@ -96,12 +100,12 @@ def _take(result: dict[str, Any]) -> None:
 
 def _refused(error: EngineError) -> None:
     if error.kind not in ("Replaced", "Cancelled"):
-        session.state().note = f"{NONE}{error.message}"  # nothing is selected in mid-movement
+        session.state().note = f"{NONE}{error.message}"  # `say` would change the selection
         session.redraw()
 
 
 def _leave() -> None:
-    """Another .blend file is opened: no draft of this one is wanted any more."""
+    """Drop the open drafts before another .blend file is opened."""
     global _wanted, _again
     for each in _open:
         each.ignore()

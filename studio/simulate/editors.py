@@ -1,4 +1,4 @@
-"""Pictures in Image Editors."""
+"""Display of pictures in Image Editors."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from ..engine.layout import TAB
 from . import picture
 
 SOON = 0.05
-"""Seconds after which Blender has handled what it was told."""
+"""Delay after which Blender has handled its events, s."""
 
 WAIT = 0.2
-"""Seconds until an area that was made or changed has its size."""
+"""Delay until an area that was created or changed has its size, s."""
 
 _fitted: dict[int, tuple[int, ...]] = {}
-"""By open editor: its size and that of its picture, in pixels, when the picture was made to fit."""
+"""Sizes in pixels of each open editor and its picture when the picture was last made to fit."""
 
 _handle: object | None = None
 
 
 def can_show(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
-    """Whether there is a window to show a picture in."""
+    """Check that there is a window to show a picture in."""
     if context.screen is None:
         operator.poll_message_set("There is no window")
         return False
@@ -28,7 +28,7 @@ def can_show(operator: type[bpy.types.Operator], context: bpy.types.Context) -> 
 
 
 def show(context: bpy.types.Context, image: bpy.types.Image) -> None:
-    """Show a picture in the Image Editor of this window, which is made where there is none."""
+    """Show a picture in the Image Editor of this window, creating one if needed."""
     areas = context.screen.areas
     editors = [each for each in areas if each.type == "IMAGE_EDITOR"]
     editor = next((each for each in editors if each.spaces.active.image == image), None)
@@ -39,7 +39,7 @@ def show(context: bpy.types.Context, image: bpy.types.Image) -> None:
 
 
 def _new_editor(context: bpy.types.Context) -> bpy.types.Area:
-    """Half of the largest 3D view becomes an Image Editor."""
+    """Turn half of the largest 3D view into an Image Editor."""
     areas = context.screen.areas
     known = set(areas)
     views = [each for each in areas if each.type == "VIEW_3D"] or list(areas)
@@ -52,7 +52,7 @@ def _new_editor(context: bpy.types.Context) -> bpy.types.Area:
 
 
 def _fit_soon(name: str) -> None:
-    """The same a moment later, where the image has its size; an empty editor shows it first."""
+    """Fit the picture a moment later, when the image has its size; empty editors show it first."""
     if not bpy.app.background:
         for window in bpy.context.window_manager.windows:
             for area in window.screen.areas:
@@ -62,7 +62,7 @@ def _fit_soon(name: str) -> None:
 
 
 def _fit(name: str) -> None:
-    """Show the whole picture in every Image Editor that shows it."""
+    """Fit the picture into every Image Editor that shows it."""
     image = bpy.data.images.get(name)
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
@@ -73,8 +73,11 @@ def _fit(name: str) -> None:
 
 
 def _fit_when_resized() -> None:
-    """In the workspace OptiSense a picture always fits: also one that was there before its editor,
-    and in an editor that was made larger or smaller. Drawing itself may not change the view."""
+    """Refit the picture if the size of it or of the editor changed, in the workspace OptiSense
+    only.
+
+    The fit is deferred to a timer, as drawing may not change the view.
+    """
     context = bpy.context
     image = context.space_data.image
     if context.workspace is None or context.workspace.name != TAB or image is None:

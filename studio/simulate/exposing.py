@@ -10,13 +10,15 @@ import bpy
 from ..scene.collections import objects_of
 
 when_exposed: list[Callable[[], None]] = []
-"""Called when the user changes the exposure."""
+"""Callbacks for a change of the exposure by the user."""
 
 _keeping = False
 
 
 def resolution(scene: bpy.types.Scene) -> list[int] | None:
-    """Width and height to simulate, in the camera's proportions; None is the camera's own."""
+    """Return width and height to simulate, in the camera's proportions; None for the camera's
+    own.
+    """
     size = scene.optisense_simulation.size
     cameras = objects_of(scene, "CAMERA")
     if size == "CAMERA" or not cameras:
@@ -27,7 +29,9 @@ def resolution(scene: bpy.types.Scene) -> list[int] | None:
 
 
 def shown_size(scene: bpy.types.Scene) -> tuple[int, int] | None:
-    """Width and height of whole pictures, which drafts are shown in; None without a camera."""
+    """Return width and height of full pictures, at which drafts are shown; None without a
+    camera.
+    """
     cameras = objects_of(scene, "CAMERA")
     if not cameras:
         return None
@@ -36,13 +40,13 @@ def shown_size(scene: bpy.types.Scene) -> tuple[int, int] | None:
 
 
 def exposure(scene: bpy.types.Scene) -> str | float:
-    """The exposure of pictures, as requests name it."""
+    """Return the exposure as a field of requests: a factor, or "auto"."""
     settings = scene.optisense_simulation
     return "auto" if settings.auto_exposure else float(settings.exposure)
 
 
 def keep_exposure(scene: bpy.types.Scene, factor: float) -> None:
-    """Remember the automatic exposure: once it is switched off, pictures stay as bright."""
+    """Store the automatic exposure, so that pictures stay as bright when it is switched off."""
     global _keeping
     settings = scene.optisense_simulation
     if settings.auto_exposure and math.isfinite(factor) and factor > 0.0:
@@ -54,7 +58,7 @@ def keep_exposure(scene: bpy.types.Scene, factor: float) -> None:
 
 
 def exposure_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
-    """The user wants pictures of another brightness."""
+    """Call the callbacks after the user has changed the exposure."""
     if not _keeping:
         for each in when_exposed:
             each()

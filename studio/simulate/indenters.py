@@ -1,4 +1,4 @@
-"""Indenters that are mesh files: the engine reads them, so that they are drawn as they press."""
+"""Meshes of indenter files, read by the engine, so that they are drawn as they press."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _asked: set[str] = set()
 
 
 def ask_for_mesh(file: str) -> None:
-    """Ask the engine for the mesh of a file, and draw the contacts that press with it."""
+    """Request the mesh of a file, and redraw the contacts that press with it."""
     if file in _asked:
         return
     _asked.add(file)

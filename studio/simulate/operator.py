@@ -1,4 +1,4 @@
-"""Place contacts, simulate, look at the picture."""
+"""Operators that place contacts, simulate, and show the picture."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SHAPE = (
     "radius", "length", "size", "file", "shape", "scale", "depth", "rotation", "indenter",
     "press_by", "force", "twist",
 )  # fmt: skip
-"""What a contact is like, wherever it is."""
+"""Properties of a contact that do not depend on its place."""
 
 
 class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
@@ -126,7 +126,7 @@ class OPTISENSE_OT_place_contact(polls.Checked, bpy.types.Operator):
 
 
 def press_along(context: bpy.types.Context, start: Vector, way: Vector) -> bool:
-    """Add a contact where a ray meets the sensing surface; whether it does."""
+    """Add a contact where a ray meets the sensing surface; return whether it does."""
     surface = sensing_surface(context.scene)
     if surface is None:
         return False
@@ -173,7 +173,7 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
             session.push_undo("Nine contacts")
             session.redraw()
 
-        # Any shape finds the same places; that of a ball is always known.
+        # Any shape is placed at the same points, and the mesh of a ball is always known.
         ball = {"kind": "sphere", "radius": 1.5}
         return start_with_design(
             self,
@@ -186,7 +186,7 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
         )
 
     def _like(self, context: bpy.types.Context) -> dict[str, Any]:
-        """What the nine contacts are like: the active one, or a ball."""
+        """Return the properties of the nine contacts: those of the active contact, or of a ball."""
         active = context.active_object
         if active is None or active.optisense.kind != "CONTACT":
             return {"depth": 0.3}

@@ -1,4 +1,4 @@
-"""The picture in the panel and in Image Editors."""
+"""The simulated picture in the panel and in Image Editors."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ _previews: bpy.utils.previews.ImagePreviewCollection | None = None
 
 
 when_resized: list[Callable[[str], None]] = []
-"""Called with the name of an image that is new, or has another size than before."""
+"""Callbacks with the name of an image that is new or has changed its size."""
 
 when_shown: list[Callable[[NDArray[np.float32]], None]] = []
-"""Called with the pixels (h, w, 4) of every picture that is shown."""
+"""Callbacks with the pixels (h, w, 4) of every picture that is shown."""
 
 
 def show(pixels: NDArray[np.float32], size: tuple[int, int] | None = None) -> bpy.types.Image:
-    """Show a picture (h, w, 4), row 0 at the bottom, 0 to 1, in place of the one before.
+    """Show a picture in place of the one before.
 
     Args:
-        pixels: the picture.
-        size: width and height of the image that Image Editors show, to which a smaller picture is
-            enlarged: a draft then takes the same place as the picture before. None is its own.
+        pixels: picture, (h, w, 4), 0 to 1, row 0 at the bottom.
+        size: width and height of the image in Image Editors; a smaller picture is enlarged, so that
+            a draft covers the same area as a full picture. None keeps the picture's own size.
     """
     if size is not None:
         pixels = enlarged(pixels, size)
@@ -40,7 +40,7 @@ def show(pixels: NDArray[np.float32], size: tuple[int, int] | None = None) -> bp
 
 
 def fill(name: str, pixels: NDArray[np.float32]) -> bpy.types.Image:
-    """Give an image, which is made where there is none, other pixels (h, w, 4)."""
+    """Set the pixels (h, w, 4) of an image, creating it if needed."""
     height, width = pixels.shape[:2]
     image = bpy.data.images.get(name)
     if image is None:
@@ -58,9 +58,9 @@ def fill(name: str, pixels: NDArray[np.float32]) -> bpy.types.Image:
 
 
 def enlarged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
-    """(height, width, 4) of a picture, each pixel as often as needed for a width and height.
+    """Enlarge a picture to a width and height by repeating pixels, (height, width, 4).
 
-    A picture that is as large already, or larger, stays as it is.
+    A picture that is as wide or as high already is returned unchanged.
     """
     height, width = pixels.shape[:2]
     if width >= size[0] or height >= size[1]:
@@ -71,7 +71,7 @@ def enlarged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.f
 
 
 def show_icon(name: str, pixels: NDArray[np.float32]) -> None:
-    """Let panels show a picture (h, w, 4), row 0 at the bottom, under a name."""
+    """Make a picture (h, w, 4), row 0 at the bottom, available to panels under a name."""
     if _previews is None:
         return
     height, width = pixels.shape[:2]
@@ -81,18 +81,18 @@ def show_icon(name: str, pixels: NDArray[np.float32]) -> None:
 
 
 def has(name: str) -> bool:
-    """Whether `show_icon` was given a picture of this name."""
+    """Whether `show_icon` was given a picture with this name."""
     return _previews is not None and name in _previews
 
 
 def icon(name: str = IMAGE) -> int:
-    """A picture of `show_icon` as an icon; 0 where there is none, or no window."""
+    """Return the icon of a picture of `show_icon`; 0 if there is none, or no window."""
     preview = None if _previews is None else _previews.get(name)
     return 0 if preview is None else preview.icon_id
 
 
 def file_icon(path: str) -> int:
-    """A picture file, such as a figure or a material's ball, as an icon; 0 if it is not there."""
+    """Return the icon of a picture file, such as a figure; 0 if the file does not exist."""
     if _previews is None or not path or not Path(path).is_file():
         return 0
     key = f"{path}:{Path(path).stat().st_mtime_ns}"

@@ -66,7 +66,7 @@ class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
 
 
 class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
-    """The picture that is shown; never saved."""
+    """Picture that is shown; never saved."""
 
     image: StringProperty(description="The engine's name of it", options={"SKIP_SAVE"})
     shown: BoolProperty(options={"SKIP_SAVE"})

@@ -20,11 +20,11 @@ AGAIN = "Simulate again to see these lights"
 _open: Request | None = None
 _wanted = False
 _shown: dict[str, Any] = {}
-"""The lights of the picture that is shown."""
+"""Lights of the picture that is shown, by group."""
 
 
 def wanted() -> None:
-    """The light groups changed: show the picture under the new lights, as soon as may be."""
+    """Schedule relighting after a change of the light groups."""
     global _wanted
     now = bpy.context.window_manager.optisense_picture
     if now.shown and now.image and session.running() is not None:
@@ -35,7 +35,7 @@ def wanted() -> None:
 
 
 def shown(values: dict[str, Any]) -> None:
-    """A new picture is shown: its lights, by group, as the engine tells them."""
+    """Store the lights of a new picture, by group, as in the engine's answer."""
     global _shown
     _shown = {
         name: {"flux": short(group["flux"]), "colour": [short(one) for one in group["colour"]]}
@@ -44,8 +44,9 @@ def shown(values: dict[str, Any]) -> None:
 
 
 def lights(scene: bpy.types.Scene) -> dict[str, Any]:
-    """All groups as they are now; dark is one that is hidden, or without a colour, which no design
-    may have."""
+    """Return the present flux and colour of all groups; hidden groups and black ones, which designs
+    do not allow, are dark.
+    """
     used = {each.optisense.group for each in scene.objects if each.optisense.kind == "LIGHT"}
     return {
         group.name: {
@@ -60,7 +61,7 @@ def lights(scene: bpy.types.Scene) -> dict[str, Any]:
 
 
 def _ask() -> None:
-    """One request at a time; what changes meanwhile goes into the next."""
+    """Send a request if none is open; later changes are collected for the next one."""
     global _open, _wanted, _shown
     if not _wanted or (_open is not None and not _open.done):
         return
@@ -91,20 +92,20 @@ def _take(result: dict[str, Any]) -> None:
 
 
 def _refused(error: EngineError) -> None:
-    # Lights that were added since, or a picture the engine forgot: only rendering helps.
+    # After lights were added, or if the engine has forgotten the picture, only rendering helps.
     bpy.context.window_manager.optisense_picture.image = ""
     session.state().note = AGAIN
 
 
 @bpy.app.handlers.persistent
 def _undone(*_: Any) -> None:
-    """Undo brings values back without telling of it."""
+    """Relight after undo or redo, which change properties without calling their callbacks."""
     if lights(bpy.context.scene) != _shown:
         wanted()
 
 
 def _leave() -> None:
-    """Another .blend file is opened, with lights of its own."""
+    """Drop the open request before another .blend file is opened."""
     global _open, _wanted
     if _open is not None:
         _open.ignore()
@@ -112,7 +113,7 @@ def _leave() -> None:
 
 
 def _forget(_: Engine) -> None:
-    """A new engine knows no picture of the one before."""
+    """Forget the picture of an engine that has ended."""
     bpy.context.window_manager.optisense_picture.image = ""
 
 

@@ -17,10 +17,10 @@ LATEST = "picture"
 
 
 def fields(scene: bpy.types.Scene) -> dict[str, Any]:
-    """A whole picture of the scene's design and contacts.
+    """Return the fields of a request for a full picture of the scene's design and contacts.
 
     Raises:
-        EngineError: there is no engine, or the scene is no design.
+        EngineError: there is no engine, or the scene does not form a design.
     """
     settings = scene.optisense_simulation
     asked: dict[str, Any] = {
@@ -40,7 +40,7 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
 
 
 def take(result: dict[str, Any], *, draft: bool) -> None:
-    """Show the engine's answer."""
+    """Show the picture in the engine's answer."""
     scene = bpy.context.scene
     picture.show(np.load(result["files"]["pixels"]), shown_size(scene) if draft else None)
     keep_exposure(scene, result["exposure"])
@@ -60,7 +60,7 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
 
 
 def _tell_unseen(numbers: list[int]) -> None:
-    """Select the contacts that the picture does not show, and say so."""
+    """Select the contacts that the picture does not show, and report them."""
     scene = bpy.context.scene
     contacts = pressing(scene)
     chosen = select([contacts[each] for each in numbers if each < len(contacts)])
@@ -73,11 +73,11 @@ def _tell_unseen(numbers: list[int]) -> None:
 
 
 def presses(result: dict[str, Any], names: list[str]) -> str:
-    """Force, pressure and area of each contact of a whole picture, one line each.
+    """Return force, pressure and area of each contact of a full picture, one line each.
 
     Args:
-        result: the engine's answer.
-        names: of the contacts, in the order in which the engine was told of them.
+        result: answer of the engine.
+        names: names of the contacts in the order of the request.
     """
     rows = [] if result.get("draft") else (result.get("settings") or {}).get("presses") or []
     lines = []
@@ -93,7 +93,7 @@ def presses(result: dict[str, Any], names: list[str]) -> str:
 
 
 def summary(result: dict[str, Any]) -> str:
-    """Size, noise and time of a picture, in a line."""
+    """Return size, noise and time of a picture in one line."""
     width, height = result["size"]
     texts = [f"{width} x {height}"]
     settings = result.get("settings") or {}

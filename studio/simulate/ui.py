@@ -55,7 +55,7 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
 
 
 def _settings(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> None:
-    """How pictures are made; always as high, so that nothing below moves."""
+    """Draw the settings of pictures; their height is constant, so that nothing below moves."""
     column.prop(settings, "size")
     column.prop(settings, "noise", text="Noise (%)")
     column.prop(settings, "skin")
@@ -91,7 +91,7 @@ def _contact(column: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> Non
 
 
 def _light_levels(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
-    """Flux and colour of each group; the picture follows at once."""
+    """Draw flux and colour of each group; a change relights the picture at once."""
     box = layout.box().column(align=True)
     box.label(text="Relight: flux (mW), colour", icon="LIGHT")
     box.enabled = session.running() is not None

@@ -1,6 +1,7 @@
-"""Display of the picture in Image Editors: channels, false colours, against a pinned picture.
+"""Display of the picture in Image Editors: channels, false colours, comparison with a pinned
+picture.
 
-The picture itself stays as it is, for scripts and for saving: what is looked at is another image.
+The picture itself is not changed, for scripts and for saving: the display is another image.
 """
 
 from __future__ import annotations
@@ -34,10 +35,10 @@ COMPARISONS = [
 ]  # fmt: skip
 
 TEXT, LINE = 12.0, 18
-"""Size in points of the words over a picture, and pixels from one line of them to the next."""
+"""Size of the text over a picture in points, and distance of its lines in pixels."""
 
 NARROW = 0.75
-"""Width of the buttons of channels, of the usual one: all controls fit above a narrow picture."""
+"""Width of the channel buttons relative to the default: all controls fit above a narrow picture."""
 
 _now: NDArray[np.float32] | None = None
 _pinned: NDArray[np.float32] | None = None
@@ -49,7 +50,7 @@ def _changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> Non
 
 
 class OPTISENSE_PG_view(bpy.types.PropertyGroup):
-    """How the picture is looked at; never saved."""
+    """Settings of the display; never saved."""
 
     channel: EnumProperty(
         name="Channel", items=CHANNELS, default="COLOUR", update=_changed,
@@ -76,14 +77,14 @@ class OPTISENSE_PG_view(bpy.types.PropertyGroup):
 
 
 def is_plain() -> bool:
-    """Whether the picture is shown as it is."""
+    """Whether the picture is shown unchanged."""
     values = bpy.context.window_manager.optisense_view
     compared = values.compare != "NONE" and _pinned is not None
     return values.channel == "COLOUR" and not values.false_colour and not compared
 
 
 def refresh() -> None:
-    """Show the picture as it is to be looked at, in all Image Editors that show it."""
+    """Update the displayed picture in all Image Editors that show it."""
     if _now is None:
         return
     if is_plain():
@@ -119,7 +120,7 @@ def _show_in_editors(before: str, after: str) -> None:
 
 
 def _take(pixels: NDArray[np.float32]) -> None:
-    """A picture is shown."""
+    """Store and display a new picture."""
     global _now
     _now = pixels
     refresh()
@@ -164,7 +165,7 @@ class OPTISENSE_OT_unpin_picture(polls.Checked, bpy.types.Operator):
 
 
 def draw_header(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
-    """The controls of the picture, in a row."""
+    """Draw the controls of the display in a row."""
     values = context.window_manager.optisense_view
     settings = context.scene.optisense_simulation
     row = layout.row(align=True)
@@ -194,13 +195,13 @@ def _draw_header(header: bpy.types.Header, context: bpy.types.Context) -> None:
 
 
 def _is_ours(context: bpy.types.Context) -> bool:
-    """Whether an Image Editor shows the picture, or nothing yet."""
+    """Whether an Image Editor shows the picture, or is empty."""
     image = context.space_data.image
     return image is None or image.name in (IMAGE, picture.IMAGE)
 
 
 def words(context: bpy.types.Context) -> list[str]:
-    """What is told over the picture, one line each."""
+    """Return the text over the picture, one line each."""
     now, values = context.window_manager.optisense_picture, context.window_manager.optisense_view
     if not now.shown:
         return []
@@ -228,7 +229,7 @@ def _draw_words() -> None:
 
 @bpy.app.handlers.persistent
 def _forget(*_: object) -> None:
-    """Another .blend file was opened, which has no picture of the one before."""
+    """Forget the pictures after another .blend file was opened."""
     global _now, _pinned
     if bpy.data.images.get(picture.IMAGE) is None:
         _now = None
