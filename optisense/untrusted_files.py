@@ -207,14 +207,15 @@ def read_table(
     """Return the rows of a CSV file as text, by column.
 
     Args:
-        path: of the file.
-        error: class of what is raised.
-        what: how messages call it.
+        path: path of the file.
+        error: class of the exception to raise.
+        what: name of the file's content in messages.
         padded: whether a row may have fewer values than there are columns, as in tables that are
             written by hand; the others are empty.
 
     Raises:
-        error: as `read_text`, or it is no such file; says the line.
+        error: the file can't be read, as in `read_text`, or is no such table; the message names the
+            line.
     """
     text = read_text(path, MOST_TABLE, error, what)
     reader = csv.DictReader(io.StringIO(text, newline=""), restval="" if padded else None)

@@ -16,7 +16,7 @@ def take_folder(folder: Path) -> None:
 
     Raises:
         FolderInUseError: another process is writing to the folder.
-        OutputError: the folder can't be written; the error comes before the work and not after it.
+        OutputError: the folder can't be written; raised before the work begins.
     """
     at_end(hold(folder))
 
@@ -24,10 +24,11 @@ def take_folder(folder: Path) -> None:
 def ensure_writable(folder: Path) -> None:
     """Create the folder if needed, and check that a file can be written into it.
 
-    This is for pages that are written whole into folders of others, such as a study that runs.
+    This is for single pages written into folders that another process may use, such as that of a
+    running study.
 
     Raises:
-        OutputError: it can't; the error comes before the work and not after it.
+        OutputError: the folder can't be created or written; raised before the work begins.
     """
     if folder.exists() and not folder.is_dir():
         raise OutputError(

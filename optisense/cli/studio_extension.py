@@ -59,7 +59,7 @@ def source_folder() -> Path:
     wheel has installed them.
 
     Raises:
-        SetupError: they are in neither place.
+        SetupError: the files are in neither place.
     """
     beside = Path(__file__).parents[2] / "studio"
     installed = Path(sysconfig.get_path("data")) / "share" / "optisense" / "studio"
@@ -79,7 +79,7 @@ def help_pages() -> Iterator[tuple[str, bytes]]:
     They are beside the package in a checkout, else where the wheel has installed them.
 
     Raises:
-        SetupError: they are in neither place.
+        SetupError: the files are in neither place.
     """
     installed = Path(sysconfig.get_path("data")) / "share" / "optisense" / "docs"
     for name in HELP:

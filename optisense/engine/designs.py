@@ -256,7 +256,7 @@ def _mesh_of_arrays(given: MeshFile) -> TriangleMesh:
     """Return the mesh of two NumPy files.
 
     Raises:
-        MeshError: they are not (n, 3) numbers and (m, 3) integers.
+        MeshError: the arrays are not (n, 3) numbers and (m, 3) integers.
     """
     vertices, faces = _array(given.vertices), _array(given.faces)
     for array, path, kinds in ((vertices, given.vertices, "fiu"), (faces, given.faces, "iu")):

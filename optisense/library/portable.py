@@ -16,7 +16,7 @@ def with_own_lights(design: SensorDesign) -> SensorDesign:
     user's own gets it as its `emitter`, and saving the design copies its files.
 
     Raises:
-        LibraryError: one of these lights can't be read.
+        LibraryError: a light of the user can't be read.
     """
     groups = [
         name

@@ -58,7 +58,7 @@ def as_begun(folder: Path, settings: StudySettings, store: Store) -> SensorDesig
     """Return the study's own design, after a check that neither it nor the settings were edited.
 
     Raises:
-        SearchError: one of them was edited; the message says which.
+        SearchError: the design or the settings were edited; the message says which.
     """
     if store.fact("settings") != settings.fingerprint_of_all():
         begun = store.fact("study")

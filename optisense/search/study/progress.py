@@ -80,7 +80,7 @@ class SearchResult:
         """Trial of the starting design, or of the nearest point to it in the space.
 
         Raises:
-            SearchError: it has not been scored.
+            SearchError: this trial has not been scored.
         """
         return self.study.trial("start")
 

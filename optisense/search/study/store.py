@@ -386,7 +386,7 @@ def _objects(parts: Any) -> dict[str, Any]:
     """Return the parts of scores that were read from JSON, after a check.
 
     Raises:
-        TypeError: they are no objects by name.
+        TypeError: `parts` is not a dictionary of dictionaries.
     """
     if not isinstance(parts, dict) or not all(isinstance(each, dict) for each in parts.values()):
         raise TypeError("the parts of its scores are no objects")

@@ -37,7 +37,9 @@ from optisense.search.study.trust import not_trusted, trust
 
 
 class Study:
-    """One search. Create one with `create` or `open`, and run it with `optisense.search.run_study`.
+    """Search with stored trials.
+
+    Create one with `create` or `open`, and run it with `optisense.search.run_study`.
 
     Attributes:
         folder: folder of the study; None in memory.

@@ -176,7 +176,7 @@ def refuse_odd_units(
         meshes: meshes in mm by their origin, such as 'part gel (gel.stl)'; only of files that don't
             state their units.
         units: units that were given; None if mm was assumed.
-        gels: those of `meshes` that are elastomers, which are nearly as large as the sensor.
+        gels: names in `meshes` of the elastomers, which are nearly as large as the sensor.
 
     Returns:
         Unusual findings, one sentence each.
