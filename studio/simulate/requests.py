@@ -93,13 +93,18 @@ def presses(result: dict[str, Any], names: list[str]) -> str:
 
 
 def summary(result: dict[str, Any]) -> str:
-    """Return size, noise and time of a picture in one line."""
+    """Return size, noise and time of a picture, in a line.
+
+    The worst places are the 5 % of the picture with the most noise.
+    """
     width, height = result["size"]
     texts = [f"{width} x {height}"]
     settings = result.get("settings") or {}
     noise = settings.get("noise_reached_percent")
     if noise is not None:
-        texts.append(f"noise {noise:.1f} %")
+        worst = settings.get("noise_of_worst_places_percent")
+        places = "" if worst is None else f" ({worst:.2g} % in the worst places)"
+        texts.append(f"noise {noise:.1f} %{places}")
     seconds = (settings.get("seconds") or {}).get("total")
     if seconds is not None:
         texts.append(f"{seconds:.1f} s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from typing import Any
 
 import bpy
@@ -31,6 +32,8 @@ def test_a_contact_is_pressed_by_force_dragged_and_turned(mini: Any) -> None:
     (given,) = handing.contacts(mini)
     assert given["force"] == 0.5 and given["shift"] == [0.2, 0.0] and given["twist"] == 10.0
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    said = bpy.context.window_manager.optisense_picture.summary
+    assert re.match(r"160 x 120, noise [\d.]+ % \([\d.]+ % in the worst places\), [\d.]+ s$", said)
     told = bpy.context.window_manager.optisense_picture.presses
     assert told.startswith("contact: 0.5 N at ") and "dragged with" in told
     mini.optisense_simulation.skin = "conforming"
