@@ -47,7 +47,9 @@ def lens_misfit(
 
     def misfit(size: float, law: str) -> float:
         """Return the relative difference of the focal length from that of such a lens."""
-        return abs(0.5 * size / PROJECTIONS[law](np.radians(0.5 * fov)) / focal_length - 1.0)
+        with np.errstate(over="ignore", divide="ignore"):  # infinity is a misfit, too
+            focal = 0.5 * size / PROJECTIONS[law](np.radians(0.5 * fov))
+            return float(abs(focal / focal_length - 1.0))
 
     if misfit(width, projection) <= LENS_MISFIT:
         return None
