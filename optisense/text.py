@@ -8,6 +8,7 @@ end a table's cell, or are HTML. All code that shows such text escapes it with t
 from __future__ import annotations
 
 import html
+import json
 import re
 import unicodedata
 
@@ -72,3 +73,16 @@ def _shown(letter: str) -> str:
     if unicodedata.category(letter) in ("Cc", "Cs") or letter in DIRECTIONS:
         return letter.encode("unicode_escape", "surrogatepass").decode("ascii")
     return letter
+
+
+def lone_surrogate(value: object) -> str:
+    r"""Return the first lone surrogate in the text of plain data, as ``\ud800``; "" if none.
+
+    Such halves of characters come from escapes in JSON, and from bytes on the command line that are
+    not UTF-8. They can't be written as UTF-8.
+    """
+    try:
+        json.dumps(value, ensure_ascii=False, default=str).encode()
+    except UnicodeEncodeError as found:
+        return found.object[found.start].encode("unicode-escape").decode()
+    return ""

@@ -22,7 +22,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from optisense.errors import OptiSenseError
-from optisense.text import brief
+from optisense.text import brief, lone_surrogate
 
 MEBIBYTE = 2**20
 """Number of bytes of a mebibyte, in which the bounds below are given."""
@@ -172,33 +172,30 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
         error: the text is not such JSON; the message names the line if it is known.
     """
     try:
-        found = json.loads(
+        found: Any = json.loads(
             text,
             parse_constant=_refused_constant,
             parse_float=_finite,
             parse_int=_integer,
             object_pairs_hook=_object,
         )
-        if _SURROGATE.search(text):
-            json.dumps(found, ensure_ascii=False).encode()
-        return found
-    except UnicodeEncodeError as wrong:
-        character = wrong.object[wrong.start].encode("unicode-escape").decode()
+    except json.JSONDecodeError as wrong:
         raise error(
-            f"{what} holds {character} alone, which is half of a character",
-            where=source,
-            hint=COPY_AGAIN,
-        ) from None
-    except json.JSONDecodeError as found:
-        raise error(
-            f"{what} is not JSON: {found.msg}",
-            where=f"{source}:{found.lineno}",
+            f"{what} is not JSON: {wrong.msg}",
+            where=f"{source}:{wrong.lineno}",
             hint=COPY_AGAIN,
         ) from None
     except RecursionError:
         raise error(f"{what} is nested too deeply", where=source, hint=COPY_AGAIN) from None
-    except (ValueError, MemoryError) as found:
-        raise error(f"{what} is not JSON: {found}", where=source, hint=COPY_AGAIN) from None
+    except (ValueError, MemoryError) as wrong:
+        raise error(f"{what} is not JSON: {wrong}", where=source, hint=COPY_AGAIN) from None
+    if _SURROGATE.search(text) and (half := lone_surrogate(found)):
+        raise error(
+            f"{what} holds {half} alone, which is half of a character",
+            where=source,
+            hint=COPY_AGAIN,
+        )
+    return found
 
 
 def read_table(

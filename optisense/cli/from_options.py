@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
 from optisense.commands.options import CommandOptions, Written
+from optisense.text import lone_surrogate
 
 
 def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -114,7 +115,7 @@ def options_of(model: type[CommandOptions], values: dict[str, Any]) -> CommandOp
     try:
         return model.model_validate(given)
     except UnicodeEncodeError:  # such as bytes that are not UTF-8 on the command line
-        odd = next(name for name, value in given.items() if not _is_text(value))
+        odd = next((name for name, value in given.items() if lone_surrogate(value)), "")
         raise typer.BadParameter("the text is not UTF-8", param_hint=_hint(model, odd)) from None
     except ValidationError as error:
         found = error.errors()[0]
@@ -126,18 +127,9 @@ def options_of(model: type[CommandOptions], values: dict[str, Any]) -> CommandOp
 
 
 def _hint(model: type[CommandOptions], name: str) -> str | None:
-    """The option of a field; None for a name that is no field's."""
+    """Return the option of a field, or None for a name that is no field's."""
     field = model.model_fields.get(name)
     if field is None:
         return None
     _, notes = _plain(field.annotation)
     return _flags(name, _written([*notes, *field.metadata]))[0]
-
-
-def _is_text(value: object) -> bool:
-    """Whether what is written in a value can be written as UTF-8."""
-    try:
-        str(value).encode()
-    except UnicodeEncodeError:
-        return False
-    return True

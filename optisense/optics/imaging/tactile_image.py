@@ -135,9 +135,7 @@ class TactileImage:
 
     def _repr_png_(self) -> bytes:
         """The exposed picture as a PNG file, for notebooks."""
-        stream = mi.MemoryStream()
-        mi.Bitmap(self.picture()).write(stream, mi.Bitmap.FileFormat.PNG)
-        return bytes(stream.raw_buffer())
+        return _encoded(self.picture(), ".png")
 
     def save_radiance(self, path: Path) -> None:
         """Write the linear radiance as an EXR file.
@@ -216,11 +214,16 @@ def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray
 
 def _bitmap(values: NDArray[Any], path: Path) -> None:
     """Write an array as an EXR or PNG file, whose path may be one that Mitsuba can't open."""
+    path.write_bytes(_encoded(values, path.suffix))
+
+
+def _encoded(values: NDArray[Any], suffix: str) -> bytes:
+    """Return the content of an EXR or PNG file of an array."""
     bitmap = mi.Bitmap(np.ascontiguousarray(values))
     kind = mi.Bitmap.FileFormat.PNG
-    if path.suffix == ".exr":
+    if suffix == ".exr":
         kind = mi.Bitmap.FileFormat.OpenEXR
         bitmap.metadata()["unit"] = RADIANCE_UNIT
     stream = mi.MemoryStream()
     bitmap.write(stream, kind)
-    path.write_bytes(stream.raw_buffer())
+    return bytes(stream.raw_buffer())

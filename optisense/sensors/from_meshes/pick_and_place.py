@@ -8,12 +8,14 @@ converted to mm.
 from __future__ import annotations
 
 import csv
+import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.errors import DesignError
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, Units
+from optisense.text import brief
 from optisense.untrusted_files import MOST_BOARD, read_bytes
 
 NAMES = {
@@ -125,9 +127,14 @@ def _placed(
             continue
         x, y = (_length(cell(key), unit, path, number) for key in ("x", "y"))
         turn = _NUMBER.match(cell("rotation"))
-        parts[name] = BoardPart(
-            name, x, y, float(turn[1]) if turn else 0.0, cell("side").lower().startswith("b")
-        )
+        rotation = float(turn[1]) if turn else 0.0
+        if not all(map(math.isfinite, (x, y, rotation))):
+            raise DesignError(
+                f"the position or rotation of '{brief(name)}' is too large a number",
+                where=f"{path}:{number}",
+                hint="Export the file again",
+            )
+        parts[name] = BoardPart(name, x, y, rotation, cell("side").lower().startswith("b"))
     if not parts:
         raise DesignError("the pick-and-place file has no parts", where=str(path))
     return parts

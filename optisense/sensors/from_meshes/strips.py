@@ -16,7 +16,6 @@ from optisense.sensors.from_meshes.directions import axis_of, vector
 from optisense.sensors.from_meshes.lights import evenly, light
 from optisense.sensors.from_meshes.pick_and_place import BoardPart
 from optisense.sensors.from_meshes.recipe_lights import Along, FromTable
-from optisense.text import brief
 
 FloatArray = NDArray[np.float64]
 
@@ -143,12 +142,6 @@ def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
         chosen = [p for n, p in table.items() if any(fnmatch.fnmatchcase(n, w) for w in wanted)]
     frame, origin = _frame(choice, table)
     lights = []
-    for name, part in table.items():
-        if part in chosen and not np.isfinite([part.x, part.y, part.rotation]).all():
-            raise DesignError(
-                f"the position or rotation of '{brief(name)}' is too large a number",
-                hint="Correct its row in the pick-and-place file",
-            )
     for part in chosen:
         side = -1.0 if part.bottom else 1.0
         turn = np.radians(part.rotation)
