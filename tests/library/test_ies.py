@@ -113,6 +113,7 @@ def test_every_truncation_is_refused_with_its_line() -> None:
         ({"candela": "100 70 0 0"}, "1 values too many"),
         ({"candela": "100 x 0"}, "'x' is not a number"),
         ({"candela": "100 nan 0"}, "finite"),
+        ({"candela": "100 1e160 0"}, "'1e160' is too large"),
         ({"candela": "100 -1 0"}, "negative"),
         ({"candela": "0 0 0"}, "not all 0"),
         ({"vertical": "0 45 80"}, "0-90, 90-180 or 0-180"),

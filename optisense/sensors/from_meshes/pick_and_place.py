@@ -29,6 +29,10 @@ NAMES = {
 
 NEEDED = ("designator", "x", "y")
 
+LONGEST_LINE = 10_000
+"""Most characters of one line. A row of the programs named above has a few hundred; Python's reader
+of tables refuses cells of more than 131,072."""
+
 _UNIT = re.compile(r"\b(mm|mils?|inch(?:es)?|in|thou)\b", re.IGNORECASE)
 _NUMBER = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*(mm|mils?|inch|in)?$", re.IGNORECASE)
 _SAYS_UNIT = re.compile(r"unit", re.IGNORECASE)
@@ -85,9 +89,18 @@ def _lines(path: Path) -> list[str]:
     data = read_bytes(path, MOST_BOARD, DesignError, "the pick-and-place file")
     coding = "utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig"
     try:
-        return data.decode(coding).splitlines()
+        lines = data.decode(coding).splitlines()
     except UnicodeDecodeError:
-        return data.decode("latin-1").splitlines()
+        lines = data.decode("latin-1").splitlines()
+    for number, line in enumerate(lines, start=1):
+        if len(line) > LONGEST_LINE:
+            raise DesignError(
+                f"this is no pick-and-place file: the line has {len(line):,} characters, and at "
+                f"most {LONGEST_LINE:,} are read",
+                where=f"{path}:{number}",
+                hint="Export it as CSV, with one part on each line",
+            )
+    return lines
 
 
 def _cells(line: str, delimiter: str | None) -> list[str]:
