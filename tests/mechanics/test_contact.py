@@ -4,6 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from ContactMechanics import PeriodicFFTElasticHalfSpace
+from ContactMechanics.Systems import NonSmoothContactSystem
+from SurfaceTopography import Topography
 
 from optisense.errors import ContactError
 from optisense.mechanics import Elasticity, youngs_modulus_of_shore_a
@@ -48,18 +51,29 @@ def test_a_thin_compressible_gel_yields_as_a_bed_of_springs():
 
 
 @pytest.mark.parametrize(
-    ("thickness", "pitch", "count", "force", "radius"),
-    [(4.25, 40 / 1024, 83, 1.97053534, 1.083486), (1.0, 20 / 1024, 165, 6.51581534, 1.286055)],
+    ("thickness", "poisson_ratio", "radius", "depth", "box"),
+    [(4.25, 0.49, 1.5, 0.8, 40.0), (1.0, 0.49, 1.5, 0.8, 12.0), (2.0, 0.3, 3.0, 0.3, 16.0)],
 )
-def test_another_program_finds_the_same_force_and_radius(thickness, pitch, count, force, radius):
-    # ContactMechanics 1.8.3: PeriodicFFTElasticHalfSpace with this thickness, a Poisson ratio of
-    # 0.49 and E = 1 MPa, 1024 x 1024 points at this pitch, hard wall, a ball of radius 1.5 mm
-    # 0.8 mm deep. Its radius counts grid points that touch, so ours does, too.
-    gel = Elasticity(1.0, 0.49)
-    solved, found, _, _ = pressed(ball(1.5, 0.8), pitch * count, count, thickness, gel)
-    counted = (solved.pressure > 0).sum() * pitch**2
-    assert found == pytest.approx(force, rel=2e-4)
-    assert math.sqrt(counted / math.pi) == pytest.approx(radius, rel=1e-5)
+def test_contactmechanics_finds_the_same_force_and_radius(
+    thickness, poisson_ratio, radius, depth, box
+):
+    points = 800
+    pitch = box / points
+    layer = PeriodicFFTElasticHalfSpace(
+        (points, points), 1.0, (box, box), thickness=thickness, poisson=poisson_ratio
+    )
+    x = (np.arange(points) - points // 2) * pitch
+    skin_to_ball = ball(radius, depth)(x[:, None] ** 2 + x**2)
+    theirs = NonSmoothContactSystem(layer, Topography(-skin_to_ball, (box, box)))
+    assert theirs.minimize_proxy(offset=0.0, pentol=1e-6).success
+    count = 2 * math.ceil(1.05 * math.sqrt(2 * radius * depth - depth**2) / pitch) + 1
+    _, force, found, _ = pressed(
+        ball(radius, depth), pitch * count, count, thickness, Elasticity(1.0, poisson_ratio)
+    )
+    assert force == pytest.approx(layer.force.sum(), rel=1e-3)
+    # The area is read from either pressure in the same way, more finely than the grid's squares.
+    area = contact_area(layer.force / pitch**2, pitch)
+    assert found == pytest.approx(math.sqrt(area / math.pi), rel=1e-3)
 
 
 def test_no_point_is_pulled_and_none_is_entered():
