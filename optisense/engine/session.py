@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from optisense.design import SensorDesign
+from optisense.design.limits import unit_slips
+from optisense.design.problems import raise_problems
 from optisense.engine.designs import Designs
 from optisense.engine.failures import ProtocolError
 from optisense.engine.files import Files
@@ -99,10 +101,11 @@ class Renderer:
 
         Raises:
             SetupError: the renderer can't run on this machine.
-            OptiSenseError: the design can't be built.
+            OptiSenseError: the design can't be built, or its sizes are those of another unit.
         """
         from optisense.optics import OpticalModel
 
+        raise_problems(unit_slips(design), f"design '{design.name}'")
         if self._model is None:
             self._model = OpticalModel(design, self.variant)
         elif _is_another(self._model.design, design):
@@ -122,6 +125,7 @@ class Renderer:
         from optisense.optics import OpticalModel as Usual  # first: it checks libLLVM
         from optisense.optics.drafts import DraftModel
 
+        raise_problems(unit_slips(design), f"design '{design.name}'")
         if self._drafts is None:
             self._drafts = DraftModel(design, self.variant)
         else:

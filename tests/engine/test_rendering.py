@@ -250,6 +250,14 @@ def test_an_error_names_the_contact_that_it_is_about(engine: Any) -> None:
     assert engine.refused("open", design="no-such-sensor")["contact"] is None
 
 
+def test_a_design_with_sizes_of_another_unit_is_refused(engine: Any) -> None:
+    far = {"from": "gelsight-mini", "set": {"cages.skin.points[14].x": -8471.0}}
+    for what in ("warm", "simulate"):
+        refused = engine.refused(what, design=far)
+        assert "control point 8471" in refused["message"]
+        assert refused["path"] == "cages.skin.points"
+
+
 def test_contacts_that_no_pixel_sees_are_told(engine: Any) -> None:
     corner, middle = "sphere:0.5@8.3,10:0.3", "sphere:1.5@0,0:0.5"
     request = {"design": "gelsight-mini", "resolution": [80, 60], "photons": PHOTONS}

@@ -49,3 +49,16 @@ def test_areas_are_true_where_many_thin_faces_meet(mesh: tuple[np.ndarray, np.nd
     assert np.std(cells.areas[whole]) < 0.07 * SIZE**2
     middle = np.hypot(*cells.centres[:, :2].T) < 1.5
     assert cells.areas[middle].mean() == pytest.approx(SIZE**2, rel=0.02)
+
+
+def test_triangles_without_area_make_no_cells() -> None:
+    use_variant("llvm")
+    from optisense.optics.scene.surface_cells import build_cells
+
+    points, faces = fan(400)
+    far = np.array([[50.0, 0.0, 0.0], [60.0, 0.0, 0.0], [70.0, 0.0, 0.0]])
+    last = len(points)
+    with_line = np.concatenate([faces, [[last, last + 1, last + 2]]])
+    cells = build_cells(np.concatenate([points, far]), with_line, SIZE)
+    assert np.isfinite(cells.centres).all()
+    assert cells.cells == build_cells(points, faces, SIZE).cells

@@ -88,6 +88,7 @@ def _twice_areas(vertices: FloatArray, faces: NDArray[np.integer]) -> tuple[Floa
 def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -> SurfaceCells:
     """Divide a mesh into cells of side ``size`` (mm)."""
     vertices = np.asarray(vertices, dtype=np.float64)
+    faces = faces[_twice_areas(vertices, faces)[1] > 0.0]  # others would give cells without area
     points, face, areas = surface_samples(vertices, faces, size / SAMPLES_ACROSS)
     # The offset is not a round number, so that a plane of the design does not coincide with a
     # border between cells.
