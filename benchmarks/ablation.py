@@ -98,6 +98,7 @@ def ablations() -> list[Ablation]:
     from optisense.optics.imaging import cached
     from optisense.optics.radiance_cache import (
         angular_variance,
+        beam_sums,
         beams,
         bin_sums,
         cache,
@@ -135,7 +136,9 @@ def ablations() -> list[Ablation]:
         return dr.zeros(mi.Float, dr.width(point)) + 2
 
     def isotropic(axis: Any, towards: Any, cosine: Any, height: Any) -> Any:
-        return angular_variance.isotropic_variance(towards, cosine)
+        frame = mi.Frame3f(towards)
+        half = dr.minimum(1 - cosine, angular_variance.MAX_SPREAD)
+        return angular_variance.AngularVariance(towards, frame.s, frame.t, half, half)
 
     def here(light: Any, fixed: Any, at: Any, k: Any) -> Any:
         return at.cell
@@ -175,7 +178,9 @@ def ablations() -> list[Ablation]:
         shading_only("occluder horizon", Change(shading, "occluder_horizon", always_doubtful)),
         shading_only("light partly below the horizon",
                      Change(bin_sums, "cosine_half_width", lambda *rest: mi.Float(0))),
-        shading_only("variance of each direction", Change(bin_sums, "angular_variance", isotropic)),
+        shading_only("variance of each direction",
+                     Change(bin_sums, "angular_variance", isotropic),
+                     Change(beam_sums, "angular_variance", isotropic)),
         shading_only("lookup along the light's line", Change(bin_sums, "_place", here)),
         shading_only("lobes broadened by the light", Change(bin_sums, "broadened_coating", sharp)),
         shading_only("coherent camera rays", Change(interact.Path, "is_coherent", coherent)),

@@ -56,6 +56,11 @@ def test_no_light_is_lost_in_merging() -> None:
         np.testing.assert_allclose(
             vector, moments[..., k].sum(axis=1).ravel(), rtol=1e-3, atol=1e-4 * flux.max()
         )
+    squares = np.asarray(field.heights).reshape(field.cells.cells, -1, field.groups)
+    along = np.bincount(entry, fluxes[:, 0] * np.asarray(field.beams.heights), len(starts) - 1)
+    np.testing.assert_allclose(
+        along, squares.sum(axis=1).ravel(), rtol=1e-3, atol=1e-4 * flux.max()
+    )
 
 
 def test_one_more_beam_leaves_the_shadow_rays_of_the_others_as_they_are(

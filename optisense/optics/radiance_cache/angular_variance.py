@@ -49,13 +49,6 @@ def mean_direction(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
     return mean * (dr.sign(value.w) / length), dr.minimum(length / dr.abs(value.w), 1.0)
 
 
-def isotropic_variance(towards: mi.Vector3f, cosine: mi.Float) -> AngularVariance:
-    """Return a beam of the given mean cosine whose variance is the same in all directions."""
-    frame = mi.Frame3f(towards)
-    half = dr.minimum(1 - cosine, MAX_SPREAD)
-    return AngularVariance(towards, frame.s, frame.t, half, half)
-
-
 def angular_variance(
     axis: mi.Vector3f, towards: mi.Vector3f, cosine: mi.Float, height: mi.Float
 ) -> AngularVariance:
@@ -126,22 +119,25 @@ def mirrored_above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
     return direction - normal * (2 * dr.minimum(dr.dot(direction, normal), 0))
 
 
-def passes_near(
-    ball: mi.Vector4f, start: mi.Point3f, towards: mi.Vector3f, radius2: mi.Float
-) -> mi.Bool:
+def passes_near(ball: mi.Vector4f, start: mi.Point3f, light: AngularVariance) -> mi.Bool:
     """Return whether a beam from ``start`` may touch a ball.
 
     Args:
         ball: centre and radius, mm.
         start: the point that the beam arrives at, mm.
-        towards: unit vector towards the light.
-        radius2: squared angular radius of the beam, radians squared.
+        light: the beam.
     """
     offset = mi.Vector3f(ball.x - start.x, ball.y - start.y, ball.z - start.z)
-    along = dr.dot(offset, towards)
+    along = dr.dot(offset, light.towards)
+    gap = offset - light.towards * along
+    gap2 = dr.squared_norm(gap)
+    # Twice the standard deviation towards the ball is the half-width of the ellipse from which
+    # `sample_direction` draws.
+    variance = light.variance_along * dr.square(dr.dot(gap, light.along))
+    variance += light.variance_up * dr.square(dr.dot(gap, light.up))
+    variance /= dr.maximum(gap2, 1e-12)
     # The margin covers the spread of the beam over the way to the ball.
-    reach = ball.w + along * dr.sqrt(radius2)
-    gap2 = dr.squared_norm(offset) - along * along
+    reach = ball.w + along * (2 * dr.sqrt(variance))
     return (along > -ball.w) & (gap2 < reach * reach)
 
 

@@ -7,8 +7,8 @@ import mitsuba as mi
 
 from optisense.optics.backend.sequences import GOLDEN_BITS, next_random, unit_float
 from optisense.optics.radiance_cache.angular_variance import (
+    angular_variance,
     broadened_coating,
-    isotropic_variance,
     sample_direction,
 )
 from optisense.optics.radiance_cache.beams import Beams
@@ -69,6 +69,7 @@ def sum_hidden(
     totals: list[mi.Color3f],
     indenters: mi.Scene,
     at: ShadingPoints,
+    axis: mi.Vector3f,
     shadow_rays: mi.Float,
 ) -> list[mi.Color3f]:
     """Return the part of ``totals`` that indenters occlude.
@@ -76,6 +77,11 @@ def sum_hidden(
     Shadow rays are drawn in proportion to the light, evenly spaced in its running sum (systematic
     sampling). They are spaced so that all the light of a group would take ``shadow_rays`` of them;
     ``beams``, which are only those that pass near indenters, take their share.
+
+    The rays of a beam have its variances along and across ``axis``, the axis of the direction bins.
+    Bins near the horizon are three times as long as high. With round beams, a low lamp would count
+    as twice as high as it is, and the skin of GelSight Mini behind a contact would lose 4 to 5 % of
+    the lamp's light to the shadow.
     """
     groups = len(totals)
     hidden = [mi.Color3f(0) for _ in range(groups)]
@@ -101,12 +107,12 @@ def sum_hidden(
         # Each beam has random bits of its own, so that a beam added or dropped by rounding does not
         # change the rays of the others.
         state = random + tag * GOLDEN_BITS
+        height = dr.gather(mi.Float, beams.heights, j, times > 0)
         while times > 0:
             state = next_random(state)
+            beam = angular_variance(axis, towards, cosine, height)
             blocked = indenters.ray_test(
-                mi.Ray3f(at.start, sample_direction(isotropic_variance(towards, cosine), state)),
-                coherent=False,
-                active=mi.Bool(True),
+                mi.Ray3f(at.start, sample_direction(beam, state)), coherent=False, active=mi.Bool(True)
             )
             part = dr.select(blocked, weight, 0)
             for g in range(groups):

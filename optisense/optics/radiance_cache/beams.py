@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.radiance_cache.angular_variance import passes_near, squared_radius
+from optisense.optics.radiance_cache.angular_variance import angular_variance, passes_near
 from optisense.optics.radiance_cache.direction_bins import FINE_BINS
-from optisense.optics.scene.surface_cells import SurfaceCells
+from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
 
 STRONG_SHARE = 0.03
 """Share of a group's light in a cell above which four neighbouring bins stay separate beams."""
@@ -47,15 +47,18 @@ class Beams:
             tag of bits with the light group and the beam's number (see `NUMBER_SHIFT`). The number
             follows from the direction bins of the beam alone, not from how many other beams there
             are.
+        heights: mean squared component of the directions of each beam along the bins' axis.
     """
 
     starts: mi.UInt32
     ways: mi.Float
     fluxes: mi.Float
+    heights: mi.Float
 
 
 def collect_beams(
     moments: mi.Float,
+    heights: mi.Float,
     colours: mi.Float,
     coloured: bool,
     used: NDArray[np.integer],
@@ -67,7 +70,7 @@ def collect_beams(
     """Merge the direction bins of a cache into beams.
 
     Args:
-        moments, colours, coloured: as in `RadianceCache`.
+        moments, heights, colours, coloured: as in `RadianceCache`.
         used: ascending numbers of the direction bins that the cache holds.
         bands, sectors: number of bands, and of sectors in each band; both even.
         entries: number of cells times number of light groups.
@@ -81,7 +84,7 @@ def collect_beams(
     # Blocks without any light are skipped.
     lit = (four != NO_SLOT).any(axis=1)
     four = four[lit]
-    field = (moments, colours, indices(four), indices(block[lit]))
+    field = (moments, heights, colours, indices(four), indices(block[lit]))
     sizes = (dr.opaque(mi.UInt32, len(four)), dr.opaque(mi.UInt32, len(used)))
     nowhere = dr.zeros(mi.Float, 4)
     lane = dr.arange(mi.UInt32, entries)
@@ -91,17 +94,17 @@ def collect_beams(
     fine = bands * sectors >= FINE_BINS.count
     widest = dr.opaque(mi.Float, 1 - 16 / (bands * sectors) if fine else 1.0)
     rest = (groups, coloured, total, widest, lane)
-    count = _collect(*field, *sizes, *rest, zero, nowhere, nowhere, False)
+    count = _collect(*field, *sizes, *rest, zero, *[nowhere] * 3, False)
     padded = dr.zeros(mi.UInt32, entries + 1)
     dr.scatter(padded, count, lane)
     starts = dr.prefix_sum(padded)
     dr.eval(starts)
     beams = max(int(starts[entries]), 1)
-    ways, fluxes = dr.zeros(mi.Float, 4 * beams), dr.zeros(mi.Float, 4 * beams)
+    ways, fluxes, squares = (dr.zeros(mi.Float, count * beams) for count in (4, 4, 1))
     first = dr.gather(mi.UInt32, starts, lane)
-    _collect(*field, *sizes, *rest, first, ways, fluxes, True)
-    dr.eval(ways, fluxes)
-    return Beams(starts, ways, fluxes)
+    _collect(*field, *sizes, *rest, first, ways, fluxes, squares, True)
+    dr.eval(ways, fluxes, squares)
+    return Beams(starts, ways, fluxes, squares)
 
 
 @dr.syntax
@@ -118,6 +121,7 @@ def _total(moments: mi.Float, used: mi.UInt32, groups: int, lane: mi.UInt32) -> 
 @dr.syntax
 def _collect(
     moments: mi.Float,
+    heights: mi.Float,
     colours: mi.Float,
     four: mi.UInt32,
     names: mi.UInt32,
@@ -131,6 +135,7 @@ def _collect(
     first: mi.UInt32,
     ways: mi.Float,
     fluxes: mi.Float,
+    squares: mi.Float,
     write: bool,
 ) -> mi.UInt32:
     """Count the beams of each lane's cell and group, or write them from index ``first`` on.
@@ -143,6 +148,7 @@ def _collect(
     k = mi.UInt32(0)
     while k < blocks:
         values = []
+        tall = []
         inks = []
         whole = mi.Vector4f(0)
         ink = mi.Vector4f(0)
@@ -153,6 +159,8 @@ def _collect(
             value = dr.gather(mi.Vector4f, moments, entry, there)
             values.append(value)
             whole += value
+            if dr.hint(write, mode="scalar"):
+                tall.append(dr.gather(mi.Float, heights, entry, there))
             if dr.hint(write and coloured, mode="scalar"):
                 inks.append(dr.gather(mi.Vector4f, colours, entry, there))
                 ink += inks[i]
@@ -164,6 +172,8 @@ def _collect(
         chosen.append(~strong & (whole.w != 0))
         values.append(whole)
         inks.append(ink)
+        if dr.hint(write, mode="scalar"):
+            tall.append(tall[0] + tall[1] + tall[2] + tall[3])
         for i in range(5):
             if dr.hint(write, mode="scalar"):
                 value = values[i]
@@ -178,6 +188,8 @@ def _collect(
                 tag = dr.reinterpret_array(mi.Float, group | (number << NUMBER_SHIFT))
                 flux = mi.Vector4f(inks[i].x, inks[i].y, inks[i].z, tag)
                 dr.scatter(fluxes, flux, slot, chosen[i])
+                squared = dr.maximum(tall[i] / dr.select(chosen[i], value.w, 1), 0)
+                dr.scatter(squares, squared, slot, chosen[i])
             slot += dr.select(chosen[i], mi.UInt32(1), mi.UInt32(0))
         k += 1
     return slot - first
@@ -200,7 +212,7 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
     near = dr.zeros(mi.UInt32, dr.width(beams.ways) // 4)
     margin = READ_DISTANCE / cells.inverse_size
     sizes = (dr.opaque(mi.UInt32, groups), dr.opaque(mi.UInt32, dr.width(balls) // 4))
-    count = _mark_near(beams, middles, balls, margin, *sizes, lane, near)
+    count = _mark_near(beams, middles, balls, margin, bin_axis(cells, 2), *sizes, lane, near)
     counts = dr.zeros(mi.UInt32, entries + 1)
     dr.scatter(counts, count, lane)
     dr.eval(counts, near)
@@ -210,7 +222,8 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
     ways, fluxes = (
         dr.ravel(dr.gather(mi.Vector4f, values, chosen)) for values in (beams.ways, beams.fluxes)
     )
-    return Beams(dr.prefix_sum(counts), ways, fluxes)
+    heights = dr.gather(mi.Float, beams.heights, chosen)
+    return Beams(dr.prefix_sum(counts), ways, fluxes, heights)
 
 
 @dr.syntax
@@ -219,6 +232,7 @@ def _mark_near(
     middles: mi.Float,
     balls: mi.Float,
     margin: mi.Float,
+    axis: mi.Vector3f,
     groups: mi.UInt32,
     ball_count: mi.UInt32,
     lane: mi.UInt32,
@@ -232,13 +246,14 @@ def _mark_near(
     end = dr.gather(mi.UInt32, beams.starts, lane + 1)
     while j < end:
         way = dr.gather(mi.Vector4f, beams.ways, j)
-        towards = mi.Vector3f(way.x, way.y, way.z)
+        height = dr.gather(mi.Float, beams.heights, j)
+        light = angular_variance(axis, mi.Vector3f(way.x, way.y, way.z), way.w, height)
         touches = mi.Bool(False)
         n = mi.UInt32(0)
         while n < ball_count:
             ball = dr.gather(mi.Vector4f, balls, n)
             ball.w += margin
-            touches |= passes_near(ball, point, towards, squared_radius(way.w))
+            touches |= passes_near(ball, point, light)
             n += 1
         dr.scatter(near, mi.UInt32(1), j, touches)
         count += dr.select(touches, mi.UInt32(1), mi.UInt32(0))

@@ -380,6 +380,7 @@ class CacheTally:
             irradiance=table,
             beams=collect_beams(
                 moments,
+                heights,
                 colours,
                 self.coloured,
                 used,

@@ -25,7 +25,7 @@ from optisense.optics.radiance_cache.shading_points import ShadingPoints, interp
 from optisense.optics.scene.bsdf import coating_of, surface_region
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
-from optisense.optics.scene.surface_cells import plane_of
+from optisense.optics.scene.surface_cells import bin_axis, plane_of
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
 
@@ -106,7 +106,8 @@ def shade(
     if indenters is None:
         return totals
     shadow_rays = dr.opaque(mi.Float, REFLECTED_SHADOW_RAYS if reflected else SHADOW_RAYS)
-    hidden = sum_hidden(culled_beams, totals, indenters.scene, at, shadow_rays)
+    axis = bin_axis(field.cells, 2)
+    hidden = sum_hidden(culled_beams, totals, indenters.scene, at, axis, shadow_rays)
     # Where all light is occluded, rounding may make the sum of the shares exceed the total.
     return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]
 
