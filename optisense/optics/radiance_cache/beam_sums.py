@@ -112,7 +112,9 @@ def sum_hidden(
             state = next_random(state)
             beam = angular_variance(axis, towards, cosine, height)
             blocked = indenters.ray_test(
-                mi.Ray3f(at.start, sample_direction(beam, state)), coherent=False, active=mi.Bool(True)
+                mi.Ray3f(at.start, sample_direction(beam, state)),
+                coherent=False,
+                active=mi.Bool(True),
             )
             part = dr.select(blocked, weight, 0)
             for g in range(groups):
