@@ -119,7 +119,7 @@ def _number(ball: Ball, width: int) -> str:
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}">{ball.number}</text>'
 
 
-def told(balls: Sequence[Ball]) -> str:
+def count_in_words(balls: Sequence[Ball]) -> str:
     """Return the number of balls that the picture shows, as a sentence; empty if there are none."""
     if not balls:
         return ""

@@ -225,7 +225,7 @@ def _piece(where: str, colour: str, start: float, share: float) -> dict[str, str
         "width": f"{100 * share:.3f}%",
         "middle": f"{100 * (start + share / 2):.3f}%",
         "label": f"{100 * share:.0f} %" if share >= LEAST_LABELLED else "",
-        "told": f"{where}: {_percent(share)}",
+        "title": f"{where}: {_percent(share)}",
     }
 
 

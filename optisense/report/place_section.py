@@ -63,7 +63,7 @@ def _group(name: str, light: GroupLight, design: SensorDesign) -> dict[str, Any]
                     "middle": f"{100 * (start + share / 2):.3f}%",
                     "ink": "#1c232b" if colour in WAY_COLOURS[1::3] else "#ffffff",
                     "label": f"{100 * share:.0f} %" if share >= LEAST_LABELLED else "",
-                    "told": f"{word}: {100 * share:.1f} %",
+                    "title": f"{word}: {100 * share:.1f} %",
                 }
             )
             start += share
@@ -101,8 +101,8 @@ def _sky(sky: NDArray[np.float64]) -> list[dict[str, str]]:
                 f"A{outer:.1f} {outer:.1f} 0 0 0 {cx:.1f} {cy:.1f}"
                 f"L{dx:.1f} {dy:.1f}A{inner:.1f} {inner:.1f} 0 0 1 {ax:.1f} {ay:.1f}Z",
                 "opacity": f"{np.sqrt(density[tilt, turn] / most):.2f}",
-                "told": f"{100 * sky[tilt, turn]:.1f} % from {10 * tilt} to {10 * (tilt + 1)}° off "
-                f"the normal, {30 * turn} to {30 * (turn + 1)}° from the picture's right",
+                "title": f"{100 * sky[tilt, turn]:.1f} % from {10 * tilt} to {10 * (tilt + 1)}° "
+                f"off the normal, {30 * turn} to {30 * (turn + 1)}° from the picture's right",
             }
         )
     return found

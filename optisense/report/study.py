@@ -18,15 +18,14 @@ from optisense.design.section_drawing import section_svg
 from optisense.errors import OptiSenseError
 from optisense.report import study_figures
 from optisense.report import study_tables as tables
-from optisense.report.balls import marks_svg
-from optisense.report.balls import told as balls_told
+from optisense.report.balls import count_in_words, marks_svg
 from optisense.report.before_after import Look
 from optisense.report.cage_changes import CageChange, cage_changes, cage_figure
 from optisense.report.drawing import figure_uri
 from optisense.report.files import as_json, page, script
 from optisense.report.pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.report.tolerance import shown_size
-from optisense.report.trial_marks import Marks, TrialFigure, answering, told
+from optisense.report.trial_marks import Marks, TrialFigure, page_data, selectable
 from optisense.search.methods import find
 from optisense.search.study.best import best_of, nearest
 from optisense.search.study.conditions import condition_note, lost_note
@@ -99,7 +98,7 @@ def render_study(
     front = front_among([t for t in trials if not t.is_start], names) if several else []
     strongest = [each.number for each in study_figures.influences(trials, names[0])]
     weighed = names if find(study.settings.method).several else names[:1]
-    known = answering(trials)
+    known = selectable(trials)
     figures_of = _Figures({trial.number for trial in known})
     if scored:
         figures_of.draw("convergence", partial(study_figures.convergence, trials, names))
@@ -160,7 +159,7 @@ def render_study(
         live=live,
         data=as_json(
             {
-                **told(study, known, strongest, pictures or {}, named),
+                **page_data(study, known, strongest, pictures or {}, named),
                 "figures": {name: each.places for name, each in figures_of.found.items()},
                 "live": live,
             }
@@ -283,16 +282,16 @@ def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[
 def _picture(seen: Look) -> dict[str, Any]:
     """Return the picture, the marks over it, and a sentence about it."""
     if seen.picture is None:
-        return {"picture": "", "marks": "", "told": ""}
+        return {"picture": "", "marks": "", "caption": ""}
     height, width = seen.picture.shape[:2]
     balls = ""
     if seen.pressed is not None:
         radius, depth = seen.pressed
-        balls = f"balls of {radius:g} mm radius, pressed in {depth:g} mm and outlined"
+        balls = f"balls of radius {radius:g} mm, pressed in {depth:g} mm and outlined"
     return {
         "picture": data_uri(seen.picture),
         "marks": marks_svg(seen.balls, width, height),
-        "told": f"What the camera sees of {len(seen.balls)} {balls}. {balls_told(seen.balls)}"
+        "caption": f"The picture shows {len(seen.balls)} {balls}. {count_in_words(seen.balls)}"
         if seen.balls
         else "",
     }

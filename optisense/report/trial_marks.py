@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_ANSWERING = 1000
+MOST_SELECTABLE = 1000
 """Largest number of trials in the data of the figures, the best ones; each takes some 300 bytes of
 the page and 20 of each panel.
 """
@@ -100,19 +100,19 @@ class TrialFigure:
         return TrialFigure(address, marks.places(figure, of))
 
 
-def answering(trials: Sequence[Trial]) -> list[Trial]:
+def selectable(trials: Sequence[Trial]) -> list[Trial]:
     """Return the trials in the data of the figures: all, or the best of very many."""
-    if len(trials) <= MOST_ANSWERING:
+    if len(trials) <= MOST_SELECTABLE:
         return list(trials)
 
     def merit(trial: Trial) -> tuple[bool, float]:
         known = math.isfinite(trial.score)
         return trial.is_start, trial.score if known else -math.inf
 
-    return sorted(trials, key=merit, reverse=True)[:MOST_ANSWERING]
+    return sorted(trials, key=merit, reverse=True)[:MOST_SELECTABLE]
 
 
-def told(
+def page_data(
     study: Study,
     trials: Sequence[Trial],
     strongest: Sequence[int],

@@ -129,7 +129,7 @@ def _object(
         sides.append(
             {
                 "label": label,
-                "told": f"{mean:.1f} degrees, {depth:.3f} mm over all places",
+                "summary": f"{mean:.1f} degrees, {depth:.3f} mm over all places",
                 "pictures": _pictures(kept, camera),
             }
         )

@@ -1,4 +1,4 @@
-"""The page of a study answers: trials are told where the pointer is, and shown when clicked."""
+"""The page of a study is interactive: it shows the numbers of the trial under the pointer."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from optisense.report.balls import find_balls, marks_svg, told
+from optisense.report.balls import count_in_words, find_balls, marks_svg
 
 
 def test_each_pixel_belongs_to_the_nearest_ball_and_pieces_are_outlined() -> None:
@@ -23,6 +23,6 @@ def test_each_pixel_belongs_to_the_nearest_ball_and_pieces_are_outlined() -> Non
     svg = marks_svg(balls, 60, 40)
     assert svg.count("<polygon") == 3
     assert ">1</text>" in svg and ">3</text>" not in svg
-    assert told(balls) == "2 of the 3 are in view; 3 is hidden, or too small to make out."
-    assert told(balls[:2]) == "All 2 are in view."
-    assert told(()) == ""
+    assert count_in_words(balls) == "2 of the 3 are in view; 3 is hidden, or too small to make out."
+    assert count_in_words(balls[:2]) == "All 2 are in view."
+    assert count_in_words(()) == ""

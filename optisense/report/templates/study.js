@@ -1,10 +1,10 @@
-// Figures that answer: point at a trial to read its numbers, click it for its picture and the command
+// Interactive figures: point at a trial to read its numbers, click it for its picture and the command
 // that takes it. A page that is served (`live`) asks for new versions of itself, and for pictures.
 (function () {
   "use strict";
   const data = JSON.parse(document.getElementById("study-data").textContent);
   const tip = document.getElementById("tip"), panel = document.getElementById("trial");
-  const REACH = 14;  // pixels around a trial in which it answers
+  const REACH = 14;  // pixels around a trial in which the pointer selects it
   const FEW = 5;  // parameters in the tip; the panel has all
 
   function element(name, text, ...children) {
@@ -70,7 +70,7 @@
     if (event.key === "Escape" && !panel.hidden) close();
   });
 
-  for (const figure of document.querySelectorAll(".answers")) {
+  for (const figure of document.querySelectorAll(".interactive")) {
     const places = (data.figures[figure.dataset.figure] || [])
       .slice().sort((one, other) => one[1] - other[1] || one[2] - other[2]);
     const ring = element("div");
