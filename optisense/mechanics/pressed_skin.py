@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.errors import ContactError
 from optisense.mechanics.displacement_field import (
     DisplacementField,
     GridSpline,
@@ -38,12 +39,12 @@ FIRST_TOLERANCE = 0.01
 ROUGH_SHARE = 0.02
 """Ratio of a pressure's tolerance to the last change (mm) of the correction for the gel's shape, so
 that each iteration is solved somewhat better than the next one changes it."""
-MAX_TURNS = 12
-"""Largest number of iterations of the pressure and the correction for the gel's shape; each reduces
-the error several times."""
-MAX_SWEEPS = 8
-"""Number of sweeps over contacts after which the iteration ends; distant contacts need one or
-two."""
+MAX_TURNS = 40
+"""Number of iterations of the pressure, or the shear, and the correction for the gel's shape after
+which the solver fails. Most contacts take 2 to 6, one at a corner of a gel up to 20."""
+MAX_SWEEPS = 20
+"""Number of sweeps over contacts after which the solver fails; distant contacts take one or two,
+contacts that nearly touch seven."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,11 +220,11 @@ def press(
             is none.
 
     Raises:
-        ContactError: the pressure under an indenter does not converge.
+        ContactError: a pressure or a shear does not converge; the error tells the residual.
     """
     contacts: list[Pressed | None] = [None] * len(places)
     overlaps = [place.overlap for place in places]
-    for _ in range(MAX_SWEEPS if len(places) > 1 else 1):
+    for _ in range(MAX_SWEEPS):
         change = 0.0
         for i, place in enumerate(places):
             others = [each for j, each in enumerate(contacts) if j != i and each is not None]
@@ -238,8 +239,10 @@ def press(
             overlaps[i] = overlap
             patch = None if patches is None else patches[i]
             contacts[i] = _pressed(place, overlap, elasticity, patch, before)
-        if change < SETTLED:
+        if change < SETTLED or len(places) == 1:
             break
+    else:
+        _refuse("the pressures under several indenters", MAX_SWEEPS, change)
     done = [each for each in contacts if each is not None]
     for i, drag in enumerate(drags or ()):
         if drag is not None:
@@ -260,8 +263,9 @@ def _dragged(
     shear = solve_shear(response, contact.pressure, elasticity.friction, wanted)
     x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
     beyond = np.zeros_like(wanted)
-    for _ in range(MAX_TURNS if patch is not None and shear.any() else 0):
-        assert patch is not None
+    for _ in range(MAX_TURNS):
+        if patch is None or not shear.any():
+            break
         loads = np.concatenate([shear, np.zeros((1, *place.overlap.shape))])
         splines = sideways_beyond(patch, loads, place, elasticity.shear_modulus)
         found = np.stack([each.at(x, y)[0] for each in splines]).reshape(wanted.shape)
@@ -270,8 +274,25 @@ def _dragged(
         shear = solve_shear(response, contact.pressure, elasticity.friction, wanted - beyond, shear)
         if change < SETTLED:
             break
+    else:
+        _refuse("the shear under an indenter", MAX_TURNS, change)
     contact.field.shear = shear
     return Pressed(place, contact.pressure, contact.field, shear)
+
+
+def _refuse(what: str, turns: int, change: float) -> NoReturn:
+    """Raise the error of an iteration that has not settled.
+
+    Args:
+        what: what is solved for.
+        turns: number of iterations.
+        change: last change of the displacements, mm.
+    """
+    raise ContactError(
+        f"{what}, in a gel of this shape, does not settle in {turns} iterations; the last one "
+        f"moved the skin by {change:.2g} mm, where {SETTLED:g} mm would do",
+        hint="press less deep, move contacts apart, or away from the sides of the gel",
+    )
 
 
 def _shear_in_numbers(contact: Pressed) -> dict[str, float]:
@@ -313,6 +334,8 @@ def _pressed(
         solved = _solve(place, overlap - beyond, elasticity, solved.pressure, rough)
         if change < SETTLED:
             break
+    else:
+        _refuse("the pressure under an indenter", MAX_TURNS, change)
     field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline, patch)
     return Pressed(place, solved.pressure, field)
 

@@ -1,0 +1,55 @@
+"""Iterations that do not settle are told with what is left."""
+
+import re
+
+import numpy as np
+import pytest
+
+from optisense.errors import ContactError
+from optisense.geometry import Contact, SensingSurface, Sphere, TriangleMesh
+from optisense.geometry.contact import place
+from optisense.mechanics import Elasticity, Gel, normal_contact, pressed_skin, tangential_contact
+
+TOP = TriangleMesh.grid((25.25, 20.75)).flipped()
+BLOCK = TriangleMesh.box((-12.625, -10.375, -4.25), (12.625, 10.375, 0.0))
+SURFACE = SensingSurface(TOP, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+MIDDLE, CORNER = (0.0, 0.0), (11.0, 8.5)
+
+
+def press(at=MIDDLE, neighbour=None, **motion):
+    gel = Gel(SURFACE, TOP, [BLOCK], Elasticity(0.435, 0.49), lambda c: place(c, SURFACE, BLOCK))
+    places = [at] if neighbour is None else [at, neighbour]
+    return gel.pressed([Contact(Sphere(1.5), at=each, depth=0.8, **motion) for each in places])
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "most", "contact", "message"),
+    [
+        (normal_contact, "MAX_ITERATIONS", 3, {}, r"not found in 3 iterations; (\S+) mm of gap"),
+        (
+            tangential_contact,
+            "MAX_ITERATIONS",
+            3,
+            {"shift": (0.1, 0.0)},
+            r"last change was (\S+) %",
+        ),
+        (pressed_skin, "MAX_TURNS", 1, {"at": CORNER}, r"moved the skin by (\S+) mm"),
+        (
+            pressed_skin,
+            "MAX_TURNS",
+            7,
+            {"at": CORNER, "shift": (0.5, 0.5)},
+            r"shear .* moved the skin by (\S+) mm",
+        ),
+        (pressed_skin, "MAX_SWEEPS", 2, {"neighbour": (2.8, 0.0)}, r"moved the skin by (\S+) mm"),
+    ],
+)
+def test_what_does_not_settle_is_told_with_its_residual(
+    monkeypatch, module, name, most, contact, message
+):
+    monkeypatch.setattr(module, name, most)
+    with pytest.raises(ContactError, match=message) as told:
+        press(**contact)
+    assert float(re.search(message, str(told.value))[1]) > 0.0
+    monkeypatch.undo()
+    assert np.isfinite(press(**contact).contacts[0].force)
