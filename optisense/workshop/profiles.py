@@ -25,6 +25,16 @@ ARC_CORNERS = 5
 SMOOTH = 20.0
 """Largest angle between neighbouring sides of a smooth curve, degrees."""
 
+SMOOTH_SAGITTA = 0.05
+"""Largest distance of a smooth curve from the sides of its polygon, mm; five times the tolerance of
+a good export. Long sides that stand farther from any curve through their corners are meant flat.
+"""
+
+ALIKE = 2.0
+"""Largest ratio of the lengths of neighbouring sides of a smooth curve. Corners on curves come in
+steady steps; a longer side beside them is a straight one, such as that of a mitred corner.
+"""
+
 CURVE_CORNERS = 6
 """Smallest number of corners in a smooth run that make a curve."""
 
@@ -126,9 +136,14 @@ def _loose(corners: FloatArray, run: list[int]) -> list[OutlinePiece]:
         return []
     points = corners[run]
     sides = np.diff(points, axis=0)
-    sides /= np.linalg.norm(sides, axis=1, keepdims=True)
-    bends = np.degrees(np.arccos(np.clip((sides[1:] * sides[:-1]).sum(axis=1), -1.0, 1.0)))
-    cuts = [0, *(np.flatnonzero(bends > SMOOTH) + 1).tolist(), len(points) - 1]
+    lengths = np.linalg.norm(sides, axis=1)
+    sides /= lengths[:, None]
+    bends = np.arccos(np.clip((sides[1:] * sides[:-1]).sum(axis=1), -1.0, 1.0))
+    # An arc that turns by this angle over a side stands off from it by an eighth of their product.
+    longer = np.maximum(lengths[1:], lengths[:-1])
+    sharp = (bends > np.radians(SMOOTH)) | (longer * bends / 8.0 > SMOOTH_SAGITTA)
+    sharp |= longer > ALIKE * np.minimum(lengths[1:], lengths[:-1])
+    cuts = [0, *(np.flatnonzero(sharp) + 1).tolist(), len(points) - 1]
     found: list[OutlinePiece] = []
     for low, high in pairwise(cuts):
         part = points[low : high + 1]

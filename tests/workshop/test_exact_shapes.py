@@ -54,6 +54,21 @@ class TestProfiles:
         assert piece.kind == "curve"
         np.testing.assert_array_equal(piece.points[:, 0], x)
 
+    def test_long_sides_at_small_angles_are_straight(self) -> None:
+        """Eight sides of 10 mm that turn by 8 degrees stand 0.17 mm off a curve."""
+        ways = np.radians(8.0 * np.arange(8))
+        ways[::2] += 0.02  # no circle
+        steps = 10.0 * np.column_stack([np.cos(ways), np.sin(ways)])
+        corners = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+        assert [piece.kind for piece in pieces(corners)] == ["line"] * 8
+
+    def test_a_mitred_end_of_a_curve_is_straight(self) -> None:
+        x = np.linspace(-1.0, 1.0, 20)
+        corners = np.concatenate([np.column_stack([x, 0.2 * x**2]), [(1.9, 0.56)]])
+        curve, end = pieces(corners)
+        assert (curve.kind, end.kind) == ("curve", "line")
+        np.testing.assert_array_equal(curve.points, corners[:-1])
+
     def test_a_polygon_stays_one(self) -> None:
         angle = np.linspace(0.0, 2.0 * np.pi, 7)
         hexagon = np.column_stack([np.cos(angle), np.sin(angle)])
