@@ -196,7 +196,10 @@ def test_a_picture_of_too_few_pixels_says_so(tmp_path: Path) -> None:
     """A pixel of GelSight Svelte's skin at 32 x 24 is 6 mm² large: more than a ball touches."""
     svelte = OpticalModel(load("gelsight-svelte"))
     coarse = DatasetSettings(
-        ContactDraw(("sphere:1.5",), depth=(0.3, 0.3)), resolution=(32, 24), photons=20_000
+        ContactDraw(("sphere:1.5",), depth=(0.3, 0.3)),
+        resolution=(32, 24),
+        photons=20_000,
+        skin="conforming",
     )
     dataset = generate(svelte, tmp_path / "d", 1, coarse)
     assert "fewer than 4 pixels of 32x24 show the contact" in dataset.failures[0]["reason"]
@@ -256,7 +259,11 @@ def test_contacts_stay_clear_of_the_edge_unless_they_may_be_cut(
     mini: OpticalModel, tmp_path: Path
 ) -> None:
     settings = DatasetSettings(
-        ContactDraw(("sphere:1.5",)), resolution=(100, 75), photons=FEW, seed=1
+        ContactDraw(("sphere:1.5",)),
+        resolution=(100, 75),
+        photons=FEW,
+        seed=1,
+        skin="conforming",
     )
     kept = generate(mini, tmp_path / "kept", 16, settings)
     assert min(edge_distance(sample.mask) for sample in kept) >= 2  # of 100 pixels
@@ -273,7 +280,7 @@ def test_an_indenter_larger_than_the_view_keeps_no_margin(
     mini: OpticalModel, tmp_path: Path
 ) -> None:
     draw = ContactDraw(("sphere:40",), depth=(1.0, 1.5))
-    settings = DatasetSettings(draw, resolution=(60, 45), photons=FEW, seed=1)
+    settings = DatasetSettings(draw, resolution=(60, 45), photons=FEW, seed=1, skin="conforming")
     made = generate(mini, tmp_path / "large", 3, settings)
     assert len(made) == 3
     assert all(edge_distance(sample.mask) == 0 for sample in made)
