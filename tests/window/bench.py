@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .desktop import SIZE, Desktop
+from .desktop import SIZE, Desktop, nothing
 from .sidebar import Sidebar
 
 PATIENCE = 300.0
@@ -67,6 +67,7 @@ class Bench(Sidebar):
             assert time.monotonic() < end, self.log()
             time.sleep(0.1)
         self._answers = self._socket.makefile(encoding="utf-8")
+        self.desktop.settle = self.settle
 
     def log(self) -> str:
         """What Blender wrote last."""
@@ -89,6 +90,16 @@ class Bench(Sidebar):
             assert not self.see("state().problem"), self.said()
             time.sleep(0.03)
         return value
+
+    def settle(self) -> None:
+        """Wait until Blender has handled what mouse and keys did, and has drawn what came of it.
+
+        It answers before it handles what has come since, and draws after that: the first answer
+        says that all has come, the second that it is handled, the third that an operator that a
+        button called has run, too.
+        """
+        for _ in range(3):
+            self.see("1")
 
     def said(self) -> str:
         """The message in the panel."""
@@ -213,6 +224,7 @@ class Bench(Sidebar):
     def quit(self) -> None:
         """Close Blender as a user does, saving the file when it asks."""
         self.over_view()
+        self.desktop.settle = nothing
         self.desktop.keys("ctrl+q")
         for _ in range(TRIES):
             try:

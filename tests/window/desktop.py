@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import subprocess
-import time
+from collections.abc import Callable
 from pathlib import Path
 from shutil import which
 
@@ -15,15 +15,23 @@ PAGE = (1000, 1000)
 """Pixels of a picture on a page, at most."""
 
 
+def nothing() -> None:
+    """Do not wait."""
+
+
 class Desktop:
     """A display of its own; what it shows is drawn by the processor.
 
     Attributes:
         actions: clicks, keys pressed and texts typed so far; a drag is one, a held key another.
+        settle: waits until the program in front has handled what mouse and keys did so far.
     """
+
+    settle: Callable[[], None]
 
     def __init__(self) -> None:
         self.actions = 0
+        self.settle = nothing
         for program in ("Xvfb", "xdotool"):
             assert which(program), f"{program} is missing: sh scripts/setup_blender_window.sh"
         read, write = os.pipe()
@@ -46,15 +54,20 @@ class Desktop:
         )
 
     def move(self, x: float, y: float) -> None:
-        """Move the mouse to a pixel, counted from the top left."""
-        self._do("mousemove", "--sync", round(x), round(y))
+        """Move the mouse to a pixel, counted from the top left.
+
+        The question for its place makes xdotool wait for the display. Its option --sync would wait
+        15 s where the mouse is there already.
+        """
+        self._do("mousemove", round(x), round(y), "getmouselocation")
 
     def click(self, x: float, y: float, *, button: int = 1, times: int = 1) -> None:
         """Click somewhere, as a hand does: first there, then down, then up."""
         self.actions += times
         self.move(x, y)
-        time.sleep(0.05)
+        self.settle()
         self._do("click", "--repeat", times, "--delay", 60, button)
+        self.settle()
 
     def press(self, down: bool) -> None:
         """Press the mouse's left button without letting it go, or let it go."""
@@ -71,11 +84,13 @@ class Desktop:
         self.actions += len(names)
         for name in names:
             self._do("key", "--delay", 30, name)
+            self.settle()
 
     def write(self, text: str) -> None:
         """Type a text."""
         self.actions += 1
         self._do("type", "--delay", 15, text)
+        self.settle()
 
     def shown(self) -> Image.Image:
         """What the display shows."""
