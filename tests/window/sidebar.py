@@ -168,6 +168,7 @@ class Sidebar(ABC):
         )
         self.see("1")
         self.drawn()
+        self._last = 0  # a button may be further up now than where it was found
         return bool(self.see(SCROLLED_TO) != before)
 
     def press(self, what: str, *, across: float = 0.5) -> None:
