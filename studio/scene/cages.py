@@ -61,6 +61,22 @@ def lock(part: bpy.types.Object, locked: bool) -> None:
     part.optisense.is_caged = locked
 
 
+def cage_around(scene: bpy.types.Scene, part: bpy.types.Object) -> bpy.types.Object | None:
+    """Return the cage that a part is in; None for a part in no cage."""
+    key = part.optisense.key
+    return next((c for c in objects_of(scene, "CAGE") if key in cage_data(c)["parts"]), None)
+
+
+def join_cage(scene: bpy.types.Scene, cage: bpy.types.Object, part: bpy.types.Object) -> None:
+    """Put another part, which is at rest and lies inside the box of a cage, into the cage."""
+    values = cage_data(cage)
+    if part.optisense.key not in values["parts"]:
+        values["parts"].append(part.optisense.key)
+        cage.optisense.data = json.dumps(values)
+    lock(part, True)
+    follow(scene, cage)
+
+
 def release(scene: bpy.types.Scene) -> None:
     """Unlock parts whose cage was deleted, and copies of parts, which are in no cage."""
     cages = objects_of(scene, "CAGE")

@@ -17,6 +17,7 @@ from ..scene.cages import (
     add_cage,
     as_array,
     as_points,
+    cage_around,
     cage_data,
     cage_values,
     current_points,
@@ -36,9 +37,7 @@ def _cage(context: bpy.types.Context) -> bpy.types.Object | None:
     if active is not None and active.optisense.kind == "CAGE":
         return active
     if active is not None and active.optisense.kind == "PART":
-        for cage in objects_of(context.scene, "CAGE"):
-            if active.optisense.key in cage_data(cage)["parts"]:
-                return cage
+        return cage_around(context.scene, active)
     return None
 
 

@@ -12,6 +12,7 @@ from ..core import outer
 from ..engine import polls
 from ..engine.operators import refuse
 from ..scene.build import add_part
+from ..scene.cages import cage_around, join_cage
 from ..scene.collections import objects_of, select_only
 from ..scene.contacts import sensing_surface
 from ..scene.gather import free_name, part_names
@@ -62,7 +63,7 @@ def _chosen(gel: bpy.types.Object) -> NDArray[np.int64]:
 
 class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
     """Lay the sensing surface on the outside of the gel: on its faces that look away from the rest,
-    or on those that are selected in edit mode; it faces inward by itself"""
+    or on those that are selected in edit mode. It faces inward, and joins the gel's cage"""
 
     bl_idname = "optisense.make_skin"
     bl_label = "Make Sensing Surface"
@@ -79,9 +80,8 @@ class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, gel = context.scene, _gel(context)
-        if gel.optisense.is_caged:
-            return refuse(self, f"A cage bends {gel.name}: remove the cage first")
-        mesh = part_mesh(gel, caged=False)
+        cage = cage_around(scene, gel)
+        mesh = part_mesh(gel, caged=cage is not None)
         if gel.mode == "EDIT":
             faces = _chosen(gel)
             if not len(faces):
@@ -95,6 +95,9 @@ class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
                 )
         key = free_name("skin", part_names(scene))
         values = {"role": "sensing_surface", "mesh": f"meshes/{key}.obj"}
-        select_only(add_part(scene, key, values, outer.skin_of(mesh, faces)))
+        skin = add_part(scene, key, values, outer.skin_of(mesh, faces))
+        if cage is not None:
+            join_cage(scene, cage, skin)
+        select_only(skin)
         self.report({"INFO"}, f"The sensing surface lies on {len(faces)} triangles of {gel.name}")
         return {"FINISHED"}

@@ -13,9 +13,10 @@ import pytest
 from studio.core import outer
 from studio.core.mesh_file import Mesh
 from studio.engine import session
+from studio.scene.cages import cage_data, follow, shown_points
 from studio.scene.collections import object_of, objects_of
 from studio.scene.contacts import sensing_surface
-from studio.scene.meshes import part_mesh
+from studio.scene.meshes import part_mesh, show_vertices, shown_vertices
 
 
 def solid(make: Callable[[Any], Any]) -> Mesh:
@@ -74,6 +75,29 @@ def test_one_press_makes_the_skin_of_a_mini(mini: Any, select: Callable[..., Non
     assert (outer.face_normals(made)[:, 2] < -0.99).all()  # it faces into the sensor
     bpy.ops.optisense.check()
     assert not session.state().problem
+
+
+def test_the_skin_of_a_bent_gel_joins_its_cage(mini: Any, select: Callable[..., None]) -> None:
+    (cage,) = objects_of(mini, "CAGE")
+    points = shown_points(cage)
+    points[14, 2] += 2.0  # lifts the middle of the skin by a quarter of that
+    show_vertices(cage.data, points)
+    follow(mini, cage)
+    old = shown_vertices(sensing_surface(mini).data)[:, 2].max()
+    bpy.data.objects.remove(sensing_surface(mini))
+    gel = object_of(mini, "PART", "gel")
+    select(gel)
+    assert bpy.ops.optisense.make_skin() == {"FINISHED"}
+    skin = sensing_surface(mini)
+    heights = shown_vertices(skin.data)[:, 2]
+    assert heights.max() == pytest.approx(shown_vertices(gel.data)[:, 2].max(), abs=1e-6)
+    assert 0.2 < heights.max() <= old + 1e-6, "as far as the gel has vertices under its middle"
+    assert skin.optisense.key in cage_data(cage)["parts"] and skin.optisense.is_caged
+    bpy.ops.optisense.check()
+    assert not session.state().problem
+    bpy.ops.optisense.select_cage(cage=cage.optisense.key)
+    bpy.ops.optisense.remove_cage()
+    assert shown_vertices(skin.data)[:, 2].max() == pytest.approx(0.0, abs=1e-6)
 
 
 def test_faces_can_be_chosen_by_hand(mini: Any, select: Callable[..., None]) -> None:

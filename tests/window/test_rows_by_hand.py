@@ -120,4 +120,5 @@ def test_a_skin_is_made_in_one_press(bench: Bench) -> None:
     bench.select_part("gel", GEL)
     bench.press("optisense.make_skin")
     bench.until("any(p.optisense.role == 'sensing_surface' for p in kinds('PART'))")
+    assert bench.see("bpy.context.view_layer.objects.active.optisense.is_caged"), "as its gel is"
     bench.photograph("skin-made")
