@@ -38,8 +38,6 @@ RANGE = "cages.skin.points[14].z=2:12"
 """What varies: how high the middle of the skin is."""
 
 POINTS = "part('scene.cages').shown_points(kinds('CAGE')[0])"
-CORNER = f"{POINTS}[2].tolist()"
-"""mm: a corner of the cage that lies free in the view."""
 
 
 def finished(study: Path) -> dict[int, Any]:
@@ -65,7 +63,7 @@ def test_a_mini_is_saved(bench: Bench) -> None:
 
 
 def test_what_may_vary_is_chosen(bench: Bench) -> None:
-    bench.desktop.click(*bench.see(f"on_screen({CORNER})"))
+    bench.press("optisense.select_cage")
     bench.until("bpy.context.view_layer.objects.active.optisense.kind == 'CAGE'")
     labels = bench.see("[e.label for e in part('core.vary').for_cage('skin', (), blended=False)]")
     bench.only(OPTIMISE)
