@@ -171,7 +171,7 @@ def ablations() -> list[Ablation]:
                      Change(shading_points, "in_series", random_in_series)),
         shading_only("interreflection in contacts",
                      Change(shading, "interreflected", no_interreflection),
-                     Change(shading, "glossily_interreflected", no_interreflection)),
+                     Change(shading, "glossy_interreflection", no_interreflection)),
         shading_only("interreflection beyond one bounce",
                      Change(interreflection, "MAX_BOUNCES", 1),
                      Change(glossy_interreflection, "MAX_BOUNCES", 1)),

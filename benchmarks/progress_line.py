@@ -42,7 +42,7 @@ LIVE = re.compile(r"[━─╸╺]|" + CLOCK.pattern)
 
 
 @dataclass
-class Look:
+class DesignView:
     """What the screen showed."""
 
     seconds: float
@@ -63,7 +63,7 @@ class Watched:
         screen: what it showed in the end.
     """
 
-    looks: list[Look] = field(default_factory=list)
+    looks: list[DesignView] = field(default_factory=list)
     seconds: float = 0.0
     code: int = 0
     obeyed: float | None = None
@@ -102,7 +102,7 @@ def watch(command: list[str], columns: int, presses: list[float]) -> Watched:
         if now >= look_at:
             look_at += LOOK_EVERY
             line = _line(screen)
-            found.looks.append(Look(now, line, _left(line)))
+            found.looks.append(DesignView(now, line, _left(line)))
     _, status = os.waitpid(pid, 0)
     found.seconds = time.monotonic() - began
     found.code = os.waitstatus_to_exitcode(status)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from optisense.starting import leave_on_signals
+from optisense.starting import exit_on_signals
 
 
 def main() -> None:
     """Run the command line; `optisense.cli.stopping` handles signals once it is imported."""
-    leave_on_signals()
+    exit_on_signals()
     from optisense.cli import main as run
 
     run()

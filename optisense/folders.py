@@ -85,7 +85,7 @@ class FolderLock:
             own = os.fstat(self._file).st_uid == os.getuid()
             half = left is not None and own and not _is_whole(self.folder, left)
             files, folders = (left.making, left.folders) if left and half else ((), ())
-            sweep(self.folder, (*SUBFOLDERS, *folders))
+            remove_temporary_files(self.folder, (*SUBFOLDERS, *folders))
             _remove(self.folder, files, folders)
             self._write(self._me)
         except OSError as error:
@@ -303,7 +303,7 @@ def holder_of(folder: Path) -> Holder | None:
         os.close(file)
 
 
-def sweep(folder: Path, subfolders: Iterable[str]) -> None:
+def remove_temporary_files(folder: Path, subfolders: Iterable[str]) -> None:
     """Remove the temporary files of ended processes from a folder whose lock is held."""
     for place in (folder, *(folder / name for name in subfolders)):
         with contextlib.suppress(OSError):

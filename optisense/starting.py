@@ -28,7 +28,7 @@ def has_begun() -> bool:
     return _begun
 
 
-def leave_on_signals() -> None:
+def exit_on_signals() -> None:
     """Let Ctrl-C and SIGTERM end the process with 130 or 143 and one word from here on.
 
     A signal that is ignored, as in programs that a shell runs in the background, stays ignored.

@@ -23,7 +23,7 @@ import optisense as ots
 from optisense.calibration import CalibrationSettings, calibrate, compare, read_photographs
 from optisense.calibration.families import chosen_families
 from optisense.design import SensorDesign, Status, get_value
-from optisense.sensors.gelsight_mini_fitted import FITTED_NUMBERS, before_the_fit
+from optisense.sensors.gelsight_mini_fitted import FITTED_NUMBERS, unfitted_design
 
 UNIT = "one GelSight Mini, calibration pictures of GelSLAM (commit e0ea7de, MIT)"
 """Whose photographs they are, for the source of each number."""
@@ -44,7 +44,7 @@ FILE = Path(ots.__file__).parent / "sensors" / FITTED_NUMBERS
 def fitted_to(photographs: str) -> SensorDesign:
     """The design after a fit with the usual settings, every third press held out."""
     found = calibrate(
-        before_the_fit(),
+        unfitted_design(),
         read_photographs(photographs),
         CalibrationSettings(families=chosen_families([], ["edges"])),
         progress=lambda *told: print(told),

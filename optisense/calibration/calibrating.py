@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from optisense.calibration.comparing import Comparison, usable
 from optisense.calibration.fit_rounds import FitRounds, Progress
-from optisense.calibration.fitted_numbers import FittedNumber, fitted_numbers, not_told_apart
+from optisense.calibration.fitted_numbers import FittedNumber, correlated_pairs, fitted_numbers
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.model_pictures import model_pictures
 from optisense.calibration.photographs import Photographs
@@ -95,7 +95,7 @@ def calibrate(
         design=fitted,
         exposure=exposure,
         numbers=numbers,
-        alike=not_told_apart(chosen, solution),
+        alike=correlated_pairs(chosen, solution),
         before=comparisons[0],
         after=comparisons[1],
         held_out=held,

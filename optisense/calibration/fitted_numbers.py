@@ -62,7 +62,7 @@ def fitted_numbers(
     return tuple(found)
 
 
-def not_told_apart(
+def correlated_pairs(
     chosen: Sequence[FitQuantity], solution: Solution
 ) -> tuple[tuple[str, str, float], ...]:
     """Return pairs of numbers, in words, that photographs can't distinguish, and their

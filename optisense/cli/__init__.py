@@ -2,10 +2,10 @@
 
 import sys
 
-from optisense.starting import leave_on_signals
+from optisense.starting import exit_on_signals
 
 if sys.argv[:1] == ["-m"]:  # so it is while Python looks for what ``python -m`` names
-    leave_on_signals()
+    exit_on_signals()
 
 from optisense.cli.app import app, main
 

@@ -39,7 +39,7 @@ def apply(
         save_design(design_of(opened, chosen), out, new=True)
         output.print(f"{out / 'design.yaml'}", markup=False)
         output.print(
-            f"trial {chosen.number}: {opened.objective} {chosen.fair_score:.4g}", markup=False
+            f"trial {chosen.number}: {opened.objective} {chosen.unbiased_score:.4g}", markup=False
         )
     finally:
         opened.close()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from optisense.report.before_after import Look
+    from optisense.report.before_after import DesignView
     from optisense.search import Study
 
 REPORT_FILE = "report.html"
@@ -117,10 +117,10 @@ def _steps(photons: int, pictures: bool, trials: int) -> list[TimedStep]:
     """Return the steps, with their usual durations (s on two cores of a desktop processor, for
     GelSight Mini).
     """
-    look = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
+    per_view = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
     return [
-        TimedStep("the sensor before the search", 1, 3.0 + look),
-        TimedStep("the sensor after the search", 1, look),
+        TimedStep("the sensor before the search", 1, 3.0 + per_view),
+        TimedStep("the sensor after the search", 1, per_view),
         TimedStep(TRIALS, trials, 2.0),
         TimedStep(WRITING, 1, 3.0),
     ]
@@ -128,10 +128,10 @@ def _steps(photons: int, pictures: bool, trials: int) -> list[TimedStep]:
 
 def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray[np.uint8]]:
     """Render the trials that a reader is most likely to look at, by number."""
-    from optisense.report.trial_pictures import TrialPictures, worth_a_picture
+    from optisense.report.trial_pictures import TrialPictures, select_for_pictures
 
     made, found = TrialPictures(study), {}
-    chosen = worth_a_picture(study, study.trials, count)
+    chosen = select_for_pictures(study, study.trials, count)
     if chosen:
         line.begin(TRIALS, len(chosen))
     for done, trial in enumerate(chosen):
@@ -143,14 +143,14 @@ def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray
     return found
 
 
-def _looks(study: Study, photons: int, pictures: bool, line: ProgressLine) -> dict[str, Look]:
+def _looks(study: Study, photons: int, pictures: bool, line: ProgressLine) -> dict[str, DesignView]:
     """Return chief rays of the start and of the best trial, with pictures if they are asked for.
 
     Raises:
         SetupError: the renderer can't run on this machine, and pictures are asked for.
     """
     from optisense.errors import SetupError
-    from optisense.report.before_after import look
+    from optisense.report.before_after import design_view
 
     designs = {"before": study.space.design}
     best = study.best
@@ -163,7 +163,7 @@ def _looks(study: Study, photons: int, pictures: bool, line: ProgressLine) -> di
         line.begin(step, text=f"{verb} {step}")
         try:
             settings = study.settings.settings
-            found[label] = look(design, settings, pictures=pictures, photons=photons)
+            found[label] = design_view(design, settings, pictures=pictures, photons=photons)
         except SetupError:
             if pictures:
                 raise

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from optisense.cli.console import messages, output
 
 if TYPE_CHECKING:
-    from optisense.report.before_after import Look
+    from optisense.report.before_after import DesignView
     from optisense.search import Study
 
 LOOK_EVERY = 1.0
@@ -60,7 +60,7 @@ class _Watched:
         self._study, self._named, self._server = study, named, server
         self._pictures = TrialPictures(study) if pictures else None
         self._version = ""
-        self._looks: dict[int, Look] = {}
+        self._looks: dict[int, DesignView] = {}
 
     def refresh(self) -> None:
         """Update the page if the study's files have changed."""
@@ -91,9 +91,9 @@ class _Watched:
         finally:
             answer.set_result(None if found is None else png(found))
 
-    def _sides(self) -> dict[str, Look]:
+    def _sides(self) -> dict[str, DesignView]:
         """Return chief rays of the start and of the best trial; each design is traced once."""
-        from optisense.report.before_after import look
+        from optisense.report.before_after import design_view
 
         best = self._study.best
         designs = {-1: ("before", self._study.space.design)}
@@ -101,7 +101,7 @@ class _Watched:
             designs[best.number] = ("after", best.design)
         settings = self._study.settings.settings
         self._looks = {
-            number: self._looks.get(number) or look(design, settings, pictures=False)
+            number: self._looks.get(number) or design_view(design, settings, pictures=False)
             for number, (_, design) in designs.items()
         }
         return {label: self._looks[number] for number, (label, _) in designs.items()}

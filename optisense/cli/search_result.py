@@ -74,7 +74,7 @@ def print_result(result: SearchResult, out: Path) -> None:
     name = study.objective
     said = "best so far" if result.interrupted else "best"
     output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}", markup=False)
-    if best.fair_score != best.score:
+    if best.unbiased_score != best.score:
         output.print(f"  by the search's own seed, by which it was chosen: {best.score:.4g}")
     for line in [*_beside(study, best, start), *(f"  {each}" for each in kept(best, start))]:
         output.print(line, markup=False)
@@ -109,13 +109,13 @@ def _print_nearest(trials: Sequence[Trial]) -> None:
 
 def _headline(best: Trial, start: Trial | None) -> str:
     """Return the best score and the start's, by fresh seeds if they were scored."""
-    text = f"{best.fair_score:.4g}"
-    if best.fair_score != best.score:
+    text = f"{best.unbiased_score:.4g}"
+    if best.unbiased_score != best.score:
         spread = best.fresh_spread()
         text += f" ± {spread:.2g}" if math.isfinite(spread) else ""
         text += " with fresh seeds"
-    if start is not None and math.isfinite(start.fair_score):
-        text += f" (start {start.fair_score:.4g})"
+    if start is not None and math.isfinite(start.unbiased_score):
+        text += f" (start {start.unbiased_score:.4g})"
     return text
 
 

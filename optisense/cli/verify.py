@@ -77,7 +77,7 @@ def verify(
     print_comparison(compared, out)
 
 
-class Compared(NamedTuple):
+class ComparisonResult(NamedTuple):
     """Result of a comparison.
 
     Attributes:
@@ -101,7 +101,7 @@ def compare(
     options: VerifyOptions,
     out: Path | None,
     variant: str,
-) -> Compared:
+) -> ComparisonResult:
     """Compare two designs, or a trial of a study with its start; see `verify`.
 
     Raises:
@@ -132,7 +132,7 @@ def compare(
             shown[side](done, count)
 
         found = compared_by_objects((models[0], models[1]), settings, names, show)
-        compared = Compared(found, conditions_of(first, trial) if second is None else [])
+        compared = ComparisonResult(found, conditions_of(first, trial) if second is None else [])
         if out is not None:
             from optisense.report.verification import render_verification
 
@@ -144,7 +144,7 @@ def compare(
     return compared
 
 
-def print_comparison(compared: Compared, out: Path | None) -> None:
+def print_comparison(compared: ComparisonResult, out: Path | None) -> None:
     """Print the errors of both sensors, the conditions, and the files that were written."""
     print_verification(compared.found)
     print_conditions(compared.conditions)

@@ -12,7 +12,7 @@ from optisense.design.fields import (
     Colour,
     Count,
     Direction,
-    MisfitError,
+    InconsistentValueError,
     Model,
     Name,
     Number,
@@ -148,7 +148,7 @@ class Camera(ImagingModel, Viewpoint):
         )
 
     @model_validator(mode="after")
-    def _makes_sense(self) -> Camera:
+    def _check_consistent(self) -> Camera:
         if self.projection == "perspective" and self.fov >= 180.0:
             raise ValueError("a perspective camera sees less than 180 degrees; use equidistant")
         direction, up = np.array(self.direction), np.array(self.up)
@@ -156,7 +156,7 @@ class Camera(ImagingModel, Viewpoint):
         if across < 1e-6 * np.linalg.norm(direction) * np.linalg.norm(up):
             raise ValueError("direction and up are parallel; up must point to the picture's top")
         if self.distortion is not None and self.distortion.projection != self.projection:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"a lens distortion of kind '{self.distortion.kind}' is one of "
                 f"{self.distortion.projection} lenses, and this one is {self.projection}",
                 ("distortion", "kind"),

@@ -105,7 +105,7 @@ def unit_of(model: type[BaseModel], name: str) -> str:
     return str(extra.get("unit", "")) if isinstance(extra, dict) else ""
 
 
-class MisfitError(ValueError):
+class InconsistentValueError(ValueError):
     """Error: a value that is valid by itself does not fit the rest of the design.
 
     Attributes:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from optisense.design.fields import (
     MILLIMETRES,
     Colour,
-    MisfitError,
+    InconsistentValueError,
     Model,
     Number,
     Positive,
@@ -47,13 +47,13 @@ class Markers(Model):
     )
 
     @model_validator(mode="after")
-    def _says_where_once(self) -> Markers:
+    def _check_one_layout(self) -> Markers:
         if (self.grid is None) == (self.places is None):
-            raise MisfitError(
+            raise InconsistentValueError(
                 "markers have a grid or places, one of both", ("grid",), "Give one of them"
             )
         if (self.grid is None) != (self.pitch is None):
-            raise MisfitError(
+            raise InconsistentValueError(
                 "markers have a grid without a pitch, or a pitch without a grid",
                 ("pitch",),
                 "Give both, or places",

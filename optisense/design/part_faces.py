@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.fields import MisfitError
+from optisense.design.fields import InconsistentValueError
 from optisense.design.materials import Material, kinds_for
 from optisense.design.parts import TRANSPARENT_SOLIDS, FaceFinish, Part, Role
 from optisense.errors import DesignError
@@ -25,19 +25,20 @@ def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> 
     """Refuse finishes of parts that can't have them, and paints that are no opaque materials.
 
     Raises:
-        MisfitError: the part is no transparent solid, or a paint is unknown or transparent.
+        InconsistentValueError: the part is no transparent solid, or a paint is unknown or
+            transparent.
     """
     for label, finish in (part.faces or {}).items():
         path: tuple[str | int, ...] = ("parts", name, "faces", label)
         if part.role is Role.SENSING_SURFACE:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"part '{name}' is a sensing_surface: it wears the coating, and can't be frosted "
                 "or painted",
                 path,
                 "Change the coating, or name faces of the elastomer that it does not cover",
             )
         if part.role not in TRANSPARENT_SOLIDS:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"part '{name}' ({part.role.value}) is no transparent solid, whose faces can be "
                 "frosted or painted",
                 path,
@@ -46,14 +47,14 @@ def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> 
         if finish.paint is None:
             continue
         if finish.paint not in materials:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"faces '{label}' of part '{name}' are painted with an unknown material "
                 f"'{finish.paint}'",
                 (*path, "paint"),
                 suggestion(finish.paint, materials),
             )
         if Role.BLOCKER not in materials[finish.paint].roles:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"material '{finish.paint}' is no paint: it is a {materials[finish.paint].kind}",
                 (*path, "paint"),
                 "Use a material of kind " + " or ".join(kinds_for(Role.BLOCKER)),

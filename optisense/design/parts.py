@@ -12,7 +12,7 @@ from optisense.design.fields import (
     MILLIMETRES,
     Direction,
     Fraction,
-    MisfitError,
+    InconsistentValueError,
     Model,
     Name,
     Number,
@@ -72,13 +72,17 @@ class FaceFinish(Model):
     )
 
     @model_validator(mode="after")
-    def _says_which_faces_and_what(self) -> FaceFinish:
+    def _check_faces(self) -> FaceFinish:
         if self.direction is None and self.box is None:
-            raise MisfitError("it is not said which faces", (), "Give 'direction', 'box' or both")
+            raise InconsistentValueError(
+                "it is not said which faces", (), "Give 'direction', 'box' or both"
+            )
         if (self.roughness is None) == (self.paint is None):
-            raise MisfitError("faces have either a roughness or a paint", (), "Give one of the two")
+            raise InconsistentValueError(
+                "faces have either a roughness or a paint", (), "Give one of the two"
+            )
         if self.box is not None and any(a > b for a, b in zip(*self.box, strict=True)):
-            raise MisfitError(
+            raise InconsistentValueError(
                 "the first corner of the box must be the lower one", ("box",), "Swap the corners"
             )
         return self

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from optisense.design.fields import MisfitError
+from optisense.design.fields import InconsistentValueError
 from optisense.design.kinds import KindModel
 from optisense.design.sensor_design import SensorDesign, dotted
 from optisense.errors import DesignError
@@ -137,7 +137,7 @@ def _problems(
             found.append(Diagnostic(message, _place(path, where, lines), hint))
             continue
         cause = context.get("error")
-        if isinstance(cause, MisfitError):
+        if isinstance(cause, InconsistentValueError):
             path = (*path, *cause.path)
             found.append(Diagnostic(str(cause), _place(path, where, lines), cause.hint))
             continue

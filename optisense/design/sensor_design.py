@@ -12,7 +12,7 @@ from pydantic import Field, PrivateAttr, StringConstraints, model_validator
 
 from optisense.design.cage import Cage
 from optisense.design.camera import Camera
-from optisense.design.fields import MisfitError, Model, Name, is_left_out
+from optisense.design.fields import InconsistentValueError, Model, Name, is_left_out
 from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup
 from optisense.design.markers import Markers
@@ -111,19 +111,21 @@ class SensorDesign(Model):
         for name, part in self.parts.items():
             check_finishes(name, part, self.materials)
         if not any(part.role is Role.SENSING_SURFACE for part in self.parts.values()):
-            raise MisfitError("no part is a sensing_surface", ("parts",), "Give one part this role")
+            raise InconsistentValueError(
+                "no part is a sensing_surface", ("parts",), "Give one part this role"
+            )
         caged: dict[str, str] = {}
         for cage_name, cage in self.cages.items():
             for index, part_name in enumerate(cage.parts):
                 path = ("cages", cage_name, "parts", index)
                 if part_name not in self.parts:
-                    raise MisfitError(
+                    raise InconsistentValueError(
                         f"cage '{cage_name}' deforms an unknown part '{part_name}'",
                         path,
                         suggestion(part_name, self.parts),
                     )
                 if part_name in caged:
-                    raise MisfitError(
+                    raise InconsistentValueError(
                         f"part '{part_name}' is in two cages, or twice in one "
                         f"('{caged[part_name]}', '{cage_name}')",
                         path,
@@ -138,7 +140,7 @@ class SensorDesign(Model):
             if part.role in MATERIAL_REQUIRED:
                 kinds = kinds_for(part.role)
                 fit = [name for name, material in self.materials.items() if material.kind in kinds]
-                raise MisfitError(
+                raise InconsistentValueError(
                     f"part '{name}' ({part.role.value}) has no material",
                     path,
                     f"Name one of: {', '.join(fit)}"
@@ -147,20 +149,20 @@ class SensorDesign(Model):
                 )
             return
         if part.role is Role.SENSING_SURFACE:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"part '{name}' is a sensing_surface and wears the coating, not a material",
                 path,
                 "Remove its material",
             )
         if part.material not in self.materials:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"part '{name}' is made of an unknown material '{part.material}'",
                 path,
                 suggestion(part.material, self.materials),
             )
         material = self.materials[part.material]
         if part.role not in material.roles:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"part '{name}' ({part.role.value}) can't be made of '{part.material}', "
                 f"which is a {material.kind}",
                 path,

@@ -88,7 +88,7 @@ def contacts_of(given: list[AnyContact]) -> list[Contact]:
 
 
 @contextmanager
-def telling_which(contacts: Sequence[Contact], place: Place) -> Iterator[None]:
+def errors_naming_contact(contacts: Sequence[Contact], place: Place) -> Iterator[None]:
     """Context in which an error about one of several contacts names that contact.
 
     Args:

@@ -24,7 +24,7 @@ from optisense.engine.failures import ProtocolError, problem_row
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
-from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 from optisense.errors import DesignError, MeshError
@@ -42,7 +42,7 @@ Resolution = tuple[int, int, int]
 Place = tuple[float, float, float]
 
 
-class Save(OfDesign):
+class Save(DesignFields):
     """Fields of the request "save"; see docs/engine.md."""
 
     to: str
@@ -57,7 +57,7 @@ class Mesh(Fields):
     scale: float = Field(default=1.0, ge=1e-9, le=1e6)
 
 
-class ChangeCage(OfDesign):
+class ChangeCage(DesignFields):
     """Fields of the request "cage"; see docs/engine.md."""
 
     action: Literal["add", "remove", "refine", "range", "settle"]
@@ -70,13 +70,13 @@ class ChangeCage(OfDesign):
     blend: float | None = 0.0
 
 
-class CageWeights(OfDesign):
+class CageWeights(DesignFields):
     """Fields of the request "cage_weights"; see docs/engine.md."""
 
     cage: str
 
 
-class Export(OfDesign):
+class Export(DesignFields):
     """Fields of the request "export"; see docs/engine.md."""
 
     to: str
@@ -93,8 +93,8 @@ def sensors(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     return {"sensors": rows}
 
 
-@handles("open", OfDesign, Lane.QUICK)
-def open_design(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
+@handles("open", DesignFields, Lane.QUICK)
+def open_design(session: Session, fields: DesignFields, job: Job) -> dict[str, Any]:
     """Return a design as JSON, with its meshes."""
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
@@ -134,8 +134,8 @@ def mesh(session: Session, fields: Mesh, job: Job) -> dict[str, Any]:
     }
 
 
-@handles("check", OfDesign, Lane.QUICK)
-def check(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
+@handles("check", DesignFields, Lane.QUICK)
+def check(session: Session, fields: DesignFields, job: Job) -> dict[str, Any]:
     """Return all problems of a design that can be found without tracing light."""
     design = design_of(session, fields, job)
     found = session.designs.problems(design)

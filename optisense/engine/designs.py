@@ -16,7 +16,7 @@ from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, design_error
 from optisense.design.sensor_design import dotted
 from optisense.design.storage import DESIGN_FILE
-from optisense.engine.failures import ProtocolError, UnsoundDesignError, place_in
+from optisense.engine.failures import InvalidDesignError, ProtocolError, place_in
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.library import names
@@ -121,15 +121,15 @@ class Designs:
         self._sound = design, found
         return found
 
-    def must_be_sound(self, design: SensorDesign) -> list[Diagnostic]:
+    def require_valid(self, design: SensorDesign) -> list[Diagnostic]:
         """Return the warnings about a design.
 
         Raises:
-            UnsoundDesignError: the design can't be simulated, or its simulation would be wrong.
+            InvalidDesignError: the design can't be simulated, or its simulation would be wrong.
         """
         found = self.problems(design)
         if any(problem.severity == "error" for problem in found):
-            raise UnsoundDesignError(found, f"design '{design.name}'")
+            raise InvalidDesignError(found, f"design '{design.name}'")
         return found
 
     def mesh(self, given: AnyMesh, scale: float = 1.0) -> TriangleMesh:

@@ -47,7 +47,7 @@ class WrongContactError(OptiSenseError):
         self.kind = type(error).__name__
 
 
-class UnsoundDesignError(OptiSenseError):
+class InvalidDesignError(OptiSenseError):
     """Error about a design that `check` refuses, with all problems that it found."""
 
     def __init__(self, problems: Sequence[Diagnostic], source: str) -> None:
@@ -72,7 +72,7 @@ def as_data(
     known = [*(design.parts if design is not None else ()), *parts]
     if isinstance(error, Cancelled):
         return _row("Cancelled", "the request was cancelled", None, None, known, design)
-    if isinstance(error, UnsoundDesignError):
+    if isinstance(error, InvalidDesignError):
         row = _row("DesignError", error.message, error.where, error.hint, known, design)
         row["problems"] = [problem_row(problem, design) for problem in error.problems]
         return row

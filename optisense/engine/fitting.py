@@ -11,26 +11,26 @@ from optisense.commands.comparing import CalibrateOptions, read_range
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
-from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 from optisense.folders import hold
 from optisense.writing import write_json, write_text
 
 
-class Calibrate(OfDesign, CalibrateOptions):
+class Calibrate(DesignFields, CalibrateOptions):
     """Fields of the request "calibrate"; see docs/engine.md."""
 
     photos: str
     to: str
 
 
-class Nothing(Fields):
+class NoFields(Fields):
     """Fields of the request "calibration_families"; see docs/engine.md."""
 
 
-@handles("calibration_families", Nothing, Lane.QUICK)
-def calibration_families(session: Session, fields: Nothing, job: Job) -> dict[str, Any]:
+@handles("calibration_families", NoFields, Lane.QUICK)
+def calibration_families(session: Session, fields: NoFields, job: Job) -> dict[str, Any]:
     """Return the families of parameters that a calibration fits by default."""
     return {"families": [{"name": name, "words": FAMILIES[name].words} for name in USUAL]}
 
@@ -51,7 +51,7 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
                     f"nothing is called '{name}'", where=where, hint="Use " + ", ".join(FAMILIES)
                 )
     design = design_of(session, fields, job)
-    session.designs.must_be_sound(design)
+    session.designs.require_valid(design)
     job.progress(0.0, "reading the photographs")
     photographs = read_photographs(Path(fields.photos), fields.ball)
     folder = Path(fields.to)

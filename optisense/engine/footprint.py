@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from optisense.engine.jobs import Job
-from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 
@@ -21,7 +21,7 @@ MOST = 640
 """Largest number of columns or rows of the grid, the number of pixels across a usual picture."""
 
 
-class FootprintGrid(OfDesign):
+class FootprintGrid(DesignFields):
     """Fields of the request "footprint"; see docs/engine.md."""
 
     columns: int = Field(default=WIDTH, ge=2, le=MOST)
@@ -54,8 +54,8 @@ def footprint(session: Session, fields: FootprintGrid, job: Job) -> dict[str, An
     }
 
 
-@handles("markers", OfDesign, Lane.RENDER)
-def markers(session: Session, fields: OfDesign, job: Job) -> dict[str, Any]:
+@handles("markers", DesignFields, Lane.RENDER)
+def markers(session: Session, fields: DesignFields, job: Job) -> dict[str, Any]:
     """Write the positions of the dots that are printed on the skin."""
     from optisense.optics.imaging.markers import MarkerDots
 

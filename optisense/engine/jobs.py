@@ -48,7 +48,7 @@ class PriorityGate:
             self._count -= 1
             self._changed.notify_all()
 
-    def give_way(self) -> None:
+    def wait_for_short_jobs(self) -> None:
         """Wait until no short work is in progress, or for `LONGEST_WAIT`."""
         time.sleep(GLANCE)  # the thread that reads requests may have one
         with self._changed:
@@ -69,10 +69,13 @@ class Job:
         number: RequestId,
         send: Send,
         draft: bool = False,
-        give_way: Callable[[], None] | None = None,
+        wait_for_short_jobs: Callable[[], None] | None = None,
     ) -> None:
-        """Store a request whose work has not begun; `give_way` is called at its safe points."""
-        self._give_way = give_way
+        """Store a request whose work has not begun.
+
+        `wait_for_short_jobs` is called at its safe points.
+        """
+        self._wait_for_short_jobs = wait_for_short_jobs
         self.id = number
         self.draft = draft
         self.design: SensorDesign | None = None
@@ -94,8 +97,8 @@ class Job:
         Raises:
             Cancelled: the request was cancelled.
         """
-        if self._give_way is not None:
-            self._give_way()
+        if self._wait_for_short_jobs is not None:
+            self._wait_for_short_jobs()
         self.check()
         now = time.monotonic()
         if now - self._told >= EVENTS_EVERY:

@@ -22,19 +22,19 @@ BALL_PIXELS = 160
 """Width and height of the picture of a single ball, in pixels."""
 
 
-class OfKind(Fields):
+class KindFields(Fields):
     """Fields of the request "library"; see docs/engine.md."""
 
     kind: str
 
 
-class OneEntry(OfKind):
+class EntryFields(KindFields):
     """Fields of the request "entry"; see docs/engine.md."""
 
     entry: str
 
 
-class Preview(OfKind):
+class Preview(KindFields):
     """Fields of the request "preview"; see docs/engine.md."""
 
     entry: str | None = None
@@ -42,7 +42,7 @@ class Preview(OfKind):
     ball: bool = False
 
 
-class LibraryAdd(OneEntry):
+class LibraryAdd(EntryFields):
     """Fields of the request "library_add"; see docs/engine.md."""
 
     value: dict[str, Any]
@@ -53,8 +53,8 @@ class LibraryAdd(OneEntry):
     sources: dict[str, Any] | None = Field(default=None)
 
 
-@handles("library", OfKind, Lane.QUICK)
-def entries(session: Session, fields: OfKind, job: Job) -> dict[str, Any]:
+@handles("library", KindFields, Lane.QUICK)
+def entries(session: Session, fields: KindFields, job: Job) -> dict[str, Any]:
     """Return the entries of a kind."""
     rows = []
     for name in library.names(fields.kind):
@@ -67,8 +67,8 @@ def entries(session: Session, fields: OfKind, job: Job) -> dict[str, Any]:
     return {"entries": rows}
 
 
-@handles("entry", OneEntry, Lane.QUICK)
-def entry(session: Session, fields: OneEntry, job: Job) -> dict[str, Any]:
+@handles("entry", EntryFields, Lane.QUICK)
+def entry(session: Session, fields: EntryFields, job: Job) -> dict[str, Any]:
     """Return all fields of an entry."""
     found = library.entry(fields.kind, fields.entry)
     own = library.is_own(fields.kind, fields.entry)

@@ -9,24 +9,24 @@ from optisense.engine.contacts import (
     AnyContact,
     GivenIndenter,
     contacts_of,
+    errors_naming_contact,
     plain_contact,
-    telling_which,
 )
 from optisense.engine.jobs import Job
-from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 from optisense.geometry import locate
 from optisense.geometry.indenter_kinds import indenter_from_plain
 
 
-class Place(OfDesign):
+class Place(DesignFields):
     """Fields of the request "place"; see docs/engine.md."""
 
     contacts: list[AnyContact]
 
 
-class NinePlaces(OfDesign):
+class NinePlaces(DesignFields):
     """Fields of the request "nine_places"; see docs/engine.md."""
 
     indenter: GivenIndenter
@@ -41,7 +41,7 @@ def place(session: Session, fields: Place, job: Job) -> dict[str, Any]:
     model = session.renderer.model(design_of(session, fields, job))
     rows = []
     contacts = contacts_of(fields.contacts)
-    with telling_which(contacts, model.place):
+    with errors_naming_contact(contacts, model.place):
         for number, contact in enumerate(contacts):
             spot = locate(contact, model.surface)
             rows.append(

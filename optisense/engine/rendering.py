@@ -18,7 +18,7 @@ from optisense.design import LightGroup, SensorDesign
 from optisense.engine.contacts import (
     AnyContact,
     contacts_of,
-    telling_which,
+    errors_naming_contact,
     unseen,
 )
 from optisense.engine.designs import AnyDesign, AnyMesh
@@ -47,21 +47,21 @@ LEVELS = (np.arange(256) / 255.0).astype(np.float32)
 ImageFile = Literal["picture", "pixels", "radiance", "layers", "normals", "points", "mask"]
 
 
-class OfDesign(Fields):
+class DesignFields(Fields):
     """Fields of a request about a design."""
 
     design: AnyDesign
     meshes: dict[str, AnyMesh] = Field(default_factory=dict)
 
 
-class Warm(OfDesign):
+class Warm(DesignFields):
     """Fields of the request "warm"; see docs/engine.md."""
 
     contacts: bool = False
     drafts: bool = False
 
 
-class Simulate(OfDesign, RenderOptions):
+class Simulate(DesignFields, RenderOptions):
     """Fields of the request "simulate"; see docs/engine.md."""
 
     contacts: list[AnyContact] = Field(default_factory=list)
@@ -92,7 +92,7 @@ class Report(Fields):
     file: str
 
 
-class Ledger(OfDesign, LedgerOptions):
+class Ledger(DesignFields, LedgerOptions):
     """Fields of the request "ledger"; see docs/engine.md."""
 
     at: list[tuple[float, float] | tuple[float, float, float]] = Field(
@@ -100,14 +100,14 @@ class Ledger(OfDesign, LedgerOptions):
     )
 
 
-class ChiefRayGrid(OfDesign):
+class ChiefRayGrid(DesignFields):
     """Fields of the request "chief_rays"; see docs/engine.md."""
 
     contacts: list[AnyContact] = Field(default_factory=list)
     resolution: tuple[int, int] = (16, 12)
 
 
-def design_of(session: Session, fields: OfDesign, job: Job) -> SensorDesign:
+def design_of(session: Session, fields: DesignFields, job: Job) -> SensorDesign:
     """Return the design of a request."""
     job.design = session.designs.read(fields.design, fields.meshes)
     return job.design
@@ -144,11 +144,11 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     if fields.draft:
         size = fields.resolution or _draft_size(design)
     else:
-        session.designs.must_be_sound(design)
+        session.designs.require_valid(design)
         job.progress(0.0, "building the sensor")
     renderer = session.renderer
     model = renderer.draft_model(design) if fields.draft else renderer.model(design)
-    with telling_which(contacts, model.place):
+    with errors_naming_contact(contacts, model.place):
         image = model.render(
             contacts,
             resolution=size,
@@ -241,7 +241,7 @@ def ledger(session: Session, fields: Ledger, job: Job) -> dict[str, Any]:
     from optisense.optics.ledger import cells_in_view
 
     design = design_of(session, fields, job)
-    session.designs.must_be_sound(design)
+    session.designs.require_valid(design)
     job.progress(0.0, "building the sensor")
     model = session.renderer.model(design)
     job.progress(0.2, "following light")
@@ -266,7 +266,7 @@ def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, An
     _checked_size(fields.resolution, design)
     model = session.renderer.model(design)
     contacts = contacts_of(fields.contacts)
-    with telling_which(contacts, model.place):
+    with errors_naming_contact(contacts, model.place):
         paths = trace_paths(model, fields.resolution, contacts)
     return {
         "files": {

@@ -14,7 +14,7 @@ from pydantic import Field
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
-from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _registering = threading.Lock()
 
 
-class Evaluate(OfDesign):
+class Evaluate(DesignFields):
     """Fields of the request "evaluate"; see docs/engine.md."""
 
     objectives: list[str] = Field(
@@ -78,7 +78,7 @@ def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     shared, own = split_settings(fields.settings, wanted)
     settings = Settings(**shared)
     design = design_of(session, fields, job)
-    session.designs.must_be_sound(design)
+    session.designs.require_valid(design)
     job.progress(0.0, "building the sensor")
     model = session.renderer.model(design)
     done = 0

@@ -15,7 +15,7 @@ from optisense.engine.failures import ProtocolError
 from optisense.engine.following import Following
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
-from optisense.engine.rendering import OfDesign, design_of
+from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.scoring import own_objectives
 from optisense.engine.search_process import SearchProcess, is_running, stop_other
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from optisense.search.space.search_space import BoundSpace
 
 
-class Space(OfDesign):
+class Space(DesignFields):
     """Fields of the request "space"; see docs/engine.md."""
 
     vary: list[str] = Field(min_length=1)
@@ -51,13 +51,13 @@ class Advise(Space):
     budget: int | None = Field(default=None, ge=1)
 
 
-class OfStudy(Fields):
+class StudyFields(Fields):
     """Fields of a request about a study."""
 
     study: str
 
 
-class Resume(OfStudy):
+class Resume(StudyFields):
     """Fields of the request "resume"; see docs/engine.md."""
 
     workers: int = Field(default=1, ge=1)
@@ -65,13 +65,13 @@ class Resume(OfStudy):
     go_on: bool = False
 
 
-class OneTrial(OfStudy):
+class TrialFields(StudyFields):
     """Fields of the request "trial"; see docs/engine.md."""
 
     trial: int | str = "best"
 
 
-class Apply(OneTrial):
+class Apply(TrialFields):
     """Fields of the request "apply"; see docs/engine.md."""
 
     to: str
@@ -136,7 +136,7 @@ def _begun(session: Session, fields: Search, job: Job) -> SearchProcess:
 
     folder = _absolute(fields.study)
     design = design_of(session, fields, job)
-    session.designs.must_be_sound(design)
+    session.designs.require_valid(design)
     job.check()
     with own_objectives():
         Study.create(folder, design, fields.plan()).close()
@@ -154,21 +154,21 @@ def resume(session: Session, fields: Resume, job: Job) -> dict[str, Any]:
     return Following(folder, job, files, child, fields.budget).result()
 
 
-@handles("watch", OfStudy, Lane.OWN)
-def watch(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
+@handles("watch", StudyFields, Lane.OWN)
+def watch(session: Session, fields: StudyFields, job: Job) -> dict[str, Any]:
     """Follow a study that another process runs."""
     files = session.files(fields, job.id)
     return Following(_absolute(fields.study), job, files, None).result()
 
 
-@handles("stop", OfStudy, Lane.QUICK)
-def stop(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
+@handles("stop", StudyFields, Lane.QUICK)
+def stop(session: Session, fields: StudyFields, job: Job) -> dict[str, Any]:
     """Stop a search of any engine on this machine."""
     return {"stopped": stop_other(_absolute(fields.study))}
 
 
-@handles("study", OfStudy, Lane.QUICK)
-def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
+@handles("study", StudyFields, Lane.QUICK)
+def about_study(session: Session, fields: StudyFields, job: Job) -> dict[str, Any]:
     """Return all data of a study except its designs."""
     folder = _absolute(fields.study)
     with _opened(folder) as study:
@@ -190,8 +190,8 @@ def about_study(session: Session, fields: OfStudy, job: Job) -> dict[str, Any]:
         }
 
 
-@handles("trial", OneTrial, Lane.QUICK)
-def trial(session: Session, fields: OneTrial, job: Job) -> dict[str, Any]:
+@handles("trial", TrialFields, Lane.QUICK)
+def trial(session: Session, fields: TrialFields, job: Job) -> dict[str, Any]:
     """Return one trial as a design."""
     from optisense.search.study.applied import design_of as design_of_trial
 

@@ -134,7 +134,9 @@ class Engine:
             request.id,
             self._channel.send,
             draft=bool(getattr(fields, "draft", False)),
-            give_way=self.session.priority_gate.give_way if kind.lane is Lane.RENDER else None,
+            wait_for_short_jobs=self.session.priority_gate.wait_for_short_jobs
+            if kind.lane is Lane.RENDER
+            else None,
         )
         with self._changed:
             self._open[request.id] = job

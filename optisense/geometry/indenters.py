@@ -73,7 +73,7 @@ class Sphere(IndenterKind):
             ]
         )
         vertices = self.radius * (normals + [0.0, 0.0, 1.0])
-        return TriangleMesh(vertices, faces, normals).wound_like_normals()
+        return TriangleMesh(vertices, faces, normals).with_winding_from_normals()
 
     def _side(self, facet_error: float) -> float:
         """Return the side (mm) of square cells whose two triangles are within the error.
@@ -117,7 +117,7 @@ class Cylinder(IndenterKind):
             np.concatenate([rim - half, rim + half]),
             grid_faces(2, count + 1),
             np.concatenate([profile, profile]),
-        ).wound_like_normals()
+        ).with_winding_from_normals()
         ends = []
         for sign in (-1.0, 1.0):
             middle = np.array([0.0, 0.0, rim[[0, -1], 2].mean()])
@@ -126,7 +126,7 @@ class Cylinder(IndenterKind):
                 [np.arange(count), np.arange(1, count + 1), np.full(count, count + 1)]
             )
             normals = np.tile([sign, 0.0, 0.0], (len(vertices), 1))
-            ends.append(TriangleMesh(vertices, fan, normals).wound_like_normals())
+            ends.append(TriangleMesh(vertices, fan, normals).with_winding_from_normals())
         return TriangleMesh.joined([side, *ends]).transformed(_turn_z(self.angle))
 
 

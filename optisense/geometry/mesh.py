@@ -221,7 +221,7 @@ class TriangleMesh:
         """
         return TriangleMesh(*welded(self.vertices, self.faces, distance))
 
-    def wound_like_normals(self) -> TriangleMesh:
+    def with_winding_from_normals(self) -> TriangleMesh:
         """Reverse the faces whose normals are opposite to their shading normals."""
         if self.normals is None:
             return self

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from optisense.design.camera import ImagingModel, Pixels
 from optisense.design.emitters import LightModel
-from optisense.design.fields import Colour, MisfitError, Model, Name, Number, Positive
+from optisense.design.fields import Colour, InconsistentValueError, Model, Name, Number, Positive
 from optisense.design.materials import CoatingModel, Material
 from optisense.design.sensor_design import Status
 from optisense.library.lens import lens_misfit
@@ -65,11 +65,11 @@ class Entry(Model, Generic[Value]):
         return [field for field in self.numbers() if self.source(field) is None]
 
     @model_validator(mode="after")
-    def _sources_speak_of_fields(self) -> Entry[Value]:
+    def _check_source_names(self) -> Entry[Value]:
         known = self.source_names()
         for name in self.sources:
             if name not in known:
-                raise MisfitError(
+                raise InconsistentValueError(
                     f"there is a source for '{name}', which this entry does not have",
                     ("sources", name),
                     suggestion(name, known),
@@ -166,13 +166,13 @@ class CameraModel(ImagingModel, LensFacts):
         return {name: value for name, value in values.items() if value is not None}
 
     @model_validator(mode="after")
-    def _makes_sense(self) -> CameraModel:
+    def _check_consistent(self) -> CameraModel:
         if self.projection == "perspective" and self.fov >= 180.0:
-            raise MisfitError(
+            raise InconsistentValueError(
                 "a perspective camera sees less than 180 degrees", ("fov",), "Use equidistant"
             )
         if self.distortion is not None and self.distortion.projection != self.projection:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"a lens distortion of kind '{self.distortion.kind}' is one of "
                 f"{self.distortion.projection} lenses",
                 ("distortion", "kind"),
@@ -182,7 +182,7 @@ class CameraModel(ImagingModel, LensFacts):
             self.projection, self.fov, self.resolution, self.pixel_size, self.focal_length
         )
         if misfit is not None:
-            raise MisfitError(misfit[0], ("fov",), misfit[1])
+            raise InconsistentValueError(misfit[0], ("fov",), misfit[1])
         return self
 
     def angles(self) -> tuple[float, float, float]:

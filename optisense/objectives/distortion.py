@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import figures
-from optisense.objectives.projection_warping import JUMP, leaping_edges
+from optisense.objectives.projection_warping import JUMP, discontinuous_edges
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -111,8 +111,8 @@ def footprints(
     x, y, z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
     right = [c[:, 1:] - c[:, :-1] for c in (x, y, z)]
     down = [c[1:] - c[:-1] for c in (x, y, z)]
-    leap_right = leaping_edges(right, hit[:, 1:] & hit[:, :-1], 1, JUMP)
-    leap_down = leaping_edges(down, hit[1:] & hit[:-1], 0, JUMP)
+    leap_right = discontinuous_edges(right, hit[:, 1:] & hit[:, :-1], 1, JUMP)
+    leap_down = discontinuous_edges(down, hit[1:] & hit[:-1], 0, JUMP)
     whole = hit[:-1, :-1] & hit[:-1, 1:] & hit[1:, :-1] & hit[1:, 1:]
     whole &= ~(leap_right[:-1] | leap_right[1:] | leap_down[:, :-1] | leap_down[:, 1:])
 

@@ -17,9 +17,9 @@ from optisense.design.material_checks import index_problems
 from optisense.design.problems import Diagnostic
 from optisense.errors import ObjectiveError
 from optisense.geometry import Contact, Sphere
+from optisense.objectives.cached_values import CachedValues
 from optisense.objectives.exposure import exposure_for
 from optisense.objectives.frames import frame_of, nearest_press
-from optisense.objectives.made_once import MadeOnce
 from optisense.objectives.press import Press
 from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
 from optisense.objectives.unexposed import (
@@ -44,7 +44,7 @@ Reads = Callable[[Press], NDArray[np.float64]]
 others."""
 
 
-class Evaluation(MadeOnce):
+class Evaluation(CachedValues):
     """One sensor, prepared for scoring by several objectives.
 
     Attributes:

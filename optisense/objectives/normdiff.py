@@ -59,7 +59,7 @@ MOST_LEAST_PIXELS = 1_000_000
 """Largest number of pixels that a press may be asked to have; no press has as many."""
 
 
-CROWD = 0.75
+SAMPLE_SHARE = 0.75
 """Share of the camera samples of a pixel that is read together with many others. With all samples,
 confusion is lower by less than a per cent, and the work is 1.5 times as much."""
 
@@ -82,13 +82,13 @@ class Confusion(NamedTuple):
     cells: NDArray[np.int64]
 
 
-def in_crowd(press: Press, *, least_pixels: int, **settings: Any) -> FloatArray:
+def sample_shares(press: Press, *, least_pixels: int, **settings: Any) -> FloatArray:
     """Return the share (h, w) of camera samples that the pixels of a press need; see `normdiff`.
 
     Raises:
         ObjectiveError: there are too few indented pixels, as in `indented_pixels`.
     """
-    return np.where(indented_pixels(press, least_pixels), CROWD, 0.0)
+    return np.where(indented_pixels(press, least_pixels), SAMPLE_SHARE, 0.0)
 
 
 def bounds(*, theta_weight: float, phi_weight: float, **others: object) -> tuple[float, float]:
@@ -106,7 +106,7 @@ designs in docs/experiments.md."""
     title="NormDiff",
     draw=figures.draw_normdiff,
     beside=("theta_range", "phi_range"),
-    reads=in_crowd,
+    reads=sample_shares,
     range=bounds,
     needs=f"each press seen, with {LEAST_PIXELS} indented pixels",
     usual=USUAL,

@@ -44,12 +44,12 @@ class TriangleAreas(NamedTuple):
     Attributes:
         areas: (h-1, w-1, 2) areas (mm²), NaN for triangles that are left out.
         missed: number of triangles left out because a corner does not see the surface.
-        leaping: number of triangles left out because an edge crosses a fold or a gap.
+        discontinuous: number of triangles left out because an edge crosses a fold or a gap.
     """
 
     areas: NDArray[np.float32]
     missed: int
-    leaping: int
+    discontinuous: int
 
 
 USUAL = (1.2, 60.0)
@@ -96,7 +96,7 @@ def projection_warping(
         "standard_deviation": deviation,
         "triangles": len(areas),
         "triangles_that_miss_the_surface": found.missed,
-        "triangles_that_leap": found.leaping,
+        "triangles_that_leap": found.discontinuous,
         "pixels_that_see_the_surface": float(rays.hit.mean()),
     }
     return mean / max(deviation, MOST_EVEN * mean), parts, {"areas": found.areas}
@@ -123,8 +123,8 @@ def triangle_areas(
     whole = np.stack(
         [corner[0] & corner[1] & corner[2], corner[1] & corner[2] & corner[3]], axis=-1
     )
-    leap_right = leaping_edges(right, hit[:, 1:] & hit[:, :-1], 1, jump)
-    leap_down = leaping_edges(down, hit[1:] & hit[:-1], 0, jump)
+    leap_right = discontinuous_edges(right, hit[:, 1:] & hit[:, :-1], 1, jump)
+    leap_down = discontinuous_edges(down, hit[1:] & hit[:-1], 0, jump)
     leaps = whole & np.stack(
         [leap_right[:-1] | leap_down[:, :-1], leap_right[1:] | leap_down[:, 1:]], axis=-1
     )
@@ -148,7 +148,7 @@ def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> N
     return half
 
 
-def leaping_edges(
+def discontinuous_edges(
     edges: list[NDArray[np.float32]], there: NDArray[np.bool_], axis: int, jump: float
 ) -> NDArray[np.bool_]:
     """Return a mask (h, w) of the edges that are much longer than both their neighbours along an

@@ -74,10 +74,10 @@ class DraftCacheStore(CacheStore):
         same_view = seen is before.seen or np.array_equal(seen, before.seen)
         if off == 0.0 and same_view and lit.table.groups == before._lit.table.groups:
             self._cells, self._kernels = before._cells, before._kernels
-        if before.aims_at(lit):
+        if before.has_guide_for(lit):
             self._guide, self._learned_on = before._guide, before._learned_on
 
-    def aims_at(self, lit: LitScene) -> bool:
+    def has_guide_for(self, lit: LitScene) -> bool:
         """Return whether the store has an emission guide for the lights of this sensor."""
         known = self._guide is not None and lit.table.count == self._lit.table.count
         return known and _apart(lit.opaque, self._learned_on) < GUIDE_TOLERANCE
@@ -177,7 +177,7 @@ class DraftModel(OpticalModel):
 
     def _new_store(self) -> DraftCacheStore:
         lit, before = LitScene.of(self.scenes), self._before
-        if before is not None and before.aims_at(lit):
+        if before is not None and before.has_guide_for(lit):
             return DraftCacheStore(lit, before.seen, before)
         rays = self.chief_rays(VIEW_RESOLUTION)
         return DraftCacheStore(lit, rays.points[rays.hit], before)

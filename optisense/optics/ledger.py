@@ -210,7 +210,10 @@ def light_ledger(
                 face = (_face_owner(piece), words)
                 faces[face] = faces.get(face, 0.0) + power
         exits += sorted(
-            (LedgerExit(name, *face, *found) for face, found in _told(faces, emitted[name])),
+            (
+                LedgerExit(name, *face, *found)
+                for face, found in _lines_with_noise(faces, emitted[name])
+            ),
             key=lambda each: -each.power,
         )
     return LightLedger(emitted, entries, photons, exits)
@@ -219,11 +222,11 @@ def light_ledger(
 def _entries(
     group: str, lines: dict[tuple[str, LightEnd], NDArray[np.float64]], emitted: float
 ) -> Iterator[LedgerEntry]:
-    for (where, kind), found in _told(lines, emitted):
+    for (where, kind), found in _lines_with_noise(lines, emitted):
         yield LedgerEntry(group, where, kind, *found)
 
 
-def _told(
+def _lines_with_noise(
     lines: dict[Line, NDArray[np.float64]], emitted: float
 ) -> Iterator[tuple[Line, tuple[float, float, float]]]:
     """Yield the power (mW), share and noise of lines that are not empty, computed from their

@@ -14,7 +14,7 @@ from optisense.design import SensorDesign
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.mechanics import ELASTIC, SKINS, PressedSkin
-from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import bound_memory
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
@@ -111,7 +111,7 @@ class OpticalModel(RayModel):
         """The emission guide, learned from a pilot pass on first use."""
         return self._store.guide
 
-    @lets_ctrl_c_through
+    @reraise_interrupts
     def render(
         self,
         contacts: Sequence[Contact] = (),

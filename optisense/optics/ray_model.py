@@ -10,7 +10,7 @@ from optisense.design.responses import PictureChain
 from optisense.design.sensor_design import refuse_no_design
 from optisense.geometry import Contact, Indenter, SensingSurface, TriangleMesh
 from optisense.mechanics import ELASTIC, PressedSkin
-from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.assembly import assemble
 from optisense.optics.scene.contact_scenes import ContactScenes
@@ -153,7 +153,7 @@ class RayModel:
         """
         return self._view.surface
 
-    @lets_ctrl_c_through
+    @reraise_interrupts
     def chief_rays(
         self,
         resolution: tuple[int, int] | None = None,

@@ -54,7 +54,7 @@ class RayFigures:
 
 
 @dataclass(frozen=True)
-class Look:
+class DesignView:
     """View of a design from its camera. Fields are None if they could not be computed or were not
     requested.
 
@@ -75,14 +75,14 @@ class Look:
     failure: str | None = None
 
 
-def look(
+def design_view(
     design: SensorDesign,
     settings: Mapping[str, Any] | None = None,
     *,
     pictures: bool = True,
     photons: int = PICTURE_PHOTONS,
     seed: int = 0,
-) -> Look:
+) -> DesignView:
     """Trace a design's chief rays, and render it with the balls that its objectives press into it.
 
     Args:
@@ -112,8 +112,8 @@ def look(
     except SetupError:
         raise
     except OptiSenseError as error:
-        return Look(**found, failure=str(error))
-    return Look(**found)
+        return DesignView(**found, failure=str(error))
+    return DesignView(**found)
 
 
 def ray_figures(evaluation: Evaluation) -> RayFigures:

@@ -19,7 +19,7 @@ from optisense.errors import OptiSenseError
 from optisense.report import study_figures
 from optisense.report import study_tables as tables
 from optisense.report.balls import count_in_words, marks_svg
-from optisense.report.before_after import Look
+from optisense.report.before_after import DesignView
 from optisense.report.cage_changes import CageChange, cage_changes, cage_figure
 from optisense.report.drawing import figure_uri
 from optisense.report.files import as_json, page, script
@@ -28,7 +28,7 @@ from optisense.report.tolerance import shown_size
 from optisense.report.trial_marks import Marks, TrialFigure, page_data, selectable
 from optisense.search.methods import find
 from optisense.search.study.best import best_of, nearest
-from optisense.search.study.conditions import condition_note, lost_note
+from optisense.search.study.conditions import condition_note, worsened_note
 from optisense.search.study.study import Study, front_among
 from optisense.search.study.trial import Trial
 from optisense.writing import write_text
@@ -48,7 +48,7 @@ FEW_CHANGES = 8
 def write_study_report(
     path: str | Path,
     study: Study,
-    looks: Mapping[str, Look] | None = None,
+    looks: Mapping[str, DesignView] | None = None,
     *,
     pictures: Mapping[int, NDArray[np.uint8]] | None = None,
     named: str | None = None,
@@ -74,7 +74,7 @@ def write_study_report(
 
 def render_study(
     study: Study,
-    looks: Mapping[str, Look] | None = None,
+    looks: Mapping[str, DesignView] | None = None,
     *,
     pictures: Mapping[int, NDArray[np.uint8]] | None = None,
     named: str | None = None,
@@ -111,7 +111,7 @@ def render_study(
     if front:
         figures_of.draw("front", partial(study_figures.front, trials, front, names, best))
     looks = looks or {}
-    figures = [looks.get(label, Look()).figures for label in ("before", "after")]
+    figures = [looks.get(label, DesignView()).figures for label in ("before", "after")]
     after = _design(best)
     cages = [] if after is None else cage_changes(study.space.design, after)
     changes = tables.changes(study, start, best, bool(cages))
@@ -136,11 +136,13 @@ def render_study(
         scores=tables.scores(study, start, best),
         conditions=tables.conditions(study, start, best or nearest(trials)),
         warnings=[
-            note for note in (condition_note(trials), lost_note(best, start)) if note is not None
+            note
+            for note in (condition_note(trials), worsened_note(best, start))
+            if note is not None
         ],
         no_fresh=tables.why_no_fresh(study, trials),
         rays=tables.ray_figures(*figures) if moves_rays(study) else None,
-        worse=tables.got_worse(*figures),
+        worse=tables.worsened_figures(*figures),
         stretching=[
             (label, data_uri(stretching_colours(each.map)))
             for label, each in zip(("before", "after"), figures, strict=True)
@@ -255,7 +257,9 @@ def _front_row(trial: Trial, names: Sequence[str]) -> list[str]:
     return [str(trial.number), *(tables.number(trial.scores[name]) for name in names)]
 
 
-def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[dict[str, Any]]:
+def _sides(
+    study: Study, best: Trial | None, looks: Mapping[str, DesignView]
+) -> list[dict[str, Any]]:
     """Return the views before and after: the picture with its balls, and the section with chief
     rays.
     """
@@ -265,7 +269,7 @@ def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[
         if design is None:
             continue
         is_start = label == "before" or best is None or best.is_start
-        seen = looks.get(label, Look())
+        seen = looks.get(label, DesignView())
         rays = seen.rays.in_section(along_rows(design)) if seen.rays is not None else ()
         found.append(
             {
@@ -279,7 +283,7 @@ def _sides(study: Study, best: Trial | None, looks: Mapping[str, Look]) -> list[
     return found
 
 
-def _picture(seen: Look) -> dict[str, Any]:
+def _picture(seen: DesignView) -> dict[str, Any]:
     """Return the picture, the marks over it, and a sentence about it."""
     if seen.picture is None:
         return {"picture": "", "marks": "", "caption": ""}

@@ -154,7 +154,7 @@ def _figure(side: RayFigures | None, field: str, percent: bool) -> str:
     return f"{100 * value:.1f} %" if percent else f"{value:.4g}"
 
 
-def got_worse(before: RayFigures | None, after: RayFigures | None) -> list[str]:
+def worsened_figures(before: RayFigures | None, after: RayFigures | None) -> list[str]:
     """Return the ray measures in which the second design is worse than the first, each with both
     numbers.
     """

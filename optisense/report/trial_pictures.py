@@ -77,7 +77,7 @@ class TrialPictures:
         return image.picture()
 
 
-def worth_a_picture(study: Study, trials: Sequence[Trial], count: int) -> list[Trial]:
+def select_for_pictures(study: Study, trials: Sequence[Trial], count: int) -> list[Trial]:
     """Return the trials that a reader is most likely to look at: some along the front of several
     objectives, and the best ones by the first.
 

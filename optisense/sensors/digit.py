@@ -26,7 +26,7 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.digit_sources import provenance
-from optisense.sensors.dimensions import Positive, describe_changes, require, tells_of_dimensions
+from optisense.sensors.dimensions import Positive, checks_dimensions, describe_changes, require
 from optisense.sensors.half_round import FloatArray, HalfRound, stacked
 from optisense.sensors.led_flux import balanced_flux
 
@@ -71,7 +71,7 @@ SIDES = {
 """Faces of the acrylic's edge, and the direction in which each points."""
 
 
-@tells_of_dimensions(NAME)
+@checks_dimensions(NAME)
 def digit(
     *,
     gel_width: Positive = 18.4,

@@ -17,13 +17,13 @@ from optisense.errors import DesignError
 Arguments = ParamSpec("Arguments")
 
 Positive = float
-"""Dimension above 0; `tells_of_dimensions` makes builders refuse others."""
+"""Dimension above 0; `checks_dimensions` makes builders refuse others."""
 
 PositiveCount = int
 """Number of objects, 1 or more."""
 
 
-def tells_of_dimensions(
+def checks_dimensions(
     sensor: str,
 ) -> Callable[[Callable[Arguments, SensorDesign]], Callable[Arguments, SensorDesign]]:
     """Return a decorator by which a builder refuses arguments of a wrong type or not above 0, and
@@ -45,7 +45,7 @@ def tells_of_dimensions(
             try:
                 return builder(*args, **kwargs)
             except ValidationError as error:
-                raise _refusal(error, sensor) from None
+                raise _dimension_error(error, sensor) from None
 
         return build
 
@@ -68,7 +68,7 @@ def _check(sensor: str, name: str, value: Any, kind: str) -> None:
                 raise DesignError(f"{name} is {value}", where=sensor, hint=f"Give a {name} above 0")
 
 
-def _refusal(error: ValidationError, sensor: str) -> DesignError:
+def _dimension_error(error: ValidationError, sensor: str) -> DesignError:
     """Return the error for a value that a part of the design refuses; it names the field, which
     usually is the argument.
     """

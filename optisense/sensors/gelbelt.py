@@ -40,8 +40,8 @@ from optisense.sensors.belt_path import (
 from optisense.sensors.dimensions import (
     Positive,
     PositiveCount,
+    checks_dimensions,
     describe_changes,
-    tells_of_dimensions,
 )
 from optisense.sensors.gelbelt_checks import (
     LED_LENGTH,
@@ -52,7 +52,7 @@ from optisense.sensors.gelbelt_checks import (
     check_numbers,
     check_wheels,
 )
-from optisense.sensors.gelbelt_sources import LeftOut, gelbelt_sources
+from optisense.sensors.gelbelt_sources import OmittedReturn, gelbelt_sources
 from optisense.sensors.led_flux import nominal_flux
 from optisense.sensors.shapes import ribbon, rod, row_of_lights, strip
 
@@ -87,7 +87,7 @@ WRAP = 90.0
 """Angle by which the belt is turned at the end of the modelled part, degrees."""
 
 
-@tells_of_dimensions(SENSOR)
+@checks_dimensions(SENSOR)
 def gelbelt(
     *,
     light_design: int = 3,
@@ -271,13 +271,13 @@ def gelbelt(
 
 def _left_out(
     left: BeltHalf, right: BeltHalf, radius: float, layers: tuple[float, float], half_width: float
-) -> LeftOut:
+) -> OmittedReturn:
     """Return the return path of the belt, which no light reaches and which is not modelled."""
     tape, gel = layers
     drawn, run = way_back(left, right)
     inner, outer = radius + tape, radius + tape + gel
     half_turn = 0.5 * math.pi * (outer**2 - inner**2)
-    return LeftOut(
+    return OmittedReturn(
         length=math.pi * radius + run,
         whole=drawn + math.pi * radius + run,
         gel=2.0 * half_width * (half_turn + gel * run),

@@ -8,7 +8,7 @@ from optisense.design import Provenance, Status
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class OmittedReturn:
     """Part of a belt that is not modelled: its return behind the wheels.
 
     Attributes:
@@ -24,7 +24,7 @@ class LeftOut:
     coat: float
 
 
-def gelbelt_sources(light_design: int, left_out: LeftOut) -> dict[str, Provenance]:
+def gelbelt_sources(light_design: int, left_out: OmittedReturn) -> dict[str, Provenance]:
     """Return the provenance of a GelBelt with one of its light designs."""
     way_back = f"{left_out.length:.0f} of {left_out.whole:.0f} mm along the inner face"
     assumed, sourced, derived = Status.ASSUMED, Status.SOURCED, Status.DERIVED

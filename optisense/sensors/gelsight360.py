@@ -27,9 +27,9 @@ from optisense.geometry import TriangleMesh
 from optisense.sensors.dimensions import (
     Positive,
     PositiveCount,
+    checks_dimensions,
     describe_changes,
     require,
-    tells_of_dimensions,
 )
 from optisense.sensors.led_boards import (
     BOARDS,
@@ -54,7 +54,7 @@ BOARD_CLEARANCE = 0.05
 """Distance between boards and the gel, and between the ring's LEDs and the boards, mm."""
 
 
-@tells_of_dimensions(SENSOR)
+@checks_dimensions(SENSOR)
 def gelsight360(
     *,
     light_colours: str = "GRRGGRRG",

@@ -31,9 +31,9 @@ from optisense.geometry import TriangleMesh
 from optisense.sensors.dimensions import (
     Positive,
     PositiveCount,
+    checks_dimensions,
     describe_changes,
     require,
-    tells_of_dimensions,
 )
 from optisense.sensors.led_flux import BALANCED, balanced_flux
 
@@ -50,7 +50,7 @@ error.
 """
 
 
-@tells_of_dimensions("gelsight-mini")
+@checks_dimensions("gelsight-mini")
 def gelsight_mini(
     *,
     gel_size: tuple[Positive, Positive] = (25.25, 20.75),
@@ -151,7 +151,7 @@ def gelsight_mini(
     return design
 
 
-@tells_of_dimensions("gelsight-mini")
+@checks_dimensions("gelsight-mini")
 def gelsight_mini_cylindrical(rise: float = 6.0, **dimensions: Any) -> SensorDesign:
     """Build a GelSight Mini whose gel is bent to a cylinder along the short side (y).
 
@@ -166,7 +166,7 @@ def gelsight_mini_cylindrical(rise: float = 6.0, **dimensions: Any) -> SensorDes
     return _bent("cylindrical", "cylinder", [(1, j, 2) for j in range(3)], (rise, 0.5), dimensions)
 
 
-@tells_of_dimensions("gelsight-mini")
+@checks_dimensions("gelsight-mini")
 def gelsight_mini_spherical(rise: float = 9.0, **dimensions: Any) -> SensorDesign:
     """Build a GelSight Mini whose gel is bent to a dome.
 

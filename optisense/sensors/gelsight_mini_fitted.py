@@ -27,7 +27,7 @@ green border that no real unit shows.
 """
 
 
-def before_the_fit() -> SensorDesign:
+def unfitted_design() -> SensorDesign:
     """Return the design that the fit starts from: a flat GelSight Mini with a wide view and
     guide.
     """
@@ -51,7 +51,7 @@ def gelsight_mini_fitted() -> SensorDesign:
     resemble those of the unit, and scores of pictures differ from those of `gelsight_mini`, whose
     camera is ideal.
     """
-    design = before_the_fit()
+    design = unfitted_design()
     with as_file(files("optisense.sensors") / FITTED_NUMBERS) as path:
         fitted, _ = read_yaml(path)
     for place, entry in fitted.items():

@@ -31,9 +31,9 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points
 from optisense.sensors.dimensions import (
     Positive,
+    checks_dimensions,
     describe_changes,
     require,
-    tells_of_dimensions,
 )
 from optisense.sensors.led_flux import balanced_flux
 from optisense.sensors.shapes import ribbon, row_of_lights, strip
@@ -66,7 +66,7 @@ BACK_OUTLINE = (
 """Outline of the back as (x, z) in mm, from the bottom of the base to the tip."""
 
 
-@tells_of_dimensions("gelsight-svelte")
+@checks_dimensions("gelsight-svelte")
 def gelsight_svelte(
     *,
     palm_outline: Points = PALM_OUTLINE,

@@ -96,7 +96,7 @@ def generate(
         raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")
     chosen = settings or DatasetSettings()
     with held(folder) as lock, closing(_Maker(model, Path(folder), chosen, lock)) as maker:
-        whole = maker.mended() if mend else maker.done()
+        whole = maker.undamaged() if mend else maker.done()
         missing = [index for index in range(count) if index not in whole]
         for number, index in enumerate(missing):
             if progress is not None:
@@ -148,7 +148,7 @@ class _Maker:
         """Return the indices of finished and of failed samples."""
         return self._labelled | self._failed
 
-    def mended(self) -> set[int]:
+    def undamaged(self) -> set[int]:
         """Return the indices of `done` except samples with damaged files; restore a damaged
         background.
         """

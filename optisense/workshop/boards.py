@@ -33,7 +33,7 @@ LEDs of the library (1.9 mm) and a board of 1.6 mm are 5.4.
 
 
 @dataclass(frozen=True)
-class OnBoard:
+class BoardPosition:
     """Position of an LED.
 
     Attributes:
@@ -58,11 +58,11 @@ class _Side:
     box: FloatArray
 
 
-def boards_of(lights: Sequence[Light]) -> list[OnBoard]:
+def boards_of(lights: Sequence[Light]) -> list[BoardPosition]:
     """Return the board of each LED."""
     sides = [side for plane in _planes(lights) for side in _split(lights, plane)]
     sides.sort(key=lambda side: side.members[0])
-    found: dict[int, OnBoard] = {}
+    found: dict[int, BoardPosition] = {}
     number = 0
     taken: set[int] = set()
     for index, side in enumerate(sides):
@@ -73,11 +73,11 @@ def boards_of(lights: Sequence[Light]) -> list[OnBoard]:
         back = next((k for k in range(index + 1, len(sides))
                      if k not in taken and _back_to_back(side, sides[k])), None)  # fmt: skip
         for member in side.members:
-            found[member] = OnBoard(number, False, right, up)
+            found[member] = BoardPosition(number, False, right, up)
         if back is not None:
             taken.add(back)
             for member in sides[back].members:
-                found[member] = OnBoard(number, True, right, up)
+                found[member] = BoardPosition(number, True, right, up)
     return [found[index] for index in range(len(lights))]
 
 

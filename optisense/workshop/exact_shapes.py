@@ -22,11 +22,11 @@ from optisense.workshop.occ import SEWN, array_of, compound, numbers, point, sew
 from optisense.workshop.profiles import SMOOTH
 from optisense.workshop.recognised import (
     SAME,
-    DrawnOut,
-    Turned,
+    Extrusion,
+    Revolution,
     across,
     box_sides,
-    drawn_out,
+    extrusion_of,
     rims,
     smooth_patches,
     turned,
@@ -117,7 +117,7 @@ def _body(shape: Shape) -> Any | None:
     found = turned(shape.mesh)
     if found is not None:
         return _turned_body(found, shape.is_solid)
-    outline = drawn_out(shape.mesh)
+    outline = extrusion_of(shape.mesh)
     if outline is not None:
         return _drawn_body(outline, shape.is_solid)
     if shape.cage is not None and shape.rest is not None:
@@ -182,7 +182,7 @@ def _patched_body(mesh: TriangleMesh, solid: bool) -> Any | None:
     faces = []
     for patch in smooth_patches(mesh, SMOOTH):
         piece = mesh.with_faces(mesh.faces[patch]).compacted()
-        outline = drawn_out(piece)
+        outline = extrusion_of(piece)
         if outline is not None:
             faces.append(_drawn_body(outline, False))
             continue
@@ -220,7 +220,7 @@ def _flat_face(mesh: TriangleMesh) -> Any | None:
     return face.Face()
 
 
-def _turned_body(found: Turned, solid: bool) -> Any:
+def _turned_body(found: Revolution, solid: bool) -> Any:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeRevol
     from OCP.gp import gp_Ax1, gp_Dir
@@ -240,7 +240,7 @@ def _turned_body(found: Turned, solid: bool) -> Any:
     return BRepPrimAPI_MakeRevol(profile, axis).Shape()
 
 
-def _drawn_body(found: DrawnOut, solid: bool) -> Any:
+def _drawn_body(found: Extrusion, solid: bool) -> Any:
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace
     from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
     from OCP.gp import gp_Vec

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from optisense.design import Role
 from optisense.geometry import TriangleMesh
 from optisense.workshop.profiles import OutlinePiece, pieces
-from optisense.workshop.recognised import drawn_along
+from optisense.workshop.recognised import extruded_along
 from optisense.workshop.shapes import Shape
 from optisense.workshop.step_format import bodies
 
@@ -114,7 +114,7 @@ def _plate(shape: Shape, mesh: TriangleMesh) -> Plate | None:
     thickness, size = float(size[2]), size[:2]
     if thickness > THICKEST or thickness > FLAT * float(size.min()):
         return None
-    found = drawn_along(flat, 2)
+    found = extruded_along(flat, 2)
     if found is None:
         return None
     corner = flat.bounds[0][:2]

@@ -30,7 +30,7 @@ largest radius; poles may be moved off the axis.
 
 
 @dataclass(frozen=True)
-class Turned:
+class Revolution:
     """Body of revolution.
 
     Attributes:
@@ -46,7 +46,7 @@ class Turned:
 
 
 @dataclass(frozen=True)
-class DrawnOut:
+class Extrusion:
     """Outline extruded along an axis.
 
     Attributes:
@@ -67,7 +67,7 @@ def across(axis: int) -> tuple[int, int]:
     return (axis + 1) % 3, (axis + 2) % 3
 
 
-def turned(mesh: TriangleMesh) -> Turned | None:
+def turned(mesh: TriangleMesh) -> Revolution | None:
     """Return the profile of a body of revolution about an axis along x, y or z; None if the mesh is
     none.
     """
@@ -78,7 +78,7 @@ def turned(mesh: TriangleMesh) -> Turned | None:
     return None
 
 
-def _turned_about(mesh: TriangleMesh, axis: int) -> Turned | None:
+def _turned_about(mesh: TriangleMesh, axis: int) -> Revolution | None:
     i, j = across(axis)
     centre = np.zeros(3)
     for k in (i, j):  # the middle of a ring is the mean of its corners
@@ -105,7 +105,7 @@ def _turned_about(mesh: TriangleMesh, axis: int) -> Turned | None:
     sides = np.concatenate([where[:, [0, 1]], where[:, [1, 2]], where[:, [2, 0]]])
     sides = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
     order = _walk(sides, len(counts))
-    return None if order is None else Turned(axis, centre, profile[order])
+    return None if order is None else Revolution(axis, centre, profile[order])
 
 
 def _axis_place(vertices: FloatArray, axis: int, k: int) -> float:
@@ -154,20 +154,20 @@ def _walk(sides: NDArray[np.int64], count: int) -> list[int] | None:
     return order if ends else [*order, start]
 
 
-def drawn_out(mesh: TriangleMesh) -> DrawnOut | None:
+def extrusion_of(mesh: TriangleMesh) -> Extrusion | None:
     """Return the outline of a prism, or of an open sheet, extruded along x, y or z; None if the
     mesh is none.
 
     A box is one, too; the axis with the most corners around it is used.
     """
     for axis in (2, 1, 0):
-        found = drawn_along(mesh, axis)
+        found = extruded_along(mesh, axis)
         if found is not None:
             return found
     return None
 
 
-def drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
+def extruded_along(mesh: TriangleMesh, axis: int) -> Extrusion | None:
     """Return the outline extruded along one axis, or None."""
     normals = np.abs(mesh.face_normals[:, axis])
     areas = mesh.face_areas > 0.0
@@ -210,7 +210,7 @@ def drawn_along(mesh: TriangleMesh, axis: int) -> DrawnOut | None:
     if mesh.is_closed != (closed and bool(caps.any())) or (caps.any() and not mesh.is_closed):
         return None
     outlines.sort(key=lambda outline: -float(np.prod(np.ptp(outline, axis=0))))
-    return DrawnOut(axis, low, high, outlines)
+    return Extrusion(axis, low, high, outlines)
 
 
 def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:

@@ -83,7 +83,7 @@ class OPTISENSE_OT_calibrate(polls.Checked, bpy.types.Operator):
 
     checks = (
         *polls.ASKING,
-        polls.needing(lambda c: _values(c).photos, "Choose the folder of the photographs first"),
+        polls.requires(lambda c: _values(c).photos, "Choose the folder of the photographs first"),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -134,7 +134,7 @@ class OPTISENSE_OT_open_calibrated(polls.Checked, bpy.types.Operator):
     bl_idname = "optisense.open_calibrated"
     bl_label = "Open Fitted Design"
 
-    checks = (polls.is_idle, polls.needing(lambda c: _values(c).folder, "Calibrate first"))
+    checks = (polls.is_idle, polls.requires(lambda c: _values(c).folder, "Calibrate first"))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         folder = _values(context).folder

@@ -31,7 +31,7 @@ def told(ledger: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
     return found
 
 
-def told_of_place(place: dict[str, Any]) -> list[str]:
+def place_text(place: dict[str, Any]) -> list[str]:
     """Return for each light group a line with the brightness of a place and the ways its light
     takes.
     """

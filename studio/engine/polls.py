@@ -44,7 +44,7 @@ def in_3d_view(operator: type[bpy.types.Operator], context: bpy.types.Context) -
     return True
 
 
-def needing(is_there: Callable[[bpy.types.Context], object], text: str) -> Check:
+def requires(is_there: Callable[[bpy.types.Context], object], text: str) -> Check:
     """Return a check that something exists; `text` is shown if it does not."""
 
     def check(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
@@ -58,7 +58,7 @@ def needing(is_there: Callable[[bpy.types.Context], object], text: str) -> Check
 
 def selecting(*kinds: str, what: str) -> Check:
     """Return a check that an object of some kinds is selected."""
-    return needing(lambda context: picked(context, *kinds), f"Select {what} first")
+    return requires(lambda context: picked(context, *kinds), f"Select {what} first")
 
 
 def picked(context: bpy.types.Context, *kinds: str) -> list[bpy.types.Object]:

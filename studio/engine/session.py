@@ -241,10 +241,10 @@ def say(error: EngineError) -> None:
     now = state()
     texts = [error.where, f"{error.hint[:1].upper()}{error.hint[1:]}" if error.hint else ""]
     if error.part or error.path or error.contact is not None:
-        from ..scene.offending import offending, select
+        from ..scene.objects_at import objects_at, select
 
         scene = bpy.context.scene
-        found = offending(scene, error.path or "", error.part or "", error.contact)
+        found = objects_at(scene, error.path or "", error.part or "", error.contact)
         chosen = select(found)
         if found:
             names = ", ".join(each.name for each in chosen or found)

@@ -68,7 +68,7 @@ def draw(layout: bpy.types.UILayout) -> None:
             row.label(text=text)
             row.label(text=share)
     for place in json.loads(values.places):
-        for line in core.told_of_place(place):
+        for line in core.place_text(place):
             paragraph(box, line, "PINNED", boxed=True)
 
 

@@ -53,7 +53,7 @@ class OPTISENSE_OT_evaluate(polls.Checked, Starting, bpy.types.Operator):
     bl_idname = "optisense.evaluate"
     bl_label = "Evaluate"
 
-    checks = (*polls.ASKING, polls.needing(lambda c: chosen(c), "Choose an objective first"))
+    checks = (*polls.ASKING, polls.requires(lambda c: chosen(c), "Choose an objective first"))
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         return start_with_design(
@@ -146,7 +146,7 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
     objective: StringProperty(name="Objective", description="Whose figure; empty for the first")
 
     checks = (
-        polls.needing(
+        polls.requires(
             lambda c: any(
                 figures.is_there(each.figure)
                 for each in c.window_manager.optisense_evaluation.scores
@@ -220,7 +220,7 @@ class OPTISENSE_OT_hide_rays(polls.Checked, bpy.types.Operator):
     bl_label = "Hide"
     bl_options = {"REGISTER", "UNDO"}
 
-    checks = (polls.needing(lambda c: rays.drawn(c.scene), "No rays are shown"),)
+    checks = (polls.requires(lambda c: rays.drawn(c.scene), "No rays are shown"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         rays.clear(context.scene)

@@ -27,7 +27,7 @@ class OPTISENSE_OT_report(polls.Checked, ChoosingFile, bpy.types.Operator):
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
     filter_glob: StringProperty(default="*.html", options={"HIDDEN"})
 
-    checks = (polls.is_idle, polls.needing(_can_report, "Simulate a whole picture first"))
+    checks = (polls.is_idle, polls.requires(_can_report, "Simulate a whole picture first"))
 
     def suggested(self, context: bpy.types.Context) -> str:
         return suggested(context.scene, ".html")

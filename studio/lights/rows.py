@@ -74,7 +74,7 @@ class OPTISENSE_OT_arrange_row(polls.Checked, bpy.types.Operator):
     checks = (
         polls.has_design,
         polls.in_object_mode,
-        polls.needing(of_one_group, "Select the lights of one row: click on their group"),
+        polls.requires(of_one_group, "Select the lights of one row: click on their group"),
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -62,7 +62,7 @@ class OPTISENSE_OT_snap_row(polls.Checked, bpy.types.Operator):
     checks = (
         polls.has_design,
         polls.in_object_mode,
-        polls.needing(of_one_group, "Select the lights of one row: click on their group"),
+        polls.requires(of_one_group, "Select the lights of one row: click on their group"),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -59,7 +59,7 @@ def _choice(context: bpy.types.Context) -> OPTISENSE_PG_material_choice:
     return context.window_manager.optisense_material
 
 
-_chosen = polls.needing(lambda c: _choice(c).entry, "The library is not loaded yet")
+_chosen = polls.requires(lambda c: _choice(c).entry, "The library is not loaded yet")
 
 
 def _is_for_a_coating(context: bpy.types.Context) -> bool:
@@ -121,7 +121,7 @@ class OPTISENSE_OT_material_pictures(polls.Checked, bpy.types.Operator):
 
     checks = (
         _chosen,
-        polls.needing(
+        polls.requires(
             lambda c: gallery.missing(_choice(c).kind), "All of them are drawn, or being drawn"
         ),
     )
@@ -142,8 +142,8 @@ class OPTISENSE_OT_apply_material(polls.Checked, bpy.types.Operator):
         polls.has_design,
         _chosen,
         polls.selecting("PART", what="a part"),
-        polls.needing(_is_for_a_coating, "Select the sensing surface: coatings are for it only"),
-        polls.needing(_is_for_a_material, "The sensing surface takes a coating, not a material"),
+        polls.requires(_is_for_a_coating, "Select the sensing surface: coatings are for it only"),
+        polls.requires(_is_for_a_material, "The sensing surface takes a coating, not a material"),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -197,8 +197,8 @@ class OPTISENSE_OT_keep_material(polls.Checked, bpy.types.Operator):
 
     checks = (
         *polls.ASKING,
-        polls.needing(_part, "Select a part first"),
-        polls.needing(_is_made_of_something, "This part has no material"),
+        polls.requires(_part, "Select a part first"),
+        polls.requires(_is_made_of_something, "This part has no material"),
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

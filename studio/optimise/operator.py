@@ -74,7 +74,7 @@ class OPTISENSE_OT_vary_remove(polls.Checked, bpy.types.Operator):
     bl_label = "Remove"
     bl_options = {"REGISTER", "UNDO"}
 
-    checks = (polls.needing(lambda c: c.scene.optisense_search.vary, "Nothing varies yet"),)
+    checks = (polls.requires(lambda c: c.scene.optisense_search.vary, "Nothing varies yet"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         search = context.scene.optisense_search
@@ -111,10 +111,10 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
 
     checks = (
         *polls.ASKING,
-        polls.needing(
+        polls.requires(
             lambda c: vary.texts_of(c.scene.optisense_search.vary), "Choose what may vary first"
         ),
-        polls.needing(
+        polls.requires(
             lambda c: c.scene.optisense_search.study or c.scene.optisense.is_saved,
             "Save the sensor first, or name a folder for the study",
         ),
@@ -165,7 +165,7 @@ class _WithStudy(polls.Checked):
 
     checks = (
         *polls.ASKING,
-        polls.needing(
+        polls.requires(
             lambda c: c.scene.optisense_search.study,
             "There is no study yet: search first, or name its folder",
         ),

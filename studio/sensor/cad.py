@@ -114,7 +114,7 @@ class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
 
     checks = (
         *polls.Replacing.checks,
-        polls.needing(lambda c: c.window_manager.optisense_cad.bodies, "Choose CAD files first"),
+        polls.requires(lambda c: c.window_manager.optisense_cad.bodies, "Choose CAD files first"),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:

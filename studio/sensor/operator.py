@@ -134,7 +134,7 @@ class OPTISENSE_OT_save(polls.Checked, _Saves, bpy.types.Operator):
 
     checks = (
         *polls.ASKING,
-        polls.needing(lambda c: c.scene.optisense.is_saved, "It has no folder yet: use Save As"),
+        polls.requires(lambda c: c.scene.optisense.is_saved, "It has no folder yet: use Save As"),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -188,7 +188,7 @@ class OPTISENSE_OT_start_engine(polls.Checked, bpy.types.Operator):
     bl_idname = "optisense.start_engine"
     bl_label = "Start the Engine"
 
-    checks = (polls.needing(lambda c: session.running() is None, "It runs"),)
+    checks = (polls.requires(lambda c: session.running() is None, "It runs"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.restart()
@@ -201,7 +201,7 @@ class OPTISENSE_OT_cancel(polls.Checked, bpy.types.Operator):
     bl_idname = "optisense.cancel"
     bl_label = "Cancel"
 
-    checks = (polls.needing(lambda c: session.is_busy(), "Nothing is going on"),)
+    checks = (polls.requires(lambda c: session.is_busy(), "Nothing is going on"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.cancel_job()

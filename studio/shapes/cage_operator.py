@@ -41,7 +41,7 @@ def _cage(context: bpy.types.Context) -> bpy.types.Object | None:
     return None
 
 
-_has_cage = polls.needing(_cage, "Select a cage, or a part that is in one")
+_has_cage = polls.requires(_cage, "Select a cage, or a part that is in one")
 
 
 def _has_bounds(context: bpy.types.Context) -> bool:
@@ -89,7 +89,7 @@ class OPTISENSE_OT_new_cage(polls.Checked, bpy.types.Operator):
         polls.has_design,
         polls.in_object_mode,
         polls.selecting("PART", what="the parts to bend"),
-        polls.needing(_are_free, "A selected part is in a cage already"),
+        polls.requires(_are_free, "A selected part is in a cage already"),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -180,7 +180,7 @@ class OPTISENSE_OT_blend(polls.Checked, bpy.types.Operator):
     bl_label = "Blend C_min and C_max"
     bl_options = {"REGISTER", "UNDO"}
 
-    checks = (_has_cage, polls.needing(_has_bounds, "Set C_min and C_max first"))
+    checks = (_has_cage, polls.requires(_has_bounds, "Set C_min and C_max first"))
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         cage = _cage(context)

@@ -107,7 +107,7 @@ class OPTISENSE_OT_set_reference(polls.Checked, ChoosingProperties, bpy.types.Op
     checks = (
         polls.has_design,
         polls.in_object_mode,
-        polls.needing(
+        polls.requires(
             lambda c: _meshes(c), "Select a mesh first that is no part of the sensor yet"
         ),
     )

@@ -71,8 +71,8 @@ class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
 
     checks = (
         polls.has_design,
-        polls.needing(_gel, "Select a gel first: a part with the role Elastomer"),
-        polls.needing(
+        polls.requires(_gel, "Select a gel first: a part with the role Elastomer"),
+        polls.requires(
             lambda c: sensing_surface(c.scene) is None,
             "There is a sensing surface already; remove it from the sensor first",
         ),

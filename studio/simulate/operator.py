@@ -58,7 +58,7 @@ class OPTISENSE_OT_show_picture(polls.Checked, bpy.types.Operator):
     bl_label = "Open in Image Editor"
 
     checks = (
-        polls.needing(lambda c: bpy.data.images.get(picture.IMAGE), "Simulate first"),
+        polls.requires(lambda c: bpy.data.images.get(picture.IMAGE), "Simulate first"),
         editors.can_show,
     )
 
@@ -202,7 +202,7 @@ class OPTISENSE_OT_clear_contacts(polls.Checked, bpy.types.Operator):
     bl_label = "Remove All"
     bl_options = {"REGISTER", "UNDO"}
 
-    checks = (polls.needing(lambda c: objects_of(c.scene, "CONTACT"), "There are no contacts"),)
+    checks = (polls.requires(lambda c: objects_of(c.scene, "CONTACT"), "There are no contacts"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         for each in objects_of(context.scene, "CONTACT"):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..engine import handing, session
 from ..scene.contacts import pressing
-from ..scene.offending import select
+from ..scene.objects_at import select
 from . import picture, relight
 from .exposing import exposure, keep_exposure, resolution, shown_size
 

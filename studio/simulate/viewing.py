@@ -132,7 +132,7 @@ class OPTISENSE_OT_pin_picture(polls.Checked, bpy.types.Operator):
     bl_idname = "optisense.pin_picture"
     bl_label = "Pin"
 
-    checks = (polls.needing(lambda _: _now is not None, "Simulate first"),)
+    checks = (polls.requires(lambda _: _now is not None, "Simulate first"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         global _pinned
@@ -154,7 +154,7 @@ class OPTISENSE_OT_unpin_picture(polls.Checked, bpy.types.Operator):
     bl_idname = "optisense.unpin_picture"
     bl_label = "Unpin"
 
-    checks = (polls.needing(lambda _: _pinned is not None, "No picture is pinned"),)
+    checks = (polls.requires(lambda _: _pinned is not None, "No picture is pinned"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         global _pinned

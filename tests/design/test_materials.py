@@ -115,13 +115,19 @@ def test_a_part_of_a_kind_that_does_not_suit_it_is_refused() -> None:
 
 
 def test_head_on_reflection_is_the_blend_of_both_lobes() -> None:
-    metal = Conductor(**SILVER).reflection().head_on()
-    paint = Diffuse(reflectance=(0.2, 0.4, 0.6)).reflection().head_on()
-    both = Coating(reflectance=(0.2, 0.4, 0.6), specularity=0.25, **SILVER).reflection().head_on()
+    metal = Conductor(**SILVER).reflection().normal_reflectance()
+    paint = Diffuse(reflectance=(0.2, 0.4, 0.6)).reflection().normal_reflectance()
+    both = (
+        Coating(reflectance=(0.2, 0.4, 0.6), specularity=0.25, **SILVER)
+        .reflection()
+        .normal_reflectance()
+    )
     np.testing.assert_allclose(both, 0.75 * paint + 0.25 * metal)
-    assert Absorber().reflection().is_black and not Absorber().reflection().head_on().any()
+    assert (
+        Absorber().reflection().is_black and not Absorber().reflection().normal_reflectance().any()
+    )
     n = 1.5  # Fresnel: the index alone tells what a clear face reflects
-    glass = Reflection(specularity=1.0, eta=(n, n, n)).head_on()
+    glass = Reflection(specularity=1.0, eta=(n, n, n)).normal_reflectance()
     np.testing.assert_allclose(glass, ((n - 1) / (n + 1)) ** 2)
 
 
@@ -146,7 +152,7 @@ def test_each_reading_of_specularity_is_its_formula(scattering: Any) -> None:
         )
         assert SINGLE_BOUNCE < energy(surface) <= 1.0 + QUADRATURE
         metal = fresnel_metal(1.0, SILVER["eta"], SILVER["k"])
-        np.testing.assert_allclose(surface.head_on(), 1.0 - share + share * metal)
+        np.testing.assert_allclose(surface.normal_reflectance(), 1.0 - share + share * metal)
 
 
 SINGLE_BOUNCE = 0.3
@@ -196,7 +202,7 @@ def test_the_usual_reading_is_in_no_file_and_changes_no_design(tmp_path: Path) -
 
 
 def test_an_index_in_a_medium_is_relative_to_it() -> None:
-    seen = Conductor(**SILVER).reflection().seen_in(2.0)
+    seen = Conductor(**SILVER).reflection().in_medium(2.0)
     np.testing.assert_allclose(seen.eta, np.array(SILVER["eta"]) / 2.0)
     assert Dielectric(ior=1.4).medium().ior == 1.4
 

@@ -13,7 +13,7 @@ import pytest
 import optisense as ots
 from optisense.engine import designs as designs_of_requests
 from optisense.engine.designs import DesignReference, Designs
-from optisense.engine.failures import UnsoundDesignError
+from optisense.engine.failures import InvalidDesignError
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 
@@ -71,8 +71,8 @@ def test_an_unsound_design_tells_all_that_is_wrong(folder: Path) -> None:
     designs = Designs()
     board = ots.load("gelsight360").meshes["boards"].vertices[:8].mean(axis=0).tolist()
     values = {"camera.position": board, "lights.lg1.lights[0].position": board}
-    with pytest.raises(UnsoundDesignError) as caught:
-        designs.must_be_sound(designs.read(DesignReference(source="gelsight360", set=values)))
+    with pytest.raises(InvalidDesignError) as caught:
+        designs.require_valid(designs.read(DesignReference(source="gelsight360", set=values)))
     errors = [p.message for p in caught.value.problems if p.severity == "error"]
     assert len(errors) == 3  # the board reaches into the shell, so the camera is in both
     assert sum("the camera is inside" in message for message in errors) == 2

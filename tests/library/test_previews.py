@@ -111,7 +111,7 @@ class TestMaterials:
     def test_the_metal_lobe_points_away_from_the_light(self) -> None:
         angle = np.linspace(-90.0, 90.0, 721)
         diffuse, metal = lobes(
-            library.coating("mirror-like").reflection().seen_in(GEL_INDEX), angle
+            library.coating("mirror-like").reflection().in_medium(GEL_INDEX), angle
         )
         assert diffuse.max() == 0.0
         assert angle[metal[:, 0].argmax()] == pytest.approx(45.0, abs=1.0)

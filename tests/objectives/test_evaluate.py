@@ -19,7 +19,7 @@ from optisense.design.responses import USUAL_RESPONSE
 from optisense.errors import ObjectiveError
 from optisense.objectives import BUILT_IN, Evaluation, Objective, Press, Settings
 from optisense.objectives.exposure import MOST_SATURATED, exposure_for
-from optisense.objectives.normdiff import CROWD, indented_pixels
+from optisense.objectives.normdiff import SAMPLE_SHARE, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
 from optisense.optics.radiance_cache import store
@@ -132,9 +132,9 @@ def test_each_pixel_gets_the_most_that_any_objective_wants(model: OpticalModel) 
     line = np.logical_or.reduce(list(lines_of(press).values()))
     turned = indented_pixels(press)
     assert (part[line] == 1.0).all()
-    assert (part[turned & ~line] == CROWD).all()
+    assert (part[turned & ~line] == SAMPLE_SHARE).all()
     assert (part[~turned & ~line] == 0.0).all()
-    assert 0.5 < CROWD < 1.0 and (turned & ~line).sum() > 10
+    assert 0.5 < SAMPLE_SHARE < 1.0 and (turned & ~line).sum() > 10
 
 
 def test_contacts_that_overlap_are_not_put_in_one_image(model: OpticalModel) -> None:

@@ -169,7 +169,7 @@ def test_triangles_next_to_missed_pixels_are_left_out() -> None:
     # A corner inside the picture belongs to six triangles.
     assert found.missed == 6
     assert np.isnan(found.areas).sum() == 6
-    assert found.leaping == 0
+    assert found.discontinuous == 0
 
 
 def test_triangles_that_leap_over_a_step_are_left_out() -> None:
@@ -181,7 +181,7 @@ def test_triangles_that_leap_over_a_step_are_left_out() -> None:
     assert rays.hit.all()
     found = triangle_areas(rays.points, rays.hit)
     # One column of quads lies across the step.
-    assert found.leaping == 2 * 29
+    assert found.discontinuous == 2 * 29
     areas = found.areas[np.isfinite(found.areas)]
     # Both sides are parallel to the picture: at distances of 10 and 5 each is even.
     assert len(np.unique(areas.round(4))) == 2
@@ -194,7 +194,7 @@ def test_a_surface_seen_edge_on_does_not_leap() -> None:
     across, along = np.meshgrid(x, np.arange(5.0))
     points = np.stack([across, along, np.zeros((5, 12))], axis=-1)
     found = triangle_areas(points.astype(np.float32), np.ones((5, 12), dtype=bool))
-    assert found.leaping == 0
+    assert found.discontinuous == 0
 
 
 def test_a_sensor_that_sees_nothing_has_a_reason() -> None:

@@ -7,7 +7,7 @@ import mitsuba as mi
 import pytest
 
 from optisense import OpticalModel, load
-from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.transport import interact
 
 
@@ -23,7 +23,7 @@ def test_ctrl_c_while_a_loop_is_recorded(step: str, monkeypatch: pytest.MonkeyPa
 
 
 def test_other_errors_in_a_loop_stay_what_they_are() -> None:
-    @lets_ctrl_c_through
+    @reraise_interrupts
     @dr.syntax
     def count() -> mi.UInt32:
         number = mi.UInt32(0)

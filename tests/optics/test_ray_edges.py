@@ -10,7 +10,7 @@ from optisense.optics.backend.variant import use_variant
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
-from optisense.optics.transport.ray_edges import Cause
+from optisense.optics.transport.ray_edges import Discontinuity
 from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 WIDTH, HEIGHT = 96, 72
@@ -64,7 +64,7 @@ def test_the_edges_of_a_blocker_are_found_to_a_fraction_of_a_pixel() -> None:
     of = traced(flat((3.33, 3.33), (0.0, 0.0, 5.0)), BLOCKER)
     edges = of.edges
     assert edges is not None
-    assert set(edges.cause.tolist()) == {Cause.EDGE}
+    assert set(edges.cause.tolist()) == {Discontinuity.EDGE}
     assert set(edges.depth.tolist()) == {0}
     side = np.abs(np.where(edges.along_x, edges.x - WIDTH / 2, edges.y - HEIGHT / 2)) * PIXEL
     assert side == pytest.approx(3.33, abs=2e-3 * PIXEL + 1e-3)
@@ -100,7 +100,7 @@ def test_a_surface_that_cuts_through_another_moves_the_line_where_they_meet() ->
     of = traced(lowered, BLOCKER)
     edges = of.edges
     assert edges is not None
-    assert set(edges.cause.tolist()) == {Cause.CROSSING}
+    assert set(edges.cause.tolist()) == {Discontinuity.CROSSING}
     assert (edges.x - WIDTH / 2) * PIXEL == pytest.approx(1.0 / 0.4, abs=5e-3)
     back = of.pull_back(weight=np.ones_like(of.weight))
     # Lower by 1 mm, the line moves 2.5 mm to the right, and more of the skin is seen.
@@ -130,7 +130,7 @@ def test_the_limit_of_total_reflection_moves_with_a_tilted_interface() -> None:
     of = tilted_by(0.0)
     edges = of.edges
     assert edges is not None
-    assert set(edges.cause.tolist()) == {Cause.TOTAL_REFLECTION}
+    assert set(edges.cause.tolist()) == {Discontinuity.TOTAL_REFLECTION}
     radius = np.hypot(edges.x - WIDTH / 2, edges.y - HEIGHT / 2) * PIXEL
     assert radius == pytest.approx(10.0 * np.tan(np.arcsin(1.0 / eta)), abs=5e-3)
     way = sheet.vertices[:, :1] * [0.0, 0.0, 1.0]

@@ -15,7 +15,7 @@ from optisense.cli import app
 from optisense.design import SensorDesign
 from optisense.report import study_figures
 from optisense.report.balls import Ball
-from optisense.report.before_after import Look, RayFigures
+from optisense.report.before_after import DesignView, RayFigures
 from optisense.report.cage_changes import cage_changes
 from optisense.report.study import render_study, write_study_report
 from optisense.search import Around, CagePoints, SearchResult, Study, search
@@ -51,8 +51,8 @@ def page(result: SearchResult) -> str:
     ball = Ball(1, 20, (np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 2.0]]),))
     figures = RayFigures(0.5, 0.25, 0.75, 0.5, 4.0, 1.1, 1.5, np.full((3, 4), 1.2))
     looks = {
-        "before": Look(picture, (ball, Ball(2, 3)), (1.5, 0.3), figures),
-        "after": Look(figures=replace(figures, evenness=1.0), failure=EVIL),
+        "before": DesignView(picture, (ball, Ball(2, 3)), (1.5, 0.3), figures),
+        "after": DesignView(figures=replace(figures, evenness=1.0), failure=EVIL),
     }
     return render_study(result.study, looks)
 
@@ -101,7 +101,7 @@ def test_what_got_worse_is_told_where_rays_may_move(page: str) -> None:
     figures = RayFigures(0.5, 0.25, 0.75, 0.5, 4.0, 1.1, 1.5, np.full((3, 4), 1.2))
     after = replace(figures, aoap=0.6, evenness=1.0)
     text = render_study(
-        found.study, {"before": Look(figures=figures), "after": Look(figures=after)}
+        found.study, {"before": DesignView(figures=figures), "after": DesignView(figures=after)}
     )
     assert "Worse than before: 2to3PW (4 before, 1 after)." in text
     assert text.count('alt="stretching ') == 2

@@ -13,7 +13,7 @@ import pytest
 from optisense import sensors
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.robust import RobustEvaluator
-from optisense.search.space.buildable import PartsRest
+from optisense.search.space.buildable import PartsInContact
 from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.space.search_space import SearchSpace
 
@@ -90,7 +90,7 @@ def test_parts_that_are_moved_together_keep_their_contact() -> None:
     belt = sensors.load("gelbelt")
     paths = [f"parts.{part}.shift.x" for part in ("window", "film")]
     space = SearchSpace(dict.fromkeys(paths, (-20.0, 20.0))).bind(belt, tried=False)
-    rest = PartsRest(belt, {"window", "film"})
+    rest = PartsInContact(belt, {"window", "film"})
     assert rest(space.apply(np.array([3.0, 3.0]))) is None
     assert "'window'" in str(rest(space.apply(np.array([3.0, 0.0]))))
 

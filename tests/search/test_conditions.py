@@ -21,7 +21,7 @@ from optisense.search.evaluation.requirements import Requirement, requirements_o
 from optisense.search.methods.base import values_to_maximise
 from optisense.search.methods.dominance import dominates, ranks
 from optisense.search.study.best import best_of, nearest
-from optisense.search.study.conditions import condition_note, kept, lost_note
+from optisense.search.study.conditions import condition_note, kept, worsened_note
 from optisense.search.study.progress import SearchProgress
 from optisense.search.study.settings import LATER, StudySettings
 from optisense.search.study.trial import Trial
@@ -295,7 +295,7 @@ def test_a_score_won_by_seeing_less_is_told(mini: SensorDesign) -> None:
     result = search(mini, FOV, "aoap", method="grid", settings=RAYS)
     assert set(result.start.parts[WATCHED]) == {"coverage", "distortion"}
     assert any("--require 'coverage>=" in note for note in result.notes), result.notes
-    assert lost_note(result.start, result.start) is None
+    assert worsened_note(result.start, result.start) is None
 
 
 def test_lights_alone_are_not_watched(mini: SensorDesign) -> None:

@@ -17,7 +17,7 @@ from optisense.design.difference import differences, fingerprint
 from optisense.errors import ObjectiveError, SearchError
 from optisense.search import Around, SearchSpace
 from optisense.search.evaluation.evaluator import DesignEvaluator
-from optisense.search.space.constraints import PartsApart, UserRule, why_forbidden
+from optisense.search.space.constraints import NoCrossings, UserRule, why_forbidden
 
 LOW = {"photons": 200_000, "resolution": (160, 120), "together": True}
 
@@ -118,7 +118,7 @@ class TestConstraints:
     def test_parts_that_come_to_cross(self, svelte: SensorDesign) -> None:
         """A mirror pushed forward by ten millimetres is in the skin."""
         space = SearchSpace({"cages.M1.points": Around(10.0)}).bind(svelte)
-        apart = PartsApart(svelte)
+        apart = NoCrossings(svelte)
         assert apart(svelte) is None
         point = space.start.copy()
         point[[name.endswith(".x") for name in space.names]] += 9.0
@@ -128,7 +128,7 @@ class TestConstraints:
         evaluator = DesignEvaluator(space, ["aoap"])
         assert evaluator(point, 0).failure == said
         free = DesignEvaluator(space, ["aoap"], apart=False)
-        assert not any(isinstance(rule, PartsApart) for rule in free.constraints)
+        assert not any(isinstance(rule, NoCrossings) for rule in free.constraints)
 
     def test_a_rule_from_a_file(self, mini: SensorDesign, tmp_path: Path) -> None:
         file = tmp_path / "rules.py"

@@ -8,7 +8,7 @@ import pytest
 from optisense import SensorDesign
 from optisense.search import Around, SearchSpace
 from optisense.search.methods.feasible import FeasibleRegion
-from optisense.search.space.constraints import PartsApart
+from optisense.search.space.constraints import NoCrossings
 from optisense.sensors import gelsight_svelte
 
 MIRROR = {
@@ -26,7 +26,7 @@ def svelte() -> SensorDesign:
 def test_a_mirror_that_is_wanted_inside_a_part_is_moved_beside_it(svelte: SensorDesign) -> None:
     """As a rule not so far as the straight way back, and at right angles to where it can slide."""
     space = SearchSpace(MIRROR).bind(svelte)
-    region = FeasibleRegion(space, [PartsApart(svelte)], ["M1"])
+    region = FeasibleRegion(space, [NoCrossings(svelte)], ["M1"])
     start = space.to_unit(space.start)
     assert region.allows(start)
     found = slid = 0

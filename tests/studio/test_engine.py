@@ -19,7 +19,7 @@ from studio.core.engine import Engine, EngineError
 from studio.engine import session
 from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
-from studio.scene.offending import offending
+from studio.scene.objects_at import objects_at
 from studio.sensor.warming import warm_up
 from studio.simulate import drafts, picture, relight
 
@@ -258,7 +258,7 @@ def test_places_in_the_design_are_found_in_the_scene(mini: Any) -> None:
         ("", "gel", 1),
         ("name", "", 0),
     ):
-        assert len(offending(mini, path, part)) == expected, path
+        assert len(objects_at(mini, path, part)) == expected, path
 
 
 def test_shapes_materials_and_lights_make_a_design_in_order(

@@ -82,5 +82,5 @@ def test_the_ledger_tells_where_the_light_goes(mini: Any) -> None:
         shares = [float(share.split()[0]) for _, share in lines]
         assert sum(shares) == pytest.approx(100.0, abs=1.5), "all of the light is somewhere"
     (place,) = json.loads(values.places)
-    assert len(words.told_of_place(place)) == 3
+    assert len(words.place_text(place)) == 3
     assert session.state().about == ledger.TITLE

@@ -17,7 +17,7 @@ from optisense.sensors.half_round import HalfRound, stacked
 from optisense.sensors.shapes import revolve
 from optisense.workshop import export
 from optisense.workshop.profiles import pieces
-from optisense.workshop.recognised import box_sides, drawn_out, turned
+from optisense.workshop.recognised import box_sides, extrusion_of, turned
 from optisense.workshop.shapes import Shape
 from optisense.workshop.step_format import write_step
 
@@ -88,7 +88,7 @@ class TestRecognised:
         assert found.profile[:, 0].max() == pytest.approx(4.0)
 
     def test_an_outline_with_its_hole(self) -> None:
-        found = drawn_out(plate_with_a_hole(48))
+        found = extrusion_of(plate_with_a_hole(48))
         assert found is not None
         assert [np.ptp(outline[:, 0]) for outline in found.outlines] == pytest.approx(
             [20.0, 6.0], rel=5e-3
@@ -98,7 +98,7 @@ class TestRecognised:
         ball = trimesh.creation.icosphere(subdivisions=2)
         mesh = TriangleMesh(ball.vertices, ball.faces)
         assert turned(mesh) is None
-        assert drawn_out(mesh) is None
+        assert extrusion_of(mesh) is None
         assert box_sides(mesh) == []
 
     def test_a_box_has_six_sides_that_look_outward(self) -> None:

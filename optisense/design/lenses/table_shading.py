@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 from scipy.ndimage import map_coordinates
 
-from optisense.design.fields import Fraction, MisfitError, Number
+from optisense.design.fields import Fraction, InconsistentValueError, Number
 from optisense.design.lenses.film import FilmPlaces
 from optisense.design.lenses.shading import LensShading
 
@@ -57,14 +57,14 @@ class TableShading(LensShading):
             widths = [len(row) for row in table]
             if len(table) < 2 or min(widths) < 2 or len(set(widths)) > 1:
                 shape = f"{len(table)} rows of " + " or ".join(map(str, sorted(set(widths))))
-                raise MisfitError(
+                raise InconsistentValueError(
                     f"the shading table '{name}' has {shape} numbers",
                     (name,),
                     "Give rows of equal length, two or more of each, such as "
                     f"{TABLE_ROWS} rows of {TABLE_COLUMNS}",
                 )
             if (len(table), widths[0]) != (len(self.gain), len(self.gain[0])):
-                raise MisfitError(
+                raise InconsistentValueError(
                     f"the shading table '{name}' has {len(table)} rows of {widths[0]} numbers, "
                     f"and 'gain' has {len(self.gain)} of {len(self.gain[0])}",
                     (name,),

@@ -70,7 +70,7 @@ class Reflection:
         """True if there is no diffuse lobe."""
         return self.specularity == 1.0
 
-    def seen_in(self, ior: float) -> Reflection:
+    def in_medium(self, ior: float) -> Reflection:
         """Return the same surface in a medium with this index: the metal's index is divided by
         it.
         """
@@ -84,7 +84,7 @@ class Reflection:
             (k_red, k_green, k_blue),
         )
 
-    def head_on(self) -> NDArray[np.float64]:
+    def normal_reflectance(self) -> NDArray[np.float64]:
         """Return the reflectance at normal incidence at R, G, B, (3,)."""
         metal = fresnel_metal(1.0, self.eta, self.k)
         diffuse = np.array(self.reflectance)
@@ -123,7 +123,7 @@ class Material(KindModel):
 
     def in_words(self) -> str:
         """Return its most informative number, in a few words."""
-        return f"reflects {100 * float(self.reflection().head_on().mean()):.3g} %"
+        return f"reflects {100 * float(self.reflection().normal_reflectance().mean()):.3g} %"
 
     def consequences(self) -> list[str]:
         """Return quantities that follow from its numbers, one per line."""
@@ -153,7 +153,7 @@ class CoatingModel(KindModel):
 
     def in_words(self) -> str:
         """Return its most informative number, in a few words."""
-        share = float(self.reflection().seen_in(GEL_INDEX).head_on().mean())
+        share = float(self.reflection().in_medium(GEL_INDEX).normal_reflectance().mean())
         return f"reflects {100 * share:.3g} % in silicone"
 
     def consequences(self) -> list[str]:

@@ -34,9 +34,9 @@ class Conductor(Material):
 
     def in_words(self) -> str:
         """Return its reflectance at normal incidence, as text."""
-        return f"reflects {100 * float(self.reflection().head_on().mean()):.0f} %"
+        return f"reflects {100 * float(self.reflection().normal_reflectance().mean()):.0f} %"
 
     def consequences(self) -> list[str]:
         """Return its reflectance in each colour, one per line."""
-        share = 100 * self.reflection().head_on()
+        share = 100 * self.reflection().normal_reflectance()
         return ["reflects {:.1f}, {:.1f}, {:.1f} % of R, G, B in air".format(*share)]

@@ -11,7 +11,7 @@ from optisense.design.fields import (
     MILLIMETRES,
     Colour,
     Fraction,
-    MisfitError,
+    InconsistentValueError,
     NonNegativeRGB,
     Number,
     Positive,
@@ -130,10 +130,10 @@ class Dielectric(Material):
     )
 
     @model_validator(mode="after")
-    def _says_each_thing_once(self) -> Dielectric:
+    def _check_one_source(self) -> Dielectric:
         ways = [name for name in ABSORPTIONS if getattr(self, name) is not None]
         if len(ways) > 1:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"absorption is given twice, by '{ways[0]}' and by '{ways[1]}'",
                 (ways[1],),
                 "Keep one of them",
@@ -141,11 +141,13 @@ class Dielectric(Material):
         for one, other in (("transmittance", "thickness"), ("sellmeier_b", "sellmeier_c")):
             for name, partner in ((one, other), (other, one)):
                 if getattr(self, name) is not None and getattr(self, partner) is None:
-                    raise MisfitError(f"'{name}' needs '{partner}' as well", (name,), "Add it")
+                    raise InconsistentValueError(
+                        f"'{name}' needs '{partner}' as well", (name,), "Add it"
+                    )
         formulas = ("dispersion", "sellmeier_b", "cauchy")
         given = [name for name in formulas if getattr(self, name) is not None]
         if len(given) > 1:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"the index at R, G, B is given twice, by '{given[0]}' and by '{given[1]}'",
                 (given[1],),
                 "Keep one of them",
@@ -160,14 +162,14 @@ class Dielectric(Material):
         name = "cauchy" if self.sellmeier_b is None else "sellmeier_b"
         found = self._index_at(SODIUM_LINE)
         if not abs(found - self.ior) <= INDEX_AGREEMENT:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"'{name}' gives an index of {found:.4g} at 589 nm, and 'ior' is {self.ior:g}",
                 (name,),
                 "Give wavelengths in micrometres, and the same index in both",
             )
         for wavelength in CHANNEL_WAVELENGTHS:
             if not 1.0 <= self._index_at(wavelength) <= 4.0:
-                raise MisfitError(
+                raise InconsistentValueError(
                     f"'{name}' gives an index of {self._index_at(wavelength):.4g} at "
                     f"{wavelength:g} nm, and it must be 1 to 4",
                     (name,),
@@ -178,7 +180,7 @@ class Dielectric(Material):
         if self.transmittance is None:
             return
         if min(self.transmittance) <= 0.0:
-            raise MisfitError(
+            raise InconsistentValueError(
                 "a plate of transmittance 0 does not tell how much is absorbed",
                 ("transmittance",),
                 "Measure a thinner plate, or give 'absorption'",
@@ -186,7 +188,7 @@ class Dielectric(Material):
         if min(self.absorption_coefficient()) < 0.0:
             faces = 1.0 - fresnel_dielectric(1.0, np.array(self.channel_indices()))
             clear = ", ".join(f"{value:.3f}" for value in faces / (2.0 - faces))
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"the two faces of a plate of index {self.ior:g} alone reflect so much that it "
                 f"passes at most {clear} of R, G, B",
                 ("transmittance",),

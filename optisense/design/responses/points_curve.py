@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from optisense.design.fields import Fraction, MisfitError
+from optisense.design.fields import Fraction, InconsistentValueError
 from optisense.design.responses.tone_curve import ToneCurve
 
 FloatArray = NDArray[np.floating]
@@ -30,14 +30,14 @@ class PointsCurve(ToneCurve):
         linear, stored = np.array(self.points).T
         for number, (step, rise) in enumerate(zip(np.diff(linear), np.diff(stored), strict=True)):
             if step <= 0.0 or rise < 0.0:
-                raise MisfitError(
+                raise InconsistentValueError(
                     f"the tone curve does not rise from point {number} {self.points[number]} to "
                     f"point {number + 1} {self.points[number + 1]}",
                     ("points", number + 1),
                     "Give points of rising linear levels whose stored levels never fall",
                 )
         if linear[0] != 0.0 or linear[-1] != 1.0:
-            raise MisfitError(
+            raise InconsistentValueError(
                 f"the tone curve runs from {linear[0]:g} to {linear[-1]:g}",
                 ("points",),
                 "Let the first point have a linear level of 0 and the last one of 1",

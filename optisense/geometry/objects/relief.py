@@ -78,7 +78,7 @@ def _mesh(relief: Relief) -> TriangleMesh:
     vertices = np.stack([across, along, z], axis=-1)
     face = TriangleMesh(
         vertices.reshape(-1, 3), grid_faces(len(y), len(x)), normals.reshape(-1, 3)
-    ).wound_like_normals()
+    ).with_winding_from_normals()
     return TriangleMesh.joined([face, *_sides(vertices), _back(vertices)])
 
 
@@ -90,7 +90,9 @@ def _sides(vertices: FloatArray) -> list[TriangleMesh]:
     for rim, normal in zip(rims, outward, strict=True):
         corners = np.concatenate([rim, _lifted(rim)])
         normals = np.tile(normal, (len(corners), 1))
-        walls.append(TriangleMesh(corners, grid_faces(2, len(rim)), normals).wound_like_normals())
+        walls.append(
+            TriangleMesh(corners, grid_faces(2, len(rim)), normals).with_winding_from_normals()
+        )
     return walls
 
 
@@ -103,7 +105,7 @@ def _back(vertices: FloatArray) -> TriangleMesh:
     here = np.arange(len(rim))
     faces = np.column_stack([here, np.roll(here, -1), np.full(len(rim), len(rim))])
     normals = np.tile((0.0, 0.0, 1.0), (len(corners), 1))
-    return TriangleMesh(corners, faces, normals).wound_like_normals()
+    return TriangleMesh(corners, faces, normals).with_winding_from_normals()
 
 
 def _lifted(points: FloatArray) -> FloatArray:

@@ -46,7 +46,7 @@ def picture_of_ball(
     medium, surface = medium_of(material), material.reflection()
     studio = white_studio(1.0 if medium is None else 0.3)
     if isinstance(material, CoatingModel):
-        studio, surface = coloured_studio(), surface.seen_in(GEL_INDEX)
+        studio, surface = coloured_studio(), surface.in_medium(GEL_INDEX)
     pixels = np.arange(size * size)
     light = np.zeros((size * size, 3))
     start, towards = _camera_rays(pixels, size, offsets)

@@ -123,7 +123,7 @@ def _lobes(axes: Any, material: Material | CoatingModel) -> str:
     if surface.is_black:
         return "absorbs all light"
     angle = np.linspace(-90.0, 90.0, 721)
-    parts = lobes(surface.seen_in(GEL_INDEX) if coated else surface, angle)
+    parts = lobes(surface.in_medium(GEL_INDEX) if coated else surface, angle)
     names = ("diffuse paint", "metal flake") if coated else ("diffuse lobe", "metallic lobe")
     total = np.zeros(len(angle))
     for part, name, shade in zip(parts, names, ("0.75", "#e0a030"), strict=True):

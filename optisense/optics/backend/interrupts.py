@@ -10,7 +10,7 @@ _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
 
-def lets_ctrl_c_through(work: Callable[_P, _R]) -> Callable[_P, _R]:
+def reraise_interrupts(work: Callable[_P, _R]) -> Callable[_P, _R]:
     """Decorate a function that runs loops of Dr.Jit.
 
     Dr.Jit turns any exception that is raised while it records a loop or a branch into a

@@ -17,7 +17,7 @@ from scipy import ndimage
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.contact_light import beside_layers, thrown_layers
+from optisense.optics.imaging.contact_light import beside_layers, mirrored_contact_layers
 from optisense.optics.imaging.film import REFERENCE_WIDTH, Film, repeated
 from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.radiance_cache.beams import cull_beams
@@ -67,7 +67,7 @@ DARK_FRACTION = 0.02
 GRAIN_WINDOW = 9
 """Side (pixels) of the square over which grain is measured and resampled."""
 
-THROWN_RANGE = 0.1
+MIRRORED_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which metallic coatings are
 shaded with the light that the contact reflects through the interfaces: 2 mm on GelSight Mini."""
 LEAST_LEFT = 0.5
@@ -208,7 +208,7 @@ def render_cached(
     near = np.zeros_like(mask)
     samples = [1]
     bent = region_image == Region.BENT
-    thrown = beside = None
+    mirrored_contacts = beside = None
     if mask.any() or bent.any():
         distance = ndimage.distance_transform_edt(~mask) if mask.any() else np.full(mask.shape, 2.0)
         near = bent | (distance <= max(2.0, RIM_WIDTH * width))
@@ -235,8 +235,10 @@ def render_cached(
             ring = skin & ~near & (distance <= BESIDE_RANGE * width)
             beside = beside_layers(field, scenes, camera, ring, seed)
         if field.metallic and not draft:
-            lit = mask if only_contacts else rays.hit & (distance <= THROWN_RANGE * width)
-            thrown = thrown_layers(field, scenes, camera, lit, lit & ~mask, seed)
+            lit = mask if only_contacts else rays.hit & (distance <= MIRRORED_RANGE * width)
+            mirrored_contacts = mirrored_contact_layers(
+                field, scenes, camera, lit, lit & ~mask, seed
+            )
     far = ~near
     layers = reflections = None
     if far.any() and not only_contacts:
@@ -287,9 +289,9 @@ def render_cached(
         layers = film.layers(width, height) + reflections
     if beside is not None:
         layers = layers + beside
-    if thrown is not None:
+    if mirrored_contacts is not None:
         # A contact also hides skin that would reflect light, but never a large share of the light.
-        layers = np.maximum(layers + thrown, layers * LEAST_LEFT)
+        layers = np.maximum(layers + mirrored_contacts, layers * LEAST_LEFT)
     return ImageLayers(
         radiance=layers,
         normals=masked(rays.normals, rays.hit),

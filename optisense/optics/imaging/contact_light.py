@@ -16,8 +16,8 @@ from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.film import REFERENCE_WIDTH, Film, repeated
 from optisense.optics.radiance_cache.cache import RadianceCache
+from optisense.optics.radiance_cache.mirrored_contacts import mirrored_contacts
 from optisense.optics.radiance_cache.shading import beside_contacts
-from optisense.optics.radiance_cache.thrown_back import thrown_back
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
 
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
     PointLight = tuple[VisiblePoints, list[mi.Color3f]]
     """Points and their radiance, one colour for each light group."""
 
-THROWN_RAYS = 8
+MIRRORED_RAYS = 8
 """Rays per pixel that sample the light that contacts reflect through the interfaces, in an image
 `REFERENCE_WIDTH` wide; smaller images take more. Few of the rays end where a contact mirrors a
 lamp."""
-BROAD_THROWN_RAYS = 1
-"""Value of `THROWN_RAYS` for lobes that are not narrower than most lamps; one suffices, as they
+BROAD_MIRRORED_RAYS = 1
+"""Value of `MIRRORED_RAYS` for lobes that are not narrower than most lamps; one suffices, as they
 receive little such light, and evenly from all directions."""
-THROWN_REACH = 1.0 / 40.0
+MIRRORED_REACH = 1.0 / 40.0
 """Width over which light from contacts is averaged on the skin, as a fraction of the image width:
 half a millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
 BESIDE_DIRECTIONS = 2
 """Rays per pixel that sample the light that contacts reflect to the skin beside them, in an image
-`REFERENCE_WIDTH` wide; smaller images take more. The light is averaged over `THROWN_REACH`, which
+`REFERENCE_WIDTH` wide; smaller images take more. The light is averaged over `MIRRORED_REACH`, which
 leaves noise of some tenths of a per cent."""
 
 
-def thrown_layers(
+def mirrored_contact_layers(
     field: RadianceCache,
     scenes: ContactScenes,
     camera: RayCamera,
@@ -54,11 +54,11 @@ def thrown_layers(
     """Return the radiance (groups, h, w, 3) due to light that contacts reflect through the
     interfaces to the pixels ``where``, averaged over ``skin``; None if there is none.
     """
-    least = THROWN_RAYS if field.narrow_lobes else BROAD_THROWN_RAYS
+    least = MIRRORED_RAYS if field.narrow_lobes else BROAD_MIRRORED_RAYS
     rays = max(least, round(least * (REFERENCE_WIDTH / camera.width) ** 2))
 
     def light(points: VisiblePoints) -> PointLight | None:
-        return thrown_back(field, scenes, points, rays)
+        return mirrored_contacts(field, scenes, points, rays)
 
     return _averaged_layers(field.groups, scenes, camera, (where, skin), (seed, 9), light)
 
@@ -118,4 +118,4 @@ def _averaged_layers(
         found = light(main)
         if found is not None:
             film.add(*found)
-    return film.spread_layers(width, height, over, max(2, round(THROWN_REACH * width)))
+    return film.spread_layers(width, height, over, max(2, round(MIRRORED_REACH * width)))

@@ -133,7 +133,7 @@ def sum_bins(
                 else:
                     reflected *= value.w
                 if dr.hint(scenes.absorption is not None and upper is None, mode="scalar"):
-                    reflected *= _spared(scenes, rise, dr.dot(upright, towards))
+                    reflected *= _shorter_path_factor(scenes, rise, dr.dot(upright, towards))
                 totals[g] += reflected * weight
         k += 1
     return totals
@@ -170,7 +170,7 @@ def _reflected(
     return (of_disc(one, within) + of_disc(other, within)) * 0.5
 
 
-def _spared(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:
+def _shorter_path_factor(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:
     """Return the factor by which light is stronger on an indenter, as its path through the gel is
     shorter.
 

@@ -44,7 +44,7 @@ arrays of one entry."""
 
 
 @dataclass
-class PlacesSeen:
+class SecondaryHits:
     """Places that rays have met.
 
     Attributes:
@@ -59,7 +59,7 @@ class PlacesSeen:
     near: mi.UInt32
 
 
-def glossily_interreflected(
+def glossy_interreflection(
     field: RadianceCache, scenes: ContactScenes, at: ShadingPoints
 ) -> list[mi.Color3f]:
     """Return the radiance towards the camera due to interreflected light, one colour per group.
@@ -90,7 +90,7 @@ def glossily_interreflected(
     looking.seen.number = looking.seen.number * directions + lane % directions
     looking.seen.weight = mi.Color3f(1 / directions)
     for _ in range(MAX_BOUNCES):
-        seen = _places_seen(scenes, looking)
+        seen = _secondary_hits(scenes, looking)
         if seen is None:
             break
         looking = shading_points(field, scenes, seen)
@@ -107,7 +107,7 @@ def glossily_interreflected(
     ]
 
 
-def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> PlacesSeen | None:
+def _secondary_hits(scenes: ContactScenes, at: ShadingPoints) -> SecondaryHits | None:
     """Return the places that one ray from each point meets, drawn from its coating's lobes."""
     assert scenes.indenters is not None
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
@@ -144,7 +144,7 @@ def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> PlacesSeen | None:
         series=next_random(random ^ points.series),
         number=mi.UInt32(points.number),
     )
-    seen = PlacesSeen(found, raised, at.cell)
+    seen = SecondaryHits(found, raised, at.cell)
     dr.eval(seen)
     lanes = dr.compress(valid)
     count = dr.width(lanes)
@@ -152,13 +152,15 @@ def _places_seen(scenes: ContactScenes, at: ShadingPoints) -> PlacesSeen | None:
         return None
     if count < MIN_LANES:
         lanes = dr.repeat(lanes, MIN_LANES)
-    seen = dr.gather(PlacesSeen, seen, lanes)
+    seen = dr.gather(SecondaryHits, seen, lanes)
     if count < MIN_LANES:
         seen.points.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
     return seen
 
 
-def shading_points(field: RadianceCache, scenes: ContactScenes, seen: PlacesSeen) -> ShadingPoints:
+def shading_points(
+    field: RadianceCache, scenes: ContactScenes, seen: SecondaryHits
+) -> ShadingPoints:
     """Return the shading points of places; each reads the cache below it, along the skin's
     normal.
     """

@@ -19,7 +19,7 @@ from optisense.optics.radiance_cache.beam_sums import sum_beams, sum_diffuse, su
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.bin_sums import sum_bins
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.glossy_interreflection import glossily_interreflected
+from optisense.optics.radiance_cache.glossy_interreflection import glossy_interreflection
 from optisense.optics.radiance_cache.interreflection import interreflected
 from optisense.optics.radiance_cache.shading_points import ShadingPoints, interpolating_cell
 from optisense.optics.scene.bsdf import coating_of, surface_region
@@ -86,7 +86,7 @@ def shade(
         )
         shadow_rays = dr.opaque(mi.Float, CONTACT_SHADOW_RAYS)
         far = sum_bins(field.binned(), scenes, at, shadow_rays, sky)
-        between = glossily_interreflected if field.metallic else interreflected
+        between = glossy_interreflection if field.metallic else interreflected
         near = between(field, scenes, at)
         return [one + other for one, other in zip(far, near, strict=True)]
     totals: list[mi.Color3f]
@@ -135,5 +135,5 @@ def beside_contacts(
     at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
     if field.metallic:
         at.raised = dr.full(mi.Bool, False, dr.width(points.pixel))
-        return glossily_interreflected(field, scenes, at)
+        return glossy_interreflection(field, scenes, at)
     return interreflected(field, scenes, at, directions)

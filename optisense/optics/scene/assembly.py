@@ -21,7 +21,7 @@ from optisense.optics.scene.emitters import (
     EmitterShape,
     frame_of,
 )
-from optisense.optics.scene.finishes import MadeBefore, finishes_of, frosted
+from optisense.optics.scene.finishes import ShapeCache, finishes_of, frosted
 from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.solids import Interface, Sheet, Solid
@@ -66,20 +66,20 @@ class Assembly:
     ior_before: float
     absorption_before: RGB
     media: Media
-    kept: Kept
+    kept: AssemblyCache
 
 
 @dataclass
-class Kept:
+class AssemblyCache:
     """Shapes computed from meshes, with the meshes that they were computed from, which are
     recognised by identity.
     """
 
-    finishes: MadeBefore = field(default_factory=MadeBefore)
+    finishes: ShapeCache = field(default_factory=ShapeCache)
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
 
-    def merge(self, mesh: TriangleMesh, before: Kept, bend: bool = False) -> TriangleMesh:
+    def merge(self, mesh: TriangleMesh, before: AssemblyCache, bend: bool = False) -> TriangleMesh:
         """Return a part's mesh with its flat faces merged; unchanged if ``bend`` and an earlier
         mesh with the same faces had no flat ones.
         """
@@ -90,7 +90,9 @@ class Kept:
         self.merged.append((mesh, _merged(mesh) if known is None else known))
         return self.merged[-1][1]
 
-    def piece(self, name: str, mesh: TriangleMesh, surface: Surface, before: Kept) -> Piece:
+    def piece(
+        self, name: str, mesh: TriangleMesh, surface: Surface, before: AssemblyCache
+    ) -> Piece:
         """Return the piece of a mesh and its surface, reused if it is known."""
         known = next((piece for old, piece in before.pieces if old is mesh), None)
         if known is None or (known.name, known.surface) != (name, surface):
@@ -116,7 +118,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     solids, sheets, pieces, fine = [], [], [], {}
     indices: list[float] = []
     absorptions: list[RGB] = []
-    kept, old = Kept(), Kept() if before is None else before.kept
+    kept, old = AssemblyCache(), AssemblyCache() if before is None else before.kept
     for name, part in design.parts.items():
         if name not in meshes:
             raise DesignError(f"part '{name}' has no mesh", where=design.where("parts", name))
@@ -197,7 +199,7 @@ def _medium(design: SensorDesign, part: str, material: Material | None) -> Mediu
 
 def coating_surface(coating: CoatingModel, ior: float, region: Region) -> Surface:
     """Return the coating as seen from a medium of refractive index ``ior``."""
-    return _reflecting(SurfaceKind.OPAQUE, coating.reflection().seen_in(ior), region)
+    return _reflecting(SurfaceKind.OPAQUE, coating.reflection().in_medium(ior), region)
 
 
 def _reflecting(kind: SurfaceKind, reflection: Reflection, region: Region) -> Surface:
@@ -230,7 +232,7 @@ def _opaque(material: Material | None, ior: float) -> Surface:
     if reflection.is_black:
         return Surface(SurfaceKind.ABSORBER)
     kind = SurfaceKind.MIRROR if is_mirror(reflection) else SurfaceKind.OPAQUE
-    return _reflecting(kind, reflection.seen_in(ior), Region.OTHER)
+    return _reflecting(kind, reflection.in_medium(ior), Region.OTHER)
 
 
 def _interface_surface(face: Interface) -> Surface:

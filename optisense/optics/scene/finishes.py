@@ -52,12 +52,12 @@ class Paint:
 
 
 @dataclass
-class MadeBefore:
+class ShapeCache:
     """Cache of shapes by their inputs; meshes are recognised by identity."""
 
     made: list[tuple[tuple[Any, ...], Any]] = field(default_factory=list)
 
-    def once(self, before: MadeBefore, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+    def get_or_make(self, before: ShapeCache, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Return the result of ``make``, which is kept for further calls with the same key."""
         known = next((value for old, value in before.made if old == key), None)
         self.made.append((key, make() if known is None else known))
@@ -68,8 +68,8 @@ def finishes_of(
     design: SensorDesign,
     meshes: dict[str, TriangleMesh],
     sheets: Sequence[Sheet],
-    kept: MadeBefore,
-    before: MadeBefore,
+    kept: ShapeCache,
+    before: ShapeCache,
 ) -> tuple[list[Frost], list[Paint]]:
     """Return the frosted and the painted faces of a design.
 
@@ -101,7 +101,7 @@ def finishes_of(
         def bare(mesh: TriangleMesh = mesh, chosen: Any = chosen) -> TriangleMesh:
             return _uncovered(mesh.with_faces(mesh.faces[chosen]).compacted(), sheets)
 
-        patch = kept.once(before, key, bare)
+        patch = kept.get_or_make(before, key, bare)
         if not len(patch.faces):
             raise DesignError(
                 f"the coating, or another opaque part, covers all of the faces {name}",
@@ -111,7 +111,7 @@ def finishes_of(
         if finish.paint is None:
             frosts.append(Frost(f"{part}.{label}", part, patch, float(finish.roughness or 0.0)))
             continue
-        inward = kept.once(before, (patch, "flipped"), patch.flipped)
+        inward = kept.get_or_make(before, (patch, "flipped"), patch.flipped)
         paints.append(Paint(Sheet(f"{part}.{label}", inward, "paint"), part, finish.paint))
     return frosts, paints
 
@@ -128,8 +128,8 @@ def frosted(
     interface: Interface,
     frosts: Sequence[Frost],
     solids: Sequence[Solid],
-    kept: MadeBefore,
-    before: MadeBefore,
+    kept: ShapeCache,
+    before: ShapeCache,
 ) -> Iterator[tuple[str, Interface]]:
     """Divide an interface into the parts on frosted faces, and the rest.
 
@@ -151,7 +151,7 @@ def frosted(
         return cut(mesh, overlays)
 
     key = (interface.mesh, *(frost.mesh for frost in own))
-    *rough, rest = kept.once(before, key, pieces)
+    *rough, rest = kept.get_or_make(before, key, pieces)
     for frost, mesh in zip(own, rough, strict=True):
         others = [
             s.roughness for s in solids if s.name in interface.names and s.name != frost.solid

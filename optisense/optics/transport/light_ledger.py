@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import indices
-from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
@@ -50,7 +50,7 @@ SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
 @dataclass(frozen=True)
-class Bookings:
+class LedgerSums:
     """The sums of the ledger.
 
     Attributes:
@@ -70,14 +70,14 @@ class Bookings:
 
 @dataclass
 class _Sums:
-    """Device arrays of `Bookings`, in double precision, and their sizes."""
+    """Device arrays of `LedgerSums`, in double precision, and their sizes."""
 
     power: mi.Float64
     rest: mi.Float64
     exits: mi.Float64
     surfaces: int
 
-    def book(
+    def record(
         self, line: mi.UInt32, surface: mi.UInt32, fate: mi.UInt32, what: mi.Color3f, where: mi.Bool
     ) -> None:
         """Add power to rows; symbolic loops may call it.
@@ -93,14 +93,14 @@ class _Sums:
         for k in range(3):
             dr.scatter_add(self.power, mi.Float64(what[k]), row * 3 + k, where)
 
-    def book_end(self, line: mi.UInt32, end: _End) -> None:
+    def record_end(self, line: mi.UInt32, end: _End) -> None:
         """Add the remaining power of photons at their ends.
 
         Args:
             line: the number of batch and group.
             end: the end of each photon.
         """
-        self.book(line, end.last, mi.UInt32(int(Fate.ESCAPED)), end.escaped, mi.Bool(True))
+        self.record(line, end.last, mi.UInt32(int(Fate.ESCAPED)), end.escaped, mi.Bool(True))
         through = (line * self.surfaces + end.last) * len(SIDES) + _side_of(end.outward)
         leaves = end.last < self.surfaces - 1
         for k in range(3):
@@ -175,7 +175,7 @@ def _follow(
     seen: TargetCells,
     seed: mi.UInt32,
 ) -> _End:
-    """Follow photons to their ends and book their losses."""
+    """Follow photons to their ends and record their losses."""
     # The number is hashed, as streams of neighbouring numbers resemble one another, and so would
     # the batches.
     rng = mi.PCG32()
@@ -193,7 +193,7 @@ def _follow(
         hit = step.hit
         if dr.hint(scene.absorbing, mode="scalar"):
             bound, side = medium_before(step, bound, side)
-            sums.book(line, bound, side, power * (1 - step.transmittance), hit.valid)
+            sums.record(line, bound, side, power * (1 - step.transmittance), hit.valid)
             power *= step.transmittance
             side = medium_after(step, side)
         escaped = ray.active & ~hit.valid
@@ -202,7 +202,7 @@ def _follow(
         cell, near = cell_at(seen.cells, hit.point, step.sensed)
         near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
         fate = dr.select(near, mi.UInt32(int(Fate.SEEN)), int(Fate.ABSORBED))
-        sums.book(line, hit.surface, fate, power - kept, hit.valid)
+        sums.record(line, hit.surface, fate, power - kept, hit.valid)
         power = dr.select(escaped, 0, kept)
         last = dr.select(step.goes_on, hit.surface, last)
         ahead = dr.sign(dr.dot(step.lobe.direction, hit.normal))
@@ -211,7 +211,7 @@ def _follow(
     return _End(gone, power, last, outward)
 
 
-@lets_ctrl_c_through
+@reraise_interrupts
 def trace_ledger(
     scene: RayScene,
     table: EmitterTable,
@@ -219,8 +219,8 @@ def trace_ledger(
     seen: TargetCells,
     photons: int,
     seed: int = 0,
-) -> Bookings:
-    """Trace photons from all lights, and book where their light ends.
+) -> LedgerSums:
+    """Trace photons from all lights, and record where their light ends.
 
     Args:
         scene: the sensor.
@@ -252,14 +252,14 @@ def trace_ledger(
         power = flight.throughput * (count * BATCHES / per_light)
         stream = dr.opaque(mi.UInt32, seed_of(seed, 6, first))
         end = _follow(scene, flight.ray, power, line, flight.number, sums, seen, stream)
-        sums.book_end(line, end)
+        sums.record_end(line, end)
         dr.eval(sums.power, sums.rest, sums.exits)
 
     def by_surface(values: mi.Float64) -> NDArray[np.float64]:
         each = np.asarray(values, dtype=np.float64)
         return np.moveaxis(each.reshape(BATCHES, table.groups, surfaces + 1, -1, 3), 4, 2)
 
-    return Bookings(
+    return LedgerSums(
         by_surface(sums.power),
         np.asarray(sums.rest, dtype=np.float64).reshape(BATCHES, table.groups, 3),
         by_surface(sums.exits),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
@@ -143,7 +143,7 @@ def _part(some: mi.Color3f, whole: mi.Color3f, weights: mi.Color3f) -> mi.Float:
     return dr.minimum(dr.dot(some, weights) / dr.maximum(dr.dot(whole, weights), 1e-30), 1)
 
 
-@lets_ctrl_c_through
+@reraise_interrupts
 def trace_photon_paths(
     scene: RayScene,
     table: EmitterTable,

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import indices
-from optisense.optics.backend.interrupts import lets_ctrl_c_through
+from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
@@ -124,7 +124,7 @@ def _count(
             power /= dr.maximum(survival, 1e-6)
 
 
-@lets_ctrl_c_through
+@reraise_interrupts
 def trace_to_place(
     scene: RayScene,
     table: EmitterTable,

@@ -43,7 +43,7 @@ ROUNDING = 1e-4
 camera."""
 
 
-class Cause(IntEnum):
+class Discontinuity(IntEnum):
     """The cause that separates two neighbouring rays."""
 
     UNKNOWN = 0  # e.g. a part thinner than the two rays' distance
@@ -64,7 +64,7 @@ class Edges:
         side: (k,) position of the boundary along the row or column, pixels from the middle between
             the two pixels.
         depth: (k,) number of surfaces that the rays meet before the one at which they separate.
-        cause: (k,) the `Cause`.
+        cause: (k,) the `Discontinuity`.
         first, second: (k,) the vertices of an EDGE, or the triangles of a CROSSING; for
             TOTAL_REFLECTION, `first` is the triangle.
     """
@@ -82,7 +82,7 @@ class Edges:
 
 
 @dataclass(frozen=True)
-class Stop:
+class PathVertex:
     """A surface on the path of rays; all arrays have one entry per ray.
 
     Attributes:
@@ -111,7 +111,7 @@ class Stop:
     goes_on: mi.Bool
 
 
-def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[Stop]:
+def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[PathVertex]:
     """Return all surfaces that rays meet one after the other, without derivatives."""
     stops = []
     active = dr.full(mi.Bool, True, dr.width(direction))
@@ -120,7 +120,7 @@ def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[St
         step = interact(scene, ray, Path.CHIEF)
         hit = step.hit
         bent = hit.shading_normal != hit.normal
-        stop = Stop(
+        stop = PathVertex(
             ray.origin,
             ray.direction,
             hit.distance,
@@ -201,7 +201,7 @@ def _causes(
         depth[rows] = number
         apart = parted[rows]
         limit = rows[~apart]
-        cause[limit], first[limit] = Cause.TOTAL_REFLECTION, face[limit]
+        cause[limit], first[limit] = Discontinuity.TOTAL_REFLECTION, face[limit]
         rows = rows[apart]
         if len(rows):
             found = _nearest_edges(scene, stop, valid, face, rows, count)
@@ -211,7 +211,7 @@ def _causes(
 
 def _nearest_edges(
     scene: RayScene,
-    stop: Stop,
+    stop: PathVertex,
     valid: NDArray[np.bool_],
     face: IntArray,
     rows: IntArray,
@@ -245,7 +245,9 @@ def _nearest_edges(
             best[better], first[better], second[better] = off[better], a[better], b[better]
     edge = best <= within
     crossing = ~edge & valid[one] & valid[other]
-    cause = np.where(edge, Cause.EDGE, np.where(crossing, Cause.CROSSING, Cause.UNKNOWN))
+    cause = np.where(
+        edge, Discontinuity.EDGE, np.where(crossing, Discontinuity.CROSSING, Discontinuity.UNKNOWN)
+    )
     first = np.where(crossing, face[one], first)
     second = np.where(crossing, face[other], second)
     return cause.astype(np.int64), first, second

@@ -27,7 +27,7 @@ from optisense.optics.scene.bsdf import refract
 from optisense.optics.scene.ray_scene import Piece, RayScene, leave
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays, trace_path_codes
-from optisense.optics.transport.ray_edges import Cause, Stop, find_edges, walk
+from optisense.optics.transport.ray_edges import Discontinuity, PathVertex, find_edges, walk
 
 FloatArray = NDArray[np.float64]
 
@@ -138,7 +138,7 @@ class DifferentiableRays:
         return np.concatenate(areas)
 
     def _follow(
-        self, stop: Stop, origin: mi.Point3f, direction: mi.Vector3f
+        self, stop: PathVertex, origin: mi.Point3f, direction: mi.Vector3f
     ) -> tuple[mi.Point3f, mi.Vector3f, mi.Point3f, mi.Vector3f, mi.Vector3f]:
         """Return the point where rays meet a surface, its shading normal, the origin and direction
         of the rays that continue (unchanged where none does), and the direction of arrival.
@@ -189,7 +189,8 @@ class DifferentiableRays:
             indices(v) for v in (edges.depth, edges.cause, edges.first, edges.second)
         )
         at_edge, at_crossing, at_limit = (
-            cause == int(c) for c in (Cause.EDGE, Cause.CROSSING, Cause.TOTAL_REFLECTION)
+            cause == int(c)
+            for c in (Discontinuity.EDGE, Discontinuity.CROSSING, Discontinuity.TOTAL_REFLECTION)
         )
         value = dr.zeros(mi.Float, len(edges.x))
         # Up to the surface that separates two rays, both take the same path as the ray between
@@ -240,7 +241,7 @@ class DifferentiableRays:
         self._value = self._boundary(floats(edges.x), floats(edges.y), self._poses[1])
         square = by_x**2 + by_y**2
         along = np.where(edges.along_x, by_x, by_y)
-        known = (edges.cause != Cause.UNKNOWN) & np.isfinite(square) & (square > 0)
+        known = (edges.cause != Discontinuity.UNKNOWN) & np.isfinite(square) & (square > 0)
         self._per_value = np.where(known, -along / np.where(known, square, 1.0), 0.0)
         share = np.where(known, along**2 / np.where(known, square, 1.0), 0.0)
         order = np.cumsum(self.hit.ravel()) - 1

@@ -28,14 +28,14 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
 from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
 from optisense.search.space.buildable import (
-    BentPartsRest,
-    LightsRest,
-    LightsStayOut,
-    PartsRest,
-    SolidsStay,
-    StaysInSize,
+    DeformedPartsInContact,
+    LightsOnSupports,
+    LightsOutsideParts,
+    PartsInContact,
+    SizeLimit,
+    SolidsStaySolid,
 )
-from optisense.search.space.constraints import Constraint, PartsApart, Unfolded, why_forbidden
+from optisense.search.space.constraints import Constraint, NoCrossings, NoFolds, why_forbidden
 from optisense.search.space.pickling import PickledWithoutCaches
 from optisense.search.space.rigid_moves import PartShift, PartTurn
 from optisense.search.space.search_space import BoundSpace
@@ -140,9 +140,9 @@ class DesignEvaluator(PickledWithoutCaches):
                 self._functions[name] = goal
         self.constraints: list[Constraint] = list(space.space.constraints)
         if space.reshapes and (apart is None or apart):
-            self.constraints.append(PartsApart(space.design))
+            self.constraints.append(NoCrossings(space.design))
         if any(name.startswith("cages.") for name in space.names):
-            self.constraints.append(Unfolded(space.design))
+            self.constraints.append(NoFolds(space.design))
         self.keeper = ModelKeeper(variant)
         self.renders = bool(self._objectives or self.requirements)
         self.kept: list[Constraint] = []
@@ -284,16 +284,16 @@ class DesignEvaluator(PickledWithoutCaches):
         """
         design, names, moved = self.space.design, self.space.names, moved_parts(self.space)
         if apart and moved:
-            self.kept += [PartsRest(design, moved), LightsRest(design, moved)]
+            self.kept += [PartsInContact(design, moved), LightsOnSupports(design, moved)]
         bends = any(name.startswith("cages.") for name in names)
         if apart and bends:
-            self.kept.append(BentPartsRest(design))
+            self.kept.append(DeformedPartsInContact(design))
         if apart and (moved or bends):
-            self.kept.append(StaysInSize(design))
+            self.kept.append(SizeLimit(design))
         if apart and (moved or bends or any(PLACED.search(name) for name in names)):
-            self.kept.append(LightsStayOut(design))
+            self.kept.append(LightsOutsideParts(design))
         if any(name.startswith("materials.") for name in names):
-            self.kept.append(SolidsStay(design))
+            self.kept.append(SolidsStaySolid(design))
         if self.renders and may_change_view(names) and design.parts_of(Role.MIRROR):
             self.kept.append(SameMirrors(design, self.keeper))
 

@@ -63,8 +63,8 @@ class SameMirrors:
         other = {way: share for way, share in seen.items() if way not in self._ways}
         if not self._ways or sum(other.values()) <= MOST_BY_OTHER_WAYS:
             return None
-        now = _told(max(other, key=lambda way: other[way]))
-        before = " or ".join(sorted(_told(way) for way in self._ways))
+        now = _way_in_words(max(other, key=lambda way: other[way]))
+        before = " or ".join(sorted(_way_in_words(way) for way in self._ways))
         return (
             f"{100 * sum(other.values()):.0f} % of the rays that reach the sensing surface do not "
             "go by the mirrors that they go by in the design that the search starts from: "
@@ -99,6 +99,6 @@ def may_change_view(names: Iterable[str]) -> bool:
     return any(not name.startswith(SIGHTLESS) for name in names)
 
 
-def _told(way: frozenset[str]) -> str:
+def _way_in_words(way: frozenset[str]) -> str:
     names = [f"'{name}'" for name in sorted(way)]
     return "by " + " and ".join(names) if names else "straight"

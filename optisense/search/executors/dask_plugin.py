@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from distributed import WorkerPlugin
 
-from optisense.search.executors.remote_worker import forget, remember
+from optisense.search.executors.remote_worker import forget, store_evaluator
 
 if TYPE_CHECKING:
     from distributed import Worker
@@ -23,7 +23,7 @@ class EvaluatorPlugin(WorkerPlugin):
         """Remember the evaluator; Dask calls this when the worker starts or the plugin reaches
         it.
         """
-        remember(self.key, self.blob)
+        store_evaluator(self.key, self.blob)
 
     def teardown(self, worker: Worker) -> None:
         """Forget the evaluator; Dask calls this when the worker ends or the study unregisters the

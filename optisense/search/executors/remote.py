@@ -14,7 +14,7 @@ from optisense.errors import SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner, packed
-from optisense.search.executors.remote_worker import work_out
+from optisense.search.executors.remote_worker import score_trial
 
 CONNECT_SECONDS = 10.0
 """Longest wait for the answer of a Dask scheduler, s; one in the same network answers within a
@@ -56,7 +56,7 @@ class ExecutorRunner(Runner):
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
         """See `Runner`."""
-        return self._executor.submit(work_out, self._key, self._blob, vector, seed)
+        return self._executor.submit(score_trial, self._key, self._blob, vector, seed)
 
     def close(self) -> None:
         """Do nothing: the executor belongs to the caller."""
@@ -95,7 +95,7 @@ class DaskRunner(Runner):
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
         """See `Runner`."""
-        given = self._executor.submit(work_out, self._key, None, vector, seed)
+        given = self._executor.submit(score_trial, self._key, None, vector, seed)
         future: Future[Outcome] = Future()
         given.add_done_callback(lambda done: _settle(done, future))
         return future

@@ -22,12 +22,12 @@ worker has.
 """
 
 
-def work_out(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: int) -> Outcome:
+def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: int) -> Outcome:
     """Score a trial in the process where this is called.
 
     Args:
         key: key of the evaluator.
-        blob: the pickled evaluator, or None if it was sent before by `remember`.
+        blob: the pickled evaluator, or None if it was sent before by `store_evaluator`.
         vector, seed: point of the trial, (n,), and its seed.
     """
     with _one_at_a_time:
@@ -47,8 +47,8 @@ def work_out(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: in
     return outcome
 
 
-def remember(key: str, blob: bytes) -> None:
-    """Keep an evaluator for `work_out` in this process."""
+def store_evaluator(key: str, blob: bytes) -> None:
+    """Keep an evaluator for `score_trial` in this process."""
     _blobs[key] = blob
 
 

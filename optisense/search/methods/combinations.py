@@ -123,7 +123,7 @@ class Combinations(Method):
             yield from self.everything(stage)
             return
         while True:
-            yield from self.climb(stage, movable, self._shaken(self.best()))
+            yield from self.climb(stage, movable, self._perturbed(self.best()))
 
     def best(self) -> Combination:
         """Return the best combination so far; before there is one, the one nearest to the
@@ -136,7 +136,7 @@ class Combinations(Method):
             for levels, now in zip(self.levels, self.space.start, strict=True)
         )
 
-    def _shaken(self, combination: Combination) -> Combination:
+    def _perturbed(self, combination: Combination) -> Combination:
         """Return a combination with two or more parameters changed at random."""
         count = len(combination)
         most = int(self._random.integers(min(2, count), count + 1))

@@ -22,7 +22,7 @@ from optisense.errors import OptiSenseError
 from optisense.geometry.crossings import crossings
 from optisense.search.methods.base import FloatArray
 from optisense.search.methods.jacobian import Jacobian, jacobian
-from optisense.search.space.constraints import Constraint, PartsApart, why_forbidden
+from optisense.search.space.constraints import Constraint, NoCrossings, why_forbidden
 from optisense.search.space.search_space import BoundSpace
 
 ROUNDS = 12
@@ -51,7 +51,7 @@ it covers the solver's rounding errors.
 """
 
 
-class Placed(NamedTuple):
+class FeasiblePoint(NamedTuple):
     """Feasible point for a wanted one, (n,) in units of the ranges, and orthonormal vectors (k, n),
     the normals of the active constraints.
     """
@@ -60,9 +60,9 @@ class Placed(NamedTuple):
     normals: FloatArray
 
     @staticmethod
-    def unchanged(point: FloatArray) -> Placed:
+    def unchanged(point: FloatArray) -> FeasiblePoint:
         """Return the result for a wanted point (n,) that is feasible itself."""
-        return Placed(point, np.zeros((0, len(point))))
+        return FeasiblePoint(point, np.zeros((0, len(point))))
 
     def along(self, slope: FloatArray) -> FloatArray:
         """Return the component of a slope (n,) that the active constraints leave free."""
@@ -102,7 +102,7 @@ class FeasibleRegion:
         self._span = space.upper - space.lower
         self._constraints = list(constraints)
         self._parts = list(parts)
-        self._apart = [each for each in constraints if isinstance(each, PartsApart)]
+        self._apart = [each for each in constraints if isinstance(each, NoCrossings)]
         self._moves: Jacobian | None = None
 
     def allows(self, unit: FloatArray) -> bool:
@@ -115,7 +115,7 @@ class FeasibleRegion:
         except OptiSenseError:
             return True
 
-    def nearest(self, wanted: FloatArray, allowed: FloatArray) -> Placed:
+    def nearest(self, wanted: FloatArray, allowed: FloatArray) -> FeasiblePoint:
         """Return a feasible point near a wanted one, both (n,) in units of the ranges.
 
         Args:
@@ -123,7 +123,7 @@ class FeasibleRegion:
             allowed: a feasible point (n,), the fallback of the bisection.
         """
         if self.allows(wanted):
-            return Placed.unchanged(wanted)
+            return FeasiblePoint.unchanged(wanted)
         planes = _Planes(np.zeros((0, len(wanted))), np.zeros(0))
         point = wanted
         for _ in range(ROUNDS):
@@ -136,7 +136,7 @@ class FeasibleRegion:
                 break
             point = found
             if self.allows(point):
-                return Placed(point, _held_back(wanted, point, planes))
+                return FeasiblePoint(point, _held_back(wanted, point, planes))
         return self._way_back(wanted, allowed)
 
     def _design(self, unit: FloatArray) -> SensorDesign:
@@ -144,7 +144,7 @@ class FeasibleRegion:
         point = np.clip(space.lower + unit * self._span, space.lower, space.upper)
         return space.apply(point)
 
-    def _way_back(self, wanted: FloatArray, allowed: FloatArray) -> Placed:
+    def _way_back(self, wanted: FloatArray, allowed: FloatArray) -> FeasiblePoint:
         """Return the last feasible point on the line from a feasible point to a wanted one, by
         bisection.
         """
@@ -157,7 +157,7 @@ class FeasibleRegion:
                 high = middle
         length = float(np.linalg.norm(way))
         normals = way[None] / length if length > 0.0 else np.zeros((0, len(way)))
-        return Placed(allowed + low * way, normals)
+        return FeasiblePoint(allowed + low * way, normals)
 
     def _planes(self, unit: FloatArray, allowed: FloatArray) -> _Planes | None:
         """Return the inequalities that move parts out of each other, or None if another constraint

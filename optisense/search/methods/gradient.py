@@ -53,7 +53,7 @@ from optisense.search.methods.checked_slopes import (
     TOLERANCE,
     SlopeEvaluator,
 )
-from optisense.search.methods.feasible import FeasibleRegion, Placed
+from optisense.search.methods.feasible import FeasiblePoint, FeasibleRegion
 from optisense.search.methods.gradient_sources import (
     GradientSource,
     LocalValues,
@@ -124,7 +124,7 @@ class Gradient(Method):
         self._known: dict[bytes, Outcome] = {}
         self._message = ""
         self._region: FeasibleRegion | None = None
-        self._places: dict[bytes, Placed] = {}
+        self._places: dict[bytes, FeasiblePoint] = {}
 
     @classmethod
     def usual_budget(cls, space: BoundSpace) -> int:
@@ -283,14 +283,14 @@ class Gradient(Method):
         values = np.array([facts[SMOOTHED], *facts.get(LIMITED, [])])
         return LocalValues(values, outcome.gradient.reshape(len(values), -1) * span)
 
-    def _placed(self, unit: FloatArray, allowed: FloatArray) -> Placed:
+    def _placed(self, unit: FloatArray, allowed: FloatArray) -> FeasiblePoint:
         """Return the nearest feasible point to a wanted point (n,), which is scored in its
         place.
         """
         key = unit.tobytes()
         if key not in self._places:
             if self._region is None:
-                self._places[key] = Placed.unchanged(unit)
+                self._places[key] = FeasiblePoint.unchanged(unit)
             else:
                 self._places[key] = self._region.nearest(unit, allowed)
         return self._places[key]

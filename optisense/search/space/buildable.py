@@ -53,7 +53,7 @@ GelSight Mini, 28 mm long, may grow by 7 mm. A larger sensor needs a larger star
 """
 
 
-class PartsRest:
+class PartsInContact:
     """Constraint: parts that rest on one another must still do so after a search has moved them.
 
     A gel that has slipped off its tray, or a coating that has left its gel, can't be built. Parts
@@ -74,7 +74,7 @@ class PartsRest:
             if set(pair) & set(moved)
             and not any(design.parts[name].role is Role.INDENTER for name in pair)
         ]
-        self._seats: dict[tuple[str, str], tuple[Seat, Seat]] = {}
+        self._seats: dict[tuple[str, str], tuple[ContactPoints, ContactPoints]] = {}
 
     def __call__(self, design: SensorDesign) -> str | None:
         """Return a message with the two parts that have come apart, or None."""
@@ -97,18 +97,18 @@ class PartsRest:
                 )
         return None
 
-    def _seat(self, one: str, other: str) -> tuple[Seat, Seat]:
+    def _seat(self, one: str, other: str) -> tuple[ContactPoints, ContactPoints]:
         if (one, other) not in self._seats:
             first, second = self._meshes[one], self._meshes[other]
             pairs = find_coincident(first, second, CONTACT, facing=False).pairs
             self._seats[one, other] = (
-                Seat.of(first, np.unique(pairs[:, 0]), second),
-                Seat.of(second, np.unique(pairs[:, 1]), first),
+                ContactPoints.of(first, np.unique(pairs[:, 0]), second),
+                ContactPoints.of(second, np.unique(pairs[:, 1]), first),
             )
         return self._seats[one, other]
 
 
-class Seat(NamedTuple):
+class ContactPoints(NamedTuple):
     """Points of one part that touch another one.
 
     Attributes:
@@ -120,18 +120,18 @@ class Seat(NamedTuple):
     shares: NDArray[np.float64]
 
     @staticmethod
-    def of(mesh: TriangleMesh, faces: NDArray[np.int64], other: TriangleMesh) -> Seat:
+    def of(mesh: TriangleMesh, faces: NDArray[np.int64], other: TriangleMesh) -> ContactPoints:
         """Return points spread evenly over some faces of a mesh that touch another mesh."""
         reached = np.cumsum(mesh.face_areas[faces])
         if len(faces) == 0 or reached[-1] <= 0.0:
-            return Seat(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
+            return ContactPoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
         number = np.arange(SEAT_POINTS) + 0.5
         chosen = faces[np.searchsorted(reached, reached[-1] * number / SEAT_POINTS)]
         u, v = np.outer(PLASTIC, number) % 1.0
         u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
-        seat = Seat(chosen, np.stack([1.0 - u - v, u, v], axis=1))
+        seat = ContactPoints(chosen, np.stack([1.0 - u - v, u, v], axis=1))
         touch = np.isfinite(near_surface(seat.points(mesh), other))
-        return Seat(seat.faces[touch], seat.shares[touch])
+        return ContactPoints(seat.faces[touch], seat.shares[touch])
 
     def points(self, mesh: TriangleMesh) -> NDArray[np.float64]:
         """Return the positions (k, 3) of the points, mm, on the part in its present shape."""
@@ -149,7 +149,7 @@ class Seat(NamedTuple):
         return float(np.isfinite(near_surface(self.points(mesh), other)).mean())
 
 
-class LightsRest:
+class LightsOnSupports:
     """Constraint: lights that sit on an opaque part must stay on it after a search has moved the
     part.
 
@@ -192,7 +192,7 @@ class LightsRest:
         return None
 
 
-class LightsStayOut:
+class LightsOutsideParts:
     """Constraint: no light may be inside of a part in which it is not at the start.
 
     A light in the acrylic of a tray is brighter than one in front of it, but there is no room for
@@ -233,7 +233,7 @@ class LightsStayOut:
         return found
 
 
-class BentPartsRest:
+class DeformedPartsInContact:
     """Constraint: parts that a cage deforms must keep contact with the parts outside of the cage on
     which they lie, and must not grow into transparent parts.
 
@@ -254,7 +254,7 @@ class BentPartsRest:
         return None
 
 
-class StaysInSize:
+class SizeLimit:
     """Constraint: parts that a search deforms or moves may not reach far beyond the sensor that it
     starts from.
 
@@ -288,7 +288,7 @@ class StaysInSize:
         return {name: meshes[name].bounds for name in self._names if name in meshes}
 
 
-class SolidsStay:
+class SolidsStaySolid:
     """Constraint: a refractive index may not turn a solid or liquid into a gas, nor an air gap into
     a solid.
 

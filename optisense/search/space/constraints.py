@@ -34,7 +34,7 @@ class CrossingParts(NamedTuple):
     place: NDArray[np.float64]
 
 
-class PartsApart:
+class NoCrossings:
     """Constraint: no part may cut through another one that it does not cut in the starting design.
 
     Transparent solids may overlap if their priorities differ, and a sensing surface lies on its
@@ -86,11 +86,11 @@ class PartsApart:
         return self._known[one, other]
 
 
-class Unfolded:
+class NoFolds:
     """Constraint: no cage may fold a part or turn it inside out, because such a shape can't be
     made.
 
-    A part that is folded in the starting design is exempt, as `PartsApart` exempts parts that cut
+    A part that is folded in the starting design is exempt, as `NoCrossings` exempts parts that cut
     through each other there.
     """
 

@@ -21,7 +21,7 @@ LIGHT_OBJECTIVES = ("rgb2normal", "normdiff")
 """Objectives of this package that read pictures."""
 
 
-def turns_no_ray(path: str) -> bool:
+def changes_no_ray(path: str) -> bool:
     """Return whether a number of a design, by its path, changes only brightness and colours."""
     return _NO_RAY_TURNS.fullmatch(path.strip()) is not None
 
@@ -37,7 +37,7 @@ def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
         A sentence that says why and one that says what to do; None if there is nothing to warn of.
     """
     named, varied = list(objectives), list(paths)
-    if not named or not varied or not all(turns_no_ray(each) for each in varied):
+    if not named or not varied or not all(changes_no_ray(each) for each in varied):
         return None
     try:
         if not are_rays_only(named):

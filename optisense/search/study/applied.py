@@ -24,7 +24,7 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
     found = Provenance(
         status=Status.DERIVED,
         source=f"trial {trial.number} of a {settings.method} search for {settings.names[0]}, "
-        f"which scores {trial.fair_score:.4g}",
+        f"which scores {trial.unbiased_score:.4g}",
     )
     before = study.space.design
     # A cage is marked as a whole; other numbers are marked one by one.

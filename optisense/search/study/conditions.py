@@ -90,7 +90,7 @@ def lost(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
     return dict(sorted(found.items()))
 
 
-def lost_note(best: Trial | None, start: Trial | None) -> str | None:
+def worsened_note(best: Trial | None, start: Trial | None) -> str | None:
     """Return a note for the user if the score rose at the cost of another quantity, else None."""
     if best is None or start is None or best.is_start or not best.score > start.score:
         return None

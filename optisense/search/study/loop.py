@@ -21,7 +21,7 @@ from optisense.search.executors.base import outcome_of
 from optisense.search.methods import Method, Problem, make
 from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.best import tie_note
-from optisense.search.study.conditions import condition_note, lost_note
+from optisense.search.study.conditions import condition_note, worsened_note
 from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
 from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
 from optisense.search.study.rescoring import rescore
@@ -174,7 +174,7 @@ class StudyRun:
         several = self.method.several  # the result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
         told = [tie, condition_note(study.trials)]
-        told += [] if several else [lost_note(study.best, study.start)]
+        told += [] if several else [worsened_note(study.best, study.start)]
         notes = [*self._notes, *self.method.notes(), *(note for note in told if note is not None)]
         return SearchResult(study, interrupted, ended, tuple(notes))
 

@@ -25,7 +25,7 @@ from optisense.errors import OutputError, SearchError
 from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study.reader import Reader
-from optisense.search.study.store_errors import damaged, told
+from optisense.search.study.store_errors import damaged, translated_errors
 from optisense.untrusted_files import MOST_STORE, check_size
 
 FloatArray = NDArray[np.float64]
@@ -108,7 +108,7 @@ class Store:
             OutputError: the file can't be written.
         """
         store = Store(path, objectives)
-        with told(path):
+        with translated_errors(path):
             store._connect("rwc")
             with store._together() as db:
                 for statement in _TABLES.split(";"):
@@ -154,7 +154,7 @@ class Store:
                     where=str(self.path),
                     hint="Put the file itself into the study's folder",
                 )
-            with told(self.path):
+            with translated_errors(self.path):
                 self._connect("rw")
                 if not _has_conditions(self._writer):
                     self._writer.execute("alter table fresh_scores add column conditions text")
@@ -167,7 +167,7 @@ class Store:
     def close(self) -> None:
         """Close the file; the content of a store in memory is lost."""
         if self._db is not None:
-            with told(self.path):
+            with translated_errors(self.path):
                 self._db.close()
             self._db = None
 
@@ -187,7 +187,7 @@ class Store:
     @contextmanager
     def _read(self) -> Iterator[sqlite3.Connection]:
         """Yield a connection for reading."""
-        with told(self.path):
+        with translated_errors(self.path):
             if self._db is not None:
                 yield self._db
             else:
@@ -197,7 +197,7 @@ class Store:
 
     def set_fact(self, name: str, value: object) -> None:
         """Store a JSON-ready value under a name."""
-        with told(self.path):
+        with translated_errors(self.path):
             self._writer.execute(
                 "insert or replace into facts values (?, ?)", (name, json.dumps(value))
             )
@@ -222,7 +222,7 @@ class Store:
             (first + k, generation, place + k, np.ascontiguousarray(vector, "<f8").tobytes())
             for k, vector in enumerate(vectors)
         ]
-        with told(self.path), self._together() as db:
+        with translated_errors(self.path), self._together() as db:
             db.executemany(
                 "insert into trials (number, generation, place, vector) values (?, ?, ?, ?)", rows
             )
@@ -239,7 +239,7 @@ class Store:
             time.time(),
             number,
         )
-        with told(self.path):
+        with translated_errors(self.path):
             changed = self._writer.execute(
                 "update trials set done = 1, scores = ?, failure = ?, parts = ?, gradient = ?, "
                 "seconds = ?, worker = ?, finished = ? where number = ? and done = 0",
@@ -250,7 +250,7 @@ class Store:
 
     def finish_fresh(self, number: int, seed: int, outcome: Outcome) -> None:
         """Write the outcome of a trial with another seed."""
-        with told(self.path):
+        with translated_errors(self.path):
             self._writer.execute(
                 "insert or replace into fresh_scores (number, seed, scores, failure, conditions) "
                 "values (?, ?, ?, ?, ?)",

@@ -29,7 +29,7 @@ def damaged(what: str, path: Path | None, why: str) -> SearchError:
 
 
 @contextmanager
-def told(path: Path | None) -> Iterator[None]:
+def translated_errors(path: Path | None) -> Iterator[None]:
     """Turn errors of SQLite and of the file system into errors of this package."""
     try:
         yield

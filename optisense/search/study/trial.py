@@ -102,7 +102,7 @@ class Trial:
         return float(np.mean(values)) if values else math.nan
 
     @property
-    def fair_score(self) -> float:
+    def unbiased_score(self) -> float:
         """Score by the first objective, by fresh seeds if they were scored.
 
         The score by the study's seed, by which a trial was chosen, is too high on average.

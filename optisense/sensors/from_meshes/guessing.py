@@ -27,7 +27,7 @@ from optisense.sensors.from_meshes.files import (
     likely_units,
 )
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
-from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow, Over
+from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow, LightsOver
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
 from optisense.sensors.from_meshes.surfaces import WITHIN
 
@@ -281,7 +281,7 @@ def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightC
     return LightChoice(
         model=LIGHT,
         colour=colour,
-        over=Over(file=found.file, solid=found.body.name, towards=side, patches="all"),
+        over=LightsOver(file=found.file, solid=found.body.name, towards=side, patches="all"),
     )
 
 

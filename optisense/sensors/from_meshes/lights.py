@@ -11,7 +11,7 @@ from optisense.errors import ContactError, DesignError
 from optisense.geometry import SensingSurface, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle
 from optisense.sensors.from_meshes.directions import Direction, axis_of, vector
-from optisense.sensors.from_meshes.recipe_lights import LightRow, Over, Ring
+from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
 
 FloatArray = NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def ring(choice: Ring, bounds: FloatArray) -> list[Light]:
     return lights
 
 
-def over(choice: Over, mesh: TriangleMesh, patches: list[Faces], where: str) -> list[Light]:
+def over(choice: LightsOver, mesh: TriangleMesh, patches: list[Faces], where: str) -> list[Light]:
     """Return lights over a surface: one on the middle of each patch, or a row or grid on the
     largest.
 
@@ -152,7 +152,7 @@ def _direction(given: Direction, normal: FloatArray) -> FloatArray:
 
 
 def _grid(
-    choice: Over, mesh: TriangleMesh, patch: Faces, where: str
+    choice: LightsOver, mesh: TriangleMesh, patch: Faces, where: str
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Return position and normal of each light of a row or grid."""
     along, across, normal, outline = _frame(mesh, patch, where)

@@ -15,7 +15,7 @@ from optisense.design import Role
 from optisense.design.fields import (
     Count,
     Fraction,
-    MisfitError,
+    InconsistentValueError,
     Model,
     Name,
     Number,
@@ -97,7 +97,7 @@ class Recipe(Model):
     @model_validator(mode="after")
     def _references_hold(self) -> Recipe:
         if not any(part.role is Role.SENSING_SURFACE for part in self.parts.values()):
-            raise MisfitError(
+            raise InconsistentValueError(
                 "no part is a sensing_surface",
                 ("parts",),
                 "Give one part this role, or add one with faces_of and towards",
@@ -105,10 +105,12 @@ class Recipe(Model):
         for path, name in self._named_parts():
             if name not in self.parts:
                 hint = suggestion(name, self.parts)
-                raise MisfitError(f"there is no part '{name}' in this recipe", path, hint)
+                raise InconsistentValueError(
+                    f"there is no part '{name}' in this recipe", path, hint
+                )
         for name, part in self.parts.items():
             if part.faces_of is not None and self.parts[part.faces_of].faces_of is not None:
-                raise MisfitError(
+                raise InconsistentValueError(
                     f"part '{part.faces_of}' consists of faces of another part itself",
                     ("parts", name, "faces_of"),
                     "Name the part that has the file",

@@ -114,7 +114,7 @@ class Ring(Model):
     )
 
 
-class Over(ShapeReference):
+class LightsOver(ShapeReference):
     """Lights over a reference surface, such as the front of a circuit board."""
 
     count: CountOrTwo | None = Field(
@@ -129,13 +129,13 @@ class Over(ShapeReference):
     )
 
     @model_validator(mode="after")
-    def _not_too_many(self) -> Over:
+    def _not_too_many(self) -> LightsOver:
         if isinstance(self.count, tuple) and self.count[0] * self.count[1] > MOST_LIGHTS:
             raise ValueError(f"{self.count[0]} x {self.count[1]} are more than {MOST_LIGHTS}")
         return self
 
 
-class Along(Model):
+class LightsAlong(Model):
     """Lights along the outline of a part, such as on a flexible strip around its edge."""
 
     edge_of: Name = Field(description="around this part")
@@ -212,8 +212,10 @@ class LightChoice(Model):
     flux: NonNegative = Field(default=10.0, description="mW of each light")
     row: LightRow | None = Field(default=None, description="lights along one side of a part's box")
     ring: Ring | None = Field(default=None, description="lights in a circle around a part")
-    over: Over | None = Field(default=None, description="lights over a surface")
-    along: Along | None = Field(default=None, description="lights along the outline of a part")
+    over: LightsOver | None = Field(default=None, description="lights over a surface")
+    along: LightsAlong | None = Field(
+        default=None, description="lights along the outline of a part"
+    )
     table: FromTable | None = Field(
         default=None, alias="from", description="lights of a pick-and-place file"
     )

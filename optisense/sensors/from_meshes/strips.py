@@ -15,7 +15,7 @@ from optisense.near import suggestion
 from optisense.sensors.from_meshes.directions import axis_of, vector
 from optisense.sensors.from_meshes.lights import evenly, light
 from optisense.sensors.from_meshes.pick_and_place import BoardPart
-from optisense.sensors.from_meshes.recipe_lights import Along, FromTable
+from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ MISFIT = 0.2
 """Largest difference between distances of points on the board and in the sensor, mm."""
 
 
-def along(choice: Along, mesh: TriangleMesh) -> list[Light]:
+def along(choice: LightsAlong, mesh: TriangleMesh) -> list[Light]:
     """Return lights along the outline of a part, cut across an axis.
 
     Args:

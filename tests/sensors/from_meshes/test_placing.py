@@ -14,7 +14,7 @@ from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes.camera import make_camera
 from optisense.sensors.from_meshes.lights import over, ring, row
 from optisense.sensors.from_meshes.recipe import CameraChoice
-from optisense.sensors.from_meshes.recipe_lights import LightRow, Over, Ring
+from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
 from optisense.sensors.from_meshes.surfaces import pick
 
 BOUNDS = np.array([[-12.0, -10.0, -3.0], [12.0, 10.0, 1.0]])
@@ -70,7 +70,7 @@ class TestOver:
     board = TriangleMesh.box((-20, -5, 0), (20, 5, 1.6))
 
     def spots(self, mesh: TriangleMesh, **choice: Any) -> list[Any]:
-        shape = Over(file="board.stl", towards="+z", **choice)
+        shape = LightsOver(file="board.stl", towards="+z", **choice)
         return over(shape, mesh, pick(mesh, shape, "lights"), "lights")
 
     def test_a_grid_over_a_board(self) -> None:
@@ -95,7 +95,7 @@ class TestOver:
     def test_over_a_ball_the_pitch_runs_along_the_surface(self) -> None:
         ball = trimesh.creation.icosphere(subdivisions=5, radius=10.0)
         mesh = TriangleMesh(ball.vertices, ball.faces).welded()
-        shape = Over(file="b.stl", towards="+z", within=60, count=3, pitch=5.0, gap=0.5)
+        shape = LightsOver(file="b.stl", towards="+z", within=60, count=3, pitch=5.0, gap=0.5)
         lights = over(shape, mesh, pick(mesh, shape, "lights"), "lights")
         np.testing.assert_allclose(np.linalg.norm(places(lights), axis=1), 10.5, atol=0.01)
         np.testing.assert_allclose(ways(lights), places(lights) / 10.5, atol=0.02)
@@ -103,7 +103,7 @@ class TestOver:
         np.testing.assert_allclose(np.arccos(cosine), 5.0 / 10.0, atol=0.01)
 
     def test_a_surface_that_looks_everywhere_is_refused(self) -> None:
-        shape = Over(file="b.stl", count=3)
+        shape = LightsOver(file="b.stl", count=3)
         with pytest.raises(DesignError, match="to all sides"):
             over(shape, self.board, pick(self.board, shape, "lights"), "lights")
 

@@ -20,7 +20,7 @@ from optisense.optics.backend.sequences import STEPS_2D, unit_float
 from optisense.optics.radiance_cache.beam_sums import sum_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.glossy_interreflection import (
-    PlacesSeen,
+    SecondaryHits,
     light_of,
     shading_points,
 )
@@ -37,7 +37,7 @@ MIN_LANES = 2
 arrays of one entry."""
 
 
-def thrown_back(
+def mirrored_contacts(
     field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, rays: int
 ) -> tuple[VisiblePoints, list[mi.Color3f]] | None:
     """Return the light that indenters reflect to visible points through the interfaces.
@@ -76,7 +76,7 @@ def thrown_back(
         end.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
     seen = replace(dr.gather(VisiblePoints, points, owner), **vars(end))
     dr.eval(seen)
-    return seen, _changes(field, scenes, seen)
+    return seen, _radiance_differences(field, scenes, seen)
 
 
 def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEnd, mi.UInt32]]:
@@ -120,7 +120,9 @@ def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEn
     yield again, lanes
 
 
-def _changes(field: RadianceCache, scenes: ContactScenes, seen: VisiblePoints) -> list[mi.Color3f]:
+def _radiance_differences(
+    field: RadianceCache, scenes: ContactScenes, seen: VisiblePoints
+) -> list[mi.Color3f]:
     """Return the radiance of places on indenters minus that of the undeformed skin behind them."""
     away = -seen.towards_eye
     behind = scenes.fixed.intersect(Ray(seen.point, away, seen.valid))
@@ -137,6 +139,6 @@ def _changes(field: RadianceCache, scenes: ContactScenes, seen: VisiblePoints) -
     coating = coating_of(scenes.full.table, behind.surface, behind.valid)
     flat = ShadingPoints(skin, coating, base, cell, shift, found & behind.valid, mi.Bool(False))
     without = sum_beams(field.beams, field.groups, flat)
-    places = PlacesSeen(seen, mi.Bool(seen.valid), cell)
+    places = SecondaryHits(seen, mi.Bool(seen.valid), cell)
     lit = light_of(field, scenes, shading_points(field, scenes, places))
     return [one - other for one, other in zip(lit, without, strict=True)]

@@ -1,4 +1,4 @@
-"""Light that contacts throw back by way of the interfaces, and how few samples of it are spread."""
+"""Light of contacts that a metal coating reflects through the interfaces, and its averaging."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from .contacts import pressing, sensing_surface
 from .gather import part_names
 
 
-def offending(
+def objects_at(
     scene: bpy.types.Scene, path: str, part: str, contact: int | None = None
 ) -> list[bpy.types.Object]:
     """Return the objects at a place in the design; empty if there are none.

@@ -11,7 +11,7 @@ from optisense.errors import OptiSenseError
 _T = TypeVar("_T")
 
 
-class MadeOnce:
+class CachedValues:
     """Base class of objects that keep the values that they have computed.
 
     Attributes:
