@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
+from optisense.errors import DesignError
 
 LARGEST = 1000.0
 """Largest size of a part, and largest distance of a light or camera from the origin, mm; larger
 numbers come from a wrong unit.
 """
+
+MILLIMETRES = "Give positions in millimetres"
+"""Remedy for places that are too far away."""
 
 SMALLEST = 0.5
 """Smallest size of a part in its largest dimension, mm; thin parts are larger in the others."""
@@ -53,16 +58,33 @@ def unit_slips(design: SensorDesign) -> list[Diagnostic]:
                 )
             )
     for label, position, path in placed_things(design):
-        distance = float(np.linalg.norm(position))
-        if distance > LARGEST:
-            problems.append(
-                Diagnostic(
-                    f"{label} is {distance:.6g} mm from the origin: not in millimetres?",
-                    design.where(*path),
-                    "Give positions in millimetres",
-                )
-            )
+        slip = place_slip(position)
+        if slip is not None:
+            problems.append(Diagnostic(f"{label} {slip}", design.where(*path), MILLIMETRES))
     return problems
+
+
+def refuse_far(label: str, position: ArrayLike) -> None:
+    """Refuse a place that no light or camera of a sensor has.
+
+    Args:
+        label: name of the light or camera in the message.
+        position: position (3,), mm.
+
+    Raises:
+        DesignError: the place is farther from the origin than `LARGEST`, or not finite.
+    """
+    slip = place_slip(position)
+    if slip is not None:
+        raise DesignError(f"{label} {slip}", hint=MILLIMETRES)
+
+
+def place_slip(position: ArrayLike) -> str | None:
+    """Return what is wrong with the place of a light or camera, or None."""
+    distance = float(np.linalg.norm(position))
+    if distance <= LARGEST:
+        return None
+    return f"is {distance:.6g} mm from the origin: not in millimetres?"
 
 
 def placed_things(

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from optisense import library
 from optisense.design import Camera
+from optisense.design.limits import refuse_far
 from optisense.design.projection import picture_places
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
@@ -54,7 +55,8 @@ def make_camera(
 
     Raises:
         LibraryError: there is no such camera.
-        DesignError: the camera looks at its own position, or `up` is the viewing direction.
+        DesignError: the camera looks at its own position, `up` is the viewing direction, or the
+            camera is more than a metre from the origin.
     """
     model = library.camera(choice.model)
     width, height = choice.resolution or standard_resolution(model)
@@ -88,6 +90,7 @@ def make_camera(
             where="camera.up",
             hint="Choose an up that points to the top of the picture",
         )
+    refuse_far("the camera", place)
     x, y, z = (np.round(place, 6) + 0.0).tolist()
     dx, dy, dz = (np.round(look, 9) + 0.0).tolist()
     ux, uy, uz = (up + 0.0).tolist()

@@ -7,6 +7,7 @@ import shapely
 from numpy.typing import NDArray
 
 from optisense.design import Light
+from optisense.design.limits import refuse_far
 from optisense.errors import ContactError, DesignError
 from optisense.geometry import SensingSurface, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle
@@ -136,7 +137,12 @@ def evenly(count: int, pitch: float | None, length: float) -> FloatArray:
 
 
 def light(place: FloatArray, way: FloatArray, up: FloatArray) -> Light:
-    """Return a light with rounded numbers, which make a design easier to read."""
+    """Return a light with rounded numbers, which make a design easier to read.
+
+    Raises:
+        DesignError: the place is more than a metre from the origin.
+    """
+    refuse_far("a light", place)
     clean = [np.round(v, 6) + 0.0 for v in (place, way, up)]
     (px, py, pz), (dx, dy, dz), (ux, uy, uz) = (v.tolist() for v in clean)
     parallel = np.linalg.norm(np.cross(way, up)) < 1e-6

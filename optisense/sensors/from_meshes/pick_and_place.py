@@ -8,7 +8,6 @@ converted to mm.
 from __future__ import annotations
 
 import csv
-import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +31,10 @@ NEEDED = ("designator", "x", "y")
 LONGEST_LINE = 10_000
 """Most characters of one line. A row of the programs named above has a few hundred; Python's reader
 of tables refuses cells of more than 131,072."""
+
+LARGEST = 10_000.0
+"""Largest coordinate of a part, mm, and largest rotation, degrees: a panel of boards is smaller
+than a metre."""
 
 _UNIT = re.compile(r"\b(mm|mils?|inch(?:es)?|in|thou)\b", re.IGNORECASE)
 _NUMBER = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*(mm|mils?|inch|in)?$", re.IGNORECASE)
@@ -141,9 +144,10 @@ def _placed(
         x, y = (_length(cell(key), unit, path, number) for key in ("x", "y"))
         turn = _NUMBER.match(cell("rotation"))
         rotation = float(turn[1]) if turn else 0.0
-        if not all(map(math.isfinite, (x, y, rotation))):
+        if not all(abs(value) <= LARGEST for value in (x, y, rotation)):
             raise DesignError(
-                f"the position or rotation of '{brief(name)}' is too large a number",
+                f"the position or rotation of '{brief(name)}' is too large a number: at most "
+                f"{LARGEST:,.0f} mm or degrees are read",
                 where=f"{path}:{number}",
                 hint="Export the file again",
             )

@@ -234,6 +234,7 @@ def test_pick_and_place_files_of_all_programs(
         ("a,b\n1,2\n", "no pick-and-place file"),
         (ALTIUM.replace("-500.000", "here"), "'here' is no length"),
         (ALTIUM.split('"D1"')[0], "has no parts"),
+        (ALTIUM.replace("-500.000", "1" * 31), "too large a number: at most 10,000 mm"),
         ("[" * 200_000, "no pick-and-place file: the line has 200,000 characters"),
     ],
 )
