@@ -1,4 +1,5 @@
-"""Gloss on parts: bright rims and highlights on gel and acrylic, reflections on mirrors.
+"""Gloss on parts: bright rims and highlights on gel and acrylic, reflections on mirrors, and the
+tint of ghosts.
 
 Blender's solid mode draws the colours and opacities; the gloss is drawn over them and, like all of
 that mode, works with software OpenGL.
@@ -13,6 +14,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
+from ..scene import kinds
 from ..scene.collections import objects_of
 from . import drawing, section
 from .drawing import MOST_FACES, in_world
@@ -31,6 +33,11 @@ what it reflects.
 
 METAL = ("mirror",)
 """Roles of parts that reflect."""
+
+GLASS, REFLECTING, TINTED = 0.0, 1.0, 2.0
+"""Surfaces that the shader knows. A tinted one is a ghost: it has its own colour, and its opacity
+is the same all over.
+"""
 
 KEY = (-0.4, 0.7, 0.6)
 """Direction to the light that makes the highlights: components to the right, up and towards the
@@ -54,7 +61,9 @@ void main() {
   if (dot(n, to_eye) < 0.0) n = -n;
   float facing = dot(n, to_eye);
   float gloss = pow(max(dot(n, normalize(key.xyz + to_eye)), 0.0), 60.0);
-  if (key.w > 0.5) {
+  if (key.w > 1.5) {
+    shown = vec4(colour.rgb * (0.5 + 0.5 * facing) + 0.3 * gloss, colour.a);
+  } else if (key.w > 0.5) {
     float up = dot(reflect(-to_eye, n), key.xyz);
     float sky = smoothstep(-0.1, 0.25, up) * (0.55 + 0.45 * up);
     shown = vec4(mix(vec3(0.12, 0.14, 0.17), colour.rgb, clamp(sky + gloss, 0.0, 1.0)), colour.a);
@@ -95,9 +104,25 @@ def draw(scene: bpy.types.Scene) -> None:
             continue
         batch = _batch(part)
         if batch is not None:
-            shader.uniform_float("key", (*key, float(role in METAL)))
+            shader.uniform_float("key", (*key, REFLECTING if role in METAL else GLASS))
             shader.uniform_float("colour", GLOSS[role])
             batch.draw(shader)
+    _draw_ghosts(scene, shader, key)
+
+
+def _draw_ghosts(scene: bpy.types.Scene, shader: Any, key: Vector) -> None:
+    """Tint the best parts of a search, also where parts of the sensor are in front of them."""
+    import gpu
+
+    ghosts = [e for e in objects_of(scene, "SHOWN") if e.optisense.key.startswith(kinds.GHOST)]
+    gpu.state.depth_test_set("NONE")
+    for ghost in ghosts:
+        batch = _batch(ghost) if ghost.visible_get() else None
+        if batch is not None:
+            shader.uniform_float("key", (*key, TINTED))
+            shader.uniform_float("colour", tuple(ghost.color))
+            batch.draw(shader)
+    gpu.state.depth_test_set("LESS_EQUAL")
 
 
 def _made() -> Any:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..core.vary import curve_picture
 from ..engine import session
 from ..scene.collections import collection, object_of, objects_of
+from ..scene.kinds import GHOST
 from ..scene.meshes import part_mesh
 from ..simulate import picture
 
@@ -85,11 +86,11 @@ def show_ghosts(scene: bpy.types.Scene, shapes: dict[str, Any]) -> None:
         faces = faces[_moved(scene, name, vertices)[faces].any(axis=1)]
         if len(faces) == 0:
             continue
-        mesh = bpy.data.meshes.new(f"ghost {name}")
+        mesh = bpy.data.meshes.new(f"{GHOST}{name}")
         mesh.from_pydata(vertices.tolist(), [], faces.tolist(), shade_flat=False)
-        ghost = bpy.data.objects.new(f"ghost {name}", mesh)
+        ghost = bpy.data.objects.new(f"{GHOST}{name}", mesh)
         ghost.optisense.kind = "SHOWN"
-        ghost.optisense.key = f"ghost {name}"
+        ghost.optisense.key = f"{GHOST}{name}"
         ghost.color = COLOUR
         ghost.show_in_front = True
         ghost.hide_select = True
@@ -108,7 +109,7 @@ def _moved(scene: bpy.types.Scene, name: str, vertices: NDArray[np.float64]) -> 
 def clear_ghosts(scene: bpy.types.Scene) -> None:
     """Remove the objects of `show_ghosts`."""
     for each in objects_of(scene, "SHOWN"):
-        if each.optisense.key.startswith("ghost "):
+        if each.optisense.key.startswith(GHOST):
             mesh = each.data
             bpy.data.objects.remove(each)
             bpy.data.meshes.remove(mesh)

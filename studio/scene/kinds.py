@@ -59,6 +59,9 @@ SKINS: Items = [
     ("conforming", "Conforming", "The skin takes the shape of what presses, and no force is known"),
 ]
 
+GHOST = "ghost "
+"""Beginning of the keys of objects that show the best parts of a search."""
+
 LOOKS: dict[str, tuple[float, float, float, float]] = {
     "sensing_surface": (0.55, 0.57, 0.6, 0.5),
     "elastomer": (0.95, 0.62, 0.35, 0.16),

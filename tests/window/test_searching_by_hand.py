@@ -28,8 +28,9 @@ TOLD = "manager.optisense_found"
 OPTIMISE = 6
 """The panel's place in the sidebar; the first is 0."""
 
-A_GHOST = 10_000
-"""Pixels of the view that a ghost covers at least."""
+A_GHOST, NO_GHOST = 10_000, 2_000
+"""Pixels of the view that a ghost covers at least, and at most as many that have its colour without
+one: there are 972 where the beams of a blue and a green lamp overlap."""
 
 MANY, TRIALS = 5000, 150
 """Trials of a search that is given up, and of one that is not over before Blender is closed."""
@@ -86,7 +87,7 @@ def test_the_best_so_far_is_a_ghost_until_the_search_is_given_up(bench: Bench) -
     bench.press("optisense.cancel", across=0.9)
     bench.until("not state().busy")
     assert bench.see(f"{TOLD}.ended").endswith("stopped")
-    assert not bench.see(GHOSTS) and ghost_pixels(bench) < A_GHOST / 100
+    assert not bench.see(GHOSTS) and ghost_pixels(bench) < NO_GHOST
     bench.bring("optisense.apply_best", 0.9, across=0.25)
     bench.photograph("given-up")
 
@@ -146,5 +147,5 @@ def test_the_ghost_becomes_the_sensor(bench: Bench) -> None:
     height = bench.see(f"float({POINTS}[14][2])")
     skin = bench.see("max(v.co.z for v in bpy.data.objects['skin'].data.vertices)")
     assert skin == pytest.approx(height / 4, abs=1e-4), "the weight of that point in its middle"
-    assert not bench.see(GHOSTS) and ghost_pixels(bench) < A_GHOST / 100
+    assert not bench.see(GHOSTS) and ghost_pixels(bench) < NO_GHOST
     bench.photograph("applied")
