@@ -40,19 +40,25 @@ class OPTISENSE_PG_calibration(bpy.types.PropertyGroup):
     )  # fmt: skip
     kept: EnumProperty(
         name="Keep", items=_families, options={"ENUM_FLAG", "SKIP_SAVE"},
-        description="What stays as it is in the design",
+        description="Groups of numbers that the fit leaves as they are in the design",
     )  # fmt: skip
     ball: FloatProperty(
         name="Ball (mm)", min=0.0, max=1000.0, precision=2, options={"SKIP_SAVE"},
-        description="Diameter of the ball, where the folder does not say it; 0 is as it says",
+        description="Diameter of the ball in mm if presses.csv does not give it; with 0, the file "
+        "is used",
     )  # fmt: skip
     as_labelled: BoolProperty(
         name="Take Labels as They Are", options={"SKIP_SAVE"},
-        description="Take labelled contacts as they are, instead of looking for them nearby",
+        description="Use the contact positions of presses.csv unchanged; otherwise each contact "
+        "is searched for near its position",
     )  # fmt: skip
-    result: StringProperty(description="What came of it, in lines", options={"SKIP_SAVE"})
-    folder: StringProperty(description="The fitted design", options={"SKIP_SAVE"})
-    page: StringProperty(description="The page about it", options={"SKIP_SAVE"})
+    result: StringProperty(
+        description="Summary of the calibration, one statement a line", options={"SKIP_SAVE"}
+    )
+    folder: StringProperty(description="Folder of the fitted design", options={"SKIP_SAVE"})
+    page: StringProperty(
+        description="File of the report about the calibration", options={"SKIP_SAVE"}
+    )
 
 
 def _values(context: bpy.types.Context) -> OPTISENSE_PG_calibration:
@@ -65,7 +71,9 @@ class OPTISENSE_OT_keep_family(bpy.types.Operator):
     bl_idname = "optisense.keep_family"
     bl_label = "May Change"
 
-    family: StringProperty(name="What", description="Of the numbers that can be fitted")
+    family: StringProperty(
+        name="Numbers", description="Group of numbers to add to the fit, or to leave out"
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         values = _values(context)

@@ -68,7 +68,9 @@ class OPTISENSE_OT_help(bpy.types.Operator):
     bl_label = "Help"
     bl_options = {"INTERNAL"}
 
-    topic: StringProperty(name="Topic", description="A panel, or a page", default="Sensor")
+    topic: StringProperty(
+        name="Topic", description="Panel or page of the documentation to open", default="Sensor"
+    )
 
     @classmethod
     def description(cls, context: bpy.types.Context, values: bpy.types.OperatorProperties) -> str:

@@ -31,7 +31,8 @@ class OPTISENSE_AP_preferences(bpy.types.AddonPreferences):
 
     engine: StringProperty(
         name="Engine",
-        description="How to start the engine, for example /home/me/.venv/bin/optisense engine",
+        description="Command that starts the engine, for example /home/me/.venv/bin/optisense "
+        "engine",
         update=_changed,
     )
 

@@ -38,22 +38,28 @@ when_leaving: list[Callable[[], None]] = []
 class OPTISENSE_PG_session(bpy.types.PropertyGroup):
     """State of the engine and its job, as the panels show it; never saved."""
 
-    busy: StringProperty(description="What the engine works on", options={"SKIP_SAVE"})
+    busy: StringProperty(description="Title of the running job", options={"SKIP_SAVE"})
     about: StringProperty(
-        description="The long job that the messages are about", options={"SKIP_SAVE"}
+        description="Title of the job that the messages belong to", options={"SKIP_SAVE"}
     )
     fraction: FloatProperty(options={"SKIP_SAVE"})
     per_cent: FloatProperty(
-        name="Progress", description="How much is done", subtype="PERCENTAGE", min=0.0, max=100.0,
-        precision=0, get=lambda self: 100.0 * self.fraction, options={"SKIP_SAVE"},
-    )  # fmt: skip
+        name="Progress",
+        description="Share of the running job that is done",
+        subtype="PERCENTAGE",
+        min=0.0,
+        max=100.0,
+        precision=0,
+        get=lambda self: 100.0 * self.fraction,
+        options={"SKIP_SAVE"},
+    )
     progress: StringProperty(options={"SKIP_SAVE"})
     cancelling: BoolProperty(options={"SKIP_SAVE"})
     problem: StringProperty(options={"SKIP_SAVE"})
     hint: StringProperty(options={"SKIP_SAVE"})
     note: StringProperty(options={"SKIP_SAVE"})
     written: StringProperty(
-        description="The page or folder that was written last", options={"SKIP_SAVE"}
+        description="Page or folder that was written last", options={"SKIP_SAVE"}
     )
 
 

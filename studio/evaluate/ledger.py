@@ -20,8 +20,10 @@ TITLE = "Following light"
 class OPTISENSE_PG_ledger(bpy.types.PropertyGroup):
     """Last ledger; never saved."""
 
-    groups: StringProperty(description="The ledger as JSON", options={"SKIP_SAVE"})
-    places: StringProperty(description="The light at places as JSON", options={"SKIP_SAVE"})
+    groups: StringProperty(
+        description="Light ledger of the light groups as JSON", options={"SKIP_SAVE"}
+    )
+    places: StringProperty(description="Light at points of the skin as JSON", options={"SKIP_SAVE"})
 
 
 class OPTISENSE_OT_ledger(polls.Asking, bpy.types.Operator):

@@ -32,7 +32,9 @@ class OPTISENSE_OT_choose_objective(bpy.types.Operator):
     bl_label = "Choose Objective"
     bl_options = {"INTERNAL"}
 
-    objective: StringProperty(name="Objective", description="By the engine's name of it")
+    objective: StringProperty(
+        name="Objective", description="Name of the objective to select or clear"
+    )
 
     @classmethod
     def description(cls, context: bpy.types.Context, values: bpy.types.OperatorProperties) -> str:
@@ -143,7 +145,11 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
     bl_idname = "optisense.show_figure"
     bl_label = "Open Figure"
 
-    objective: StringProperty(name="Objective", description="Whose figure; empty for the first")
+    objective: StringProperty(
+        name="Objective",
+        description="Name of the score whose figure is opened; if empty, the first score that has "
+        "one",
+    )
 
     checks = (
         polls.requires(

@@ -29,23 +29,26 @@ class OPTISENSE_PG_score(bpy.types.PropertyGroup):
 
     title: StringProperty()
     value: StringProperty()
-    number: FloatProperty(description="The value in single precision")
-    share: FloatProperty(description="How good it is, 0 to 1")
+    number: FloatProperty(description="Value of the score in single precision")
+    share: FloatProperty(
+        description="Position between the worst (0) and the best (1) built-in sensor"
+    )
     per_cent: FloatProperty(
         name="How good", subtype="PERCENTAGE", min=0.0, max=100.0, precision=0,
-        description="From the poorest (0) to the best (100) of the built-in sensors, or of all "
+        description="Position between the worst (0) and the best (100) built-in sensor, or "
+        "between all "
         "values that the objective can have",
         get=lambda self: 100.0 * self.share,
     )  # fmt: skip
-    has_share: BoolProperty(description="Its objective says what is poor and what is good")
+    has_share: BoolProperty(description="Whether the objective has a scale from worst to best")
     unit: StringProperty()
-    direction: StringProperty(description="Which way it is good, in words")
-    change: StringProperty(description="Since the scores before, in words")
-    is_open: BoolProperty(name="Details", description="Show its parts and its figure")
-    is_live: BoolProperty(description="It was scored while the sensor was edited")
-    parts: StringProperty(description="One 'name: number' a line")
+    direction: StringProperty(description="Whether higher or lower values are better, in words")
+    change: StringProperty(description="Change since the last evaluation, in words")
+    is_open: BoolProperty(name="Details", description="Show the parts and the figure of this score")
+    is_live: BoolProperty(description="Whether the score was computed while the sensor was edited")
+    parts: StringProperty(description="Parts of the score, one 'name: number' a line")
     failure: StringProperty()
-    figure: StringProperty(description="A picture file")
+    figure: StringProperty(description="File of the picture that explains the score")
 
 
 class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
@@ -55,27 +58,31 @@ class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
         name="Objectives",
         items=catalogue.objectives,
         options={"ENUM_FLAG", "SKIP_SAVE"},
-        description="What the sensor is scored by",
+        description="Objectives with which the sensor is evaluated",
     )
     live: BoolProperty(
         name="Score while editing",
-        description="Keep the scores up to date that trace rays only, such as AOAP, while the "
+        description="Update the scores that only trace rays, such as AOAP, while the "
         "camera, parts and cages are moved",
         update=_live_changed,
         options={"SKIP_SAVE"},
     )
     own: StringProperty(
         name="Your own",
-        description="An objective of your own, scored with the others: FILE.py:FUNCTION, or only "
+        description="Your own objective, evaluated with the others: FILE.py:FUNCTION, or only "
         "FILE.py where a decorator in it says which function it is",
         subtype="FILE_PATH",
         options={"SKIP_SAVE"},
     )
     is_before: BoolProperty(
-        description="They are of the sensor that was open before", options={"SKIP_SAVE"}
+        description="Whether the scores belong to the sensor that was open before",
+        options={"SKIP_SAVE"},
     )
     scores: CollectionProperty(type=OPTISENSE_PG_score, options={"SKIP_SAVE"})
-    rays: StringProperty(description="What became of the chief rays", options={"SKIP_SAVE"})
+    rays: StringProperty(
+        description="Numbers of chief rays that reach the skin, escape or are absorbed",
+        options={"SKIP_SAVE"},
+    )
 
 
 PROPERTIES = {"WindowManager": {"optisense_evaluation": OPTISENSE_PG_evaluation}}

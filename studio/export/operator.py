@@ -23,7 +23,9 @@ class OPTISENSE_OT_report(polls.Checked, ChoosingFile, bpy.types.Operator):
     bl_idname = "optisense.report"
     bl_label = "Write Report"
 
-    filepath: StringProperty(name="File", description="The page to write", subtype="FILE_PATH")
+    filepath: StringProperty(
+        name="File", description="File of the report, an HTML page", subtype="FILE_PATH"
+    )
     check_existing: BoolProperty(default=True, options={"HIDDEN"})
     filter_glob: StringProperty(default="*.html", options={"HIDDEN"})
 
@@ -55,12 +57,19 @@ class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
     bl_idname = "optisense.export"
     bl_label = "Export for the Workshop"
 
-    filepath: StringProperty(name="Folder", description="Where to", subtype="DIR_PATH")
-    stl: BoolProperty(name="STL", description="Triangles, for printing; in mm", default=True)
-    obj: BoolProperty(name="OBJ", description="Triangles, for modelling programs; in mm")
-    three_mf: BoolProperty(name="3MF", description="Triangles with their unit, for printing")
+    filepath: StringProperty(
+        name="Folder", description="Folder into which the files are written", subtype="DIR_PATH"
+    )
+    stl: BoolProperty(
+        name="STL", description="Write triangle meshes in mm for 3D printing", default=True
+    )
+    obj: BoolProperty(name="OBJ", description="Write triangle meshes in mm for modelling programs")
+    three_mf: BoolProperty(
+        name="3MF", description="Write triangle meshes with their unit for 3D printing"
+    )
     step: BoolProperty(
-        name="STEP", description="Solids, for CAD; needs the extra 'step' of the package"
+        name="STEP",
+        description="Write solids for CAD programs; needs the extra 'step' of the package",
     )
 
     def suggested(self, context: bpy.types.Context) -> str:

@@ -88,40 +88,42 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
     bl_options = {"REGISTER", "UNDO"}
 
     model: EnumProperty(
-        name="Model", items=_light_models, description="The library's light of a new group"
+        name="Model", items=_light_models, description="Lamp of the library for the new group"
     )
     group: EnumProperty(
         name="Group", items=_groups,
-        description="The lights of a group share model, colour and flux, and are relit together",
+        description="Group of the new lights; all lights of a group have the same model, colour "
+        "and flux",
     )  # fmt: skip
     name: StringProperty(
         name="Name of a new group", default="white",
-        description="Letters, digits, - and _; it gets a number where there is such a group",
+        description="Letters, digits, - and _; a number is appended if a group already has this "
+        "name",
     )  # fmt: skip
     colour: FloatVectorProperty(
         name="Colour of a new group", size=3, min=0.0, max=1.0, subtype="COLOR",
         default=(1.0,) * 3,
-        description="How the flux is shared among R, G, B; only ratios count",
+        description="Shares of the flux in red, green and blue; only their ratios matter",
     )  # fmt: skip
     flux: FloatProperty(
         name="Flux of a new group (mW)", min=0.0, max=1e6, default=2.0,
-        description="mW, radiant flux of each light",
+        description="Radiant flux of each light, mW",
     )  # fmt: skip
     count: IntProperty(
-        name="Count", min=1, max=1000, default=1, description="How many lights, in a row"
+        name="Count", min=1, max=1000, default=1, description="Number of lights in the row"
     )
     pitch: FloatProperty(
-        name="Pitch (mm)", description="mm, between the middles of neighbours in the row; 0 leaves "
-        f"{GAP:g} mm between lamps of this size",
+        name="Pitch (mm)", description="Distance between the centres of neighbouring lights, mm; "
+        f"0 leaves a gap of {GAP:g} mm between the lamps",
         min=0.0, default=0.0,
     )  # fmt: skip
     place: FloatVectorProperty(
         name="Place (mm)", size=3, precision=3,
-        description="mm, of the middle of the row where no light reference is selected",
+        description="Middle of the row, mm; used if no light reference is selected",
     )  # fmt: skip
     aim: EnumProperty(
         name="Aim", items=AIMS, default="SURFACE",
-        description="Which way the lights shine where no light reference is selected",
+        description="Direction of the lights; used if no light reference is selected",
     )  # fmt: skip
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -245,12 +247,12 @@ class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Ope
 
     model: EnumProperty(
         name="Model", items=_camera_models,
-        description="The library's camera; its picture is 320 pixels wide at most, to begin with",
+        description="Camera of the library; its picture is first made at most 320 pixels wide",
     )  # fmt: skip
     imaging: BoolProperty(
         name="With Noise and Colours", default=False,
-        description="Take over what the library knows of its lens, its sensor and its processor, "
-        "such as noise, shading, colour matrix and tone curve; else it is an ideal camera",
+        description="Copy the library's data on lens, image sensor and image processing, "
+        "such as noise, shading, colour matrix and tone curve; otherwise the camera is ideal",
     )  # fmt: skip
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -298,8 +300,10 @@ class OPTISENSE_OT_set_model(polls.Designing, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
     bl_property = "model"
 
-    model: EnumProperty(name="Model", items=_light_models, description="The library's light")
-    group: StringProperty(name="Group", description="Whose lamps change")
+    model: EnumProperty(
+        name="Model", items=_light_models, description="Lamp of the library for this group"
+    )
+    group: StringProperty(name="Group", description="Light group whose lamps are replaced")
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         context.window_manager.invoke_search_popup(self)
@@ -324,7 +328,9 @@ class OPTISENSE_OT_set_group(polls.Checked, ChoosingProperties, bpy.types.Operat
     bl_options = {"REGISTER", "UNDO"}
 
     group: EnumProperty(
-        name="Group", items=_groups, description="Where to; a new one is like that of the first"
+        name="Group",
+        items=_groups,
+        description="Group to move the lights to; a new group copies the group of the first light",
     )
     name: StringProperty(
         name="Name of a new group", default="white", description="Letters, digits, - and _"

@@ -59,15 +59,20 @@ class OPTISENSE_OT_arrange_row(polls.Checked, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     count: IntProperty(
-        name="Count", description="How many lights", min=1, max=1000, default=1,
+        name="Count", description="Number of lights in the row", min=1, max=1000, default=1,
         update=_pitch_changed,
     )  # fmt: skip
     pitch: FloatProperty(
-        name="Pitch (mm)", description="mm, between the middles of neighbours", min=0.0,
-        precision=3, default=4.0, update=_pitch_changed,
-    )  # fmt: skip
+        name="Pitch (mm)",
+        description="Distance between the centres of neighbouring lights, mm",
+        min=0.0,
+        precision=3,
+        default=4.0,
+        update=_pitch_changed,
+    )
     length: FloatProperty(
-        name="Length (mm)", description="mm, from the middle of the first to that of the last",
+        name="Length (mm)", description="Distance between the centres of the first and the last "
+        "light, mm",
         min=0.0, precision=3, update=_length_changed,
     )  # fmt: skip
 
@@ -116,7 +121,7 @@ class OPTISENSE_OT_solo_group(polls.Designing, bpy.types.Operator):
     bl_label = "Solo"
     bl_options = {"REGISTER", "UNDO"}
 
-    group: StringProperty(name="Group", description="Whose light is shown")
+    group: StringProperty(name="Group", description="Light group that is shown alone")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         groups = context.scene.optisense.light_groups

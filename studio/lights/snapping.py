@@ -56,7 +56,7 @@ class OPTISENSE_OT_snap_row(polls.Checked, bpy.types.Operator):
 
     away: FloatProperty(
         name="Away (mm)", min=-100.0, max=100.0, precision=3,
-        description="mm that the lights stay away from the edge, towards where they shine",
+        description="Distance of the lights from the edge along their direction, mm",
     )  # fmt: skip
 
     checks = (

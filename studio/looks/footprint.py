@@ -41,7 +41,9 @@ _request = LatestRequest()
 class OPTISENSE_PG_footprint(bpy.types.PropertyGroup):
     """Text about the footprint; never saved."""
 
-    text: StringProperty(description="How much the camera sees", options={"SKIP_SAVE"})
+    text: StringProperty(
+        description="Share of the skin that the camera sees, in words", options={"SKIP_SAVE"}
+    )
 
 
 def is_on(scene: bpy.types.Scene | None) -> bool:

@@ -114,15 +114,27 @@ class OPTISENSE_OT_set_markers(polls.Designing, ChoosingProperties, bpy.types.Op
     bl_label = "Markers"
     bl_options = {"REGISTER", "UNDO"}
 
-    columns: IntProperty(name="Columns", min=1, max=200, default=9, description="Dots along u")
-    rows: IntProperty(name="Rows", min=1, max=200, default=7, description="Dots along v")
+    columns: IntProperty(
+        name="Columns",
+        min=1,
+        max=200,
+        default=9,
+        description="Number of dots along the width of the skin",
+    )
+    rows: IntProperty(
+        name="Rows",
+        min=1,
+        max=200,
+        default=7,
+        description="Number of dots along the height of the skin",
+    )
     pitch: FloatProperty(
         name="Pitch (mm)", min=0.01, max=1000.0, default=2.0, precision=3,
-        description="mm between neighbours",
+        description="Distance between the centres of neighbouring dots, mm",
     )  # fmt: skip
     radius: FloatProperty(
         name="Radius (mm)", min=0.001, max=1000.0, default=0.4, precision=3,
-        description="mm, of a dot",
+        description="Diameter of a dot, mm",
     )  # fmt: skip
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -54,17 +54,17 @@ class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
         name="Section", description="Cut the sensor open in 3D views", update=_changed
     )
     axis: EnumProperty(
-        name="Axis", items=AXES, default="Y", description="Which way the cut looks",
+        name="Axis", items=AXES, default="Y", description="Axis that is perpendicular to the cut",
         update=_changed,
     )  # fmt: skip
     share: FloatProperty(
         name="Section", subtype="FACTOR", min=0.0, max=1.0, default=0.5, precision=2,
-        description="Where the cut is: 0 leaves the whole sensor, 1 nothing of it",
+        description="Position of the cut: 0 shows the whole sensor, 1 removes all of it",
         update=_changed,
     )  # fmt: skip
     footprint: BoolProperty(
         name="Camera's Footprint",
-        description="Outline what the camera sees of the skin, and tint the rest of it red; it "
+        description="Outline the part of the skin that the camera sees and tint the rest red; it "
         "follows the camera, mirrors and the skin",
         update=_footprint_asked,
     )

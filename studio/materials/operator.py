@@ -36,17 +36,22 @@ class OPTISENSE_PG_material_choice(bpy.types.PropertyGroup):
             ("material", "Parts", "Optical materials"),
             ("coating", "Sensing surface", "Coatings"),
         ],
-        description="What is to be chosen in the library",
+        description="Kind of library entries to choose from",
         options={"SKIP_SAVE"},
     )
     material: EnumProperty(
-        name="Material", items=_materials, description="Of the library", options={"SKIP_SAVE"}
+        name="Material",
+        items=_materials,
+        description="Material of the library",
+        options={"SKIP_SAVE"},
     )
     coating: EnumProperty(
-        name="Coating", items=_coatings, description="Of the library", options={"SKIP_SAVE"}
+        name="Coating", items=_coatings, description="Coating of the library", options={"SKIP_SAVE"}
     )
-    preview: StringProperty(description="The file of the picture", options={"SKIP_SAVE"})
-    previewed: StringProperty(description="What it shows", options={"SKIP_SAVE"})
+    preview: StringProperty(description="File of the preview picture", options={"SKIP_SAVE"})
+    previewed: StringProperty(
+        description="Name of the entry in the preview picture", options={"SKIP_SAVE"}
+    )
 
     @property
     def entry(self) -> str:
@@ -187,12 +192,14 @@ class OPTISENSE_OT_keep_material(polls.Checked, bpy.types.Operator):
 
     name: StringProperty(
         name="Name", default="my-material",
-        description="Letters, digits, - and _; one of yours of that name is replaced",
+        description="Letters, digits, - and _; your own entry with the same name is replaced",
     )  # fmt: skip
-    description: StringProperty(name="Description", description="A line that the lists show")
+    description: StringProperty(
+        name="Description", description="One line that is shown in the lists"
+    )
     source: StringProperty(
         name="Source of its numbers", default="chosen by hand",
-        description="A datasheet, a paper, a measurement",
+        description="Where the numbers come from: a datasheet, a paper or a measurement",
     )  # fmt: skip
 
     checks = (

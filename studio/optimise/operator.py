@@ -29,15 +29,18 @@ the sidebar.
 
 
 class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):
-    """Let the search change this"""
+    """Add this parameter to those that the search may change"""
 
     bl_idname = "optisense.vary"
     bl_label = "Vary"
     bl_options = {"REGISTER", "UNDO"}
 
-    label: StringProperty(name="Label", description="What varies, in words")
+    label: StringProperty(name="Label", description="Name of the parameter in the list")
     text: StringProperty(
-        name="Range", description="PATH=LOW:HIGH, PATH=+-REACH, PATH=LOW:HIGH:STEPS or PATH=A,B"
+        name="Range",
+        description="Values that the search may choose: PATH=LOW:HIGH, PATH=+-REACH, "
+        "PATH=LOW:HIGH:STEPS "
+        "or PATH=A,B",
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -51,7 +54,7 @@ class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):
 
 
 class OPTISENSE_MT_vary(bpy.types.Menu):
-    """What a search may change of the active object"""
+    """Parameters of the selected object that a search may change"""
 
     bl_idname = "OPTISENSE_MT_vary"
     bl_label = "Vary ..."
@@ -68,7 +71,7 @@ class OPTISENSE_MT_vary(bpy.types.Menu):
 
 
 class OPTISENSE_OT_vary_remove(polls.Checked, bpy.types.Operator):
-    """Keep this as it is"""
+    """Remove the selected parameter from the list, so that the search does not change it"""
 
     bl_idname = "optisense.vary_remove"
     bl_label = "Remove"
@@ -95,7 +98,7 @@ def wait_property() -> Any:
     """Return the property with which scripts wait until the search is over."""
     return BoolProperty(
         name="Wait",
-        description="Return when the search is over; a click never waits",
+        description="Return only when the search is over; for scripts",
         default=True,
         options={"HIDDEN", "SKIP_SAVE"},
     )
@@ -173,7 +176,7 @@ class _WithStudy(polls.Checked):
 
 
 class OPTISENSE_OT_resume(_WithStudy, Starting, bpy.types.Operator):
-    """Go on with the study, for as many trials as the budget says"""
+    """Continue the study until it has the given number of trials"""
 
     bl_idname = "optisense.resume"
     bl_label = "Resume"
@@ -210,7 +213,7 @@ class OPTISENSE_OT_resume(_WithStudy, Starting, bpy.types.Operator):
 
 
 class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
-    """Replace the sensor in this scene by the best one of the study"""
+    """Replace the sensor in this scene by the best design of the study"""
 
     bl_idname = "optisense.apply_best"
     bl_label = "Apply Best"
@@ -249,13 +252,16 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
 
 
 class OPTISENSE_OT_keep_variant(_WithStudy, ChoosingFile, bpy.types.Operator):
-    """Write the best sensor of the study to a folder of its own; this one stays"""
+    """Write the best design of the study to a new folder; the sensor in this scene stays as it "
+    "is"""
 
     bl_idname = "optisense.keep_variant"
     bl_label = "Keep as Variant"
 
     filepath: StringProperty(
-        name="Folder", description="That does not exist yet", subtype="DIR_PATH"
+        name="Folder",
+        description="New folder for the design; it must not exist yet",
+        subtype="DIR_PATH",
     )
 
     def suggested(self, context: bpy.types.Context) -> str:

@@ -32,9 +32,14 @@ def _methods(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> cat
 class OPTISENSE_PG_vary(bpy.types.PropertyGroup):
     """Parameter of the search; its name is a label."""
 
-    active: BoolProperty(name="Vary", description="The search changes it", default=True)
+    active: BoolProperty(
+        name="Vary", description="Whether the search changes this parameter", default=True
+    )
     text: StringProperty(
-        name="Range", description="PATH=LOW:HIGH, PATH=+-REACH, PATH=LOW:HIGH:STEPS or PATH=A,B"
+        name="Range",
+        description="Values that the search may choose: PATH=LOW:HIGH, PATH=+-REACH, "
+        "PATH=LOW:HIGH:STEPS "
+        "or PATH=A,B",
     )
 
 
@@ -48,35 +53,41 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
     objective: StringProperty(
         name="Objective",
         default="aoap",
-        description="What to make as high as possible: a name, arithmetic such as aoap + "
-        "0.5*coverage, or FILE.py:FUNCTION of your own; several, with commas between them, for the "
-        "method pareto",
+        description="Score to be maximised: a name, arithmetic such as aoap + "
+        "0.5*coverage, or your own FILE.py:FUNCTION; the method pareto takes several, separated by "
+        "commas",
     )
     require: StringProperty(
         name="Conditions",
-        description="What the best sensor must keep, such as coverage>=0.55, distortion<=1.5, with "
-        "commas between them; empty for none",
+        description="Conditions that the best design must meet, separated by commas, such as "
+        "coverage>=0.55, distortion<=1.5; empty for none",
     )
     method: StringProperty(
-        name="Method", default="cma-es", description="How the next trials are chosen"
+        name="Method", default="cma-es", description="Method that chooses the next trials"
     )
     budget: IntProperty(
-        name="Trials", description="In all; 0 leaves it to the method", min=0, default=60
+        name="Trials",
+        description="Number of trials in total; with 0, the method decides",
+        min=0,
+        default=60,
     )
     workers: IntProperty(
-        name="Workers", description="Processes that score trials at the same time", min=1, max=256,
+        name="Workers",
+        description="Number of processes that evaluate trials in parallel",
+        min=1,
+        max=256,
         default=1,
-    )  # fmt: skip
+    )
     seed: IntProperty(
         name="Seed", min=0, max=2**31 - 1,
-        description="Of the method's chance: the same seed goes the same way",
+        description="Seed of the method's random numbers: the same seed gives the same search",
     )  # fmt: skip
     go_on: BoolProperty(
         name="Go on without Blender",
-        description="Closing Blender does not end the search; Resume finds it again",
+        description="Continue the search when Blender is closed; Resume connects to it again",
     )
     study: StringProperty(
-        name="Study", description="Folder that keeps every trial", subtype="DIR_PATH"
+        name="Study", description="Folder in which every trial is stored", subtype="DIR_PATH"
     )
 
 
@@ -106,15 +117,23 @@ class OPTISENSE_PG_found(bpy.types.PropertyGroup):
         name="Method", items=_methods, options={"SKIP_SAVE"}, description="Choose a method",
         update=_method_chosen,
     )  # fmt: skip
-    best: StringProperty(description="The best score so far", options={"SKIP_SAVE"})
-    values: StringProperty(description="What it has, one a line", options={"SKIP_SAVE"})
-    conditions: StringProperty(
-        description="What it has of each condition, one a line", options={"SKIP_SAVE"}
+    best: StringProperty(description="Best score so far", options={"SKIP_SAVE"})
+    values: StringProperty(
+        description="Parameters of the best trial, one a line", options={"SKIP_SAVE"}
     )
-    start: StringProperty(description="The score at the start", options={"SKIP_SAVE"})
-    ended: StringProperty(description="Why it is over", options={"SKIP_SAVE"})
-    expected: StringProperty(description="How long the search takes", options={"SKIP_SAVE"})
-    offer: StringProperty(description="What a study waits for", options={"SKIP_SAVE"})
+    conditions: StringProperty(
+        description="Values of the best trial for the conditions, one a line", options={"SKIP_SAVE"}
+    )
+    start: StringProperty(
+        description="Score of the design before the search", options={"SKIP_SAVE"}
+    )
+    ended: StringProperty(
+        description="Number of trials and reason for the end of the search", options={"SKIP_SAVE"}
+    )
+    expected: StringProperty(description="Expected duration of the search", options={"SKIP_SAVE"})
+    offer: StringProperty(
+        description="Message about a study that can be continued", options={"SKIP_SAVE"}
+    )
 
 
 PROPERTIES = {

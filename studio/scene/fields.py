@@ -99,7 +99,10 @@ class OPTISENSE_PG_field(bpy.types.PropertyGroup):
     kind: StringProperty(options={"HIDDEN"})
     holder: StringProperty(options={"HIDDEN"})
     given: BoolProperty(
-        name="Given", description="It can be left out", default=True, update=_changed
+        name="Given",
+        description="Whether the design gives this optional number",
+        default=True,
+        update=_changed,
     )
     number: FloatProperty(name="Number", description=WHAT, precision=4, update=_changed)
     pair: FloatVectorProperty(
@@ -116,7 +119,7 @@ class OPTISENSE_PG_field(bpy.types.PropertyGroup):
     text: StringProperty(name="Text", description=WHAT, update=_changed)
     file: StringProperty(
         name="File", subtype="FILE_PATH", update=_changed,
-        description="In the design's folder, or anywhere else: Save copies it to there",
+        description="Path of the file; Save copies it into the folder of the design",
     )  # fmt: skip
     choice: EnumProperty(name="Choice", description=WHAT, items=_choices, get=_choice, set=_choose)
 

@@ -43,58 +43,73 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
     """Role of an object in the design, and its properties."""
 
     kind: EnumProperty(
-        name="Kind", items=kinds.OBJECT_KINDS, description="What it is to the sensor"
+        name="Kind", items=kinds.OBJECT_KINDS, description="Kind of object in the sensor"
     )
-    key: StringProperty(name="Name", description="In the design file")
-    order: IntProperty(description="Its place in the design file", options={"HIDDEN"})
+    key: StringProperty(name="Name", description="Name of the object in the design file")
+    order: IntProperty(description="Position of the object in the design file", options={"HIDDEN"})
     data: StringProperty(
-        description="Its values as they were read, with their numbers in full", options={"HIDDEN"}
+        description="Values as they were read, in full precision", options={"HIDDEN"}
     )
 
     role: EnumProperty(
         name="Role", items=kinds.ROLES, update=_role_changed,
-        description="What the part does in the sensor",
+        description="Function of the part in the sensor",
     )  # fmt: skip
-    material: StringProperty(name="Material", description="What the part is made of")
+    material: StringProperty(name="Material", description="Material of the part")
     priority: IntProperty(
-        name="Priority", description="Where solids overlap, the higher one counts",
+        name="Priority", description="Where two solids overlap, the material of the one with the "
+        "higher priority is used",
         min=-1000, max=1000,
     )  # fmt: skip
     mesh_file: StringProperty(options={"HIDDEN"})
-    is_caged: BoolProperty(description="A cage holds it where it is", options={"HIDDEN"})
+    is_caged: BoolProperty(description="Whether the part is in a cage", options={"HIDDEN"})
 
-    reference: EnumProperty(
-        name="Reference", items=kinds.REFERENCES, description="What the mesh is for"
+    reference: EnumProperty(name="Reference", items=kinds.REFERENCES, description="Use of the mesh")
+
+    group: StringProperty(name="Group", description="Light group of the light")
+
+    model: StringProperty(
+        name="Model", description="Camera of the library from which this one was made"
     )
-
-    group: StringProperty(name="Group", description="The light group it belongs to")
-
-    model: StringProperty(name="Model", description="The library camera it started from")
     projection: EnumProperty(
         name="Projection", items=kinds.PROJECTIONS, update=_camera_changed,
-        description="How the lens maps angles to the picture",
+        description="Projection of the lens: how it maps angles to the picture",
     )  # fmt: skip
     fov: FloatProperty(
-        name="Field of view", description="Degrees, across the image width", min=0.01, max=360.0,
-        default=60.0, precision=3, update=_camera_changed,
-    )  # fmt: skip
+        name="Field of view",
+        description="Angle of view across the width of the picture, degrees",
+        min=0.01,
+        max=360.0,
+        default=60.0,
+        precision=3,
+        update=_camera_changed,
+    )
     pixels: IntVectorProperty(
-        name="Resolution", description="Pixels, width and height", size=2, min=1, max=65536,
-        default=(320, 240), update=_camera_changed,
-    )  # fmt: skip
+        name="Resolution",
+        description="Width and height of the picture, pixels",
+        size=2,
+        min=1,
+        max=65536,
+        default=(320, 240),
+        update=_camera_changed,
+    )
 
     blend: FloatProperty(
-        name="Blend", description="A: 0 is C_min, 1 is C_max", min=0.0, max=1.0, precision=3,
+        name="Blend",
+        description="Weight A of the blend: 0 is the shape C_min, 1 the shape C_max",
+        min=0.0,
+        max=1.0,
+        precision=3,
         update=_blend_changed,
-    )  # fmt: skip
+    )
 
     indenter: EnumProperty(
         name="Indenter", items=kinds.INDENTERS, update=_contact_changed,
-        description="The shape of what presses",
+        description="Shape of the indenter",
     )  # fmt: skip
     radius: FloatProperty(
         name="Radius",
-        description="mm, of the ball or cylinder",
+        description="Radius of the ball or cylinder, mm",
         min=0.01,
         max=1000.0,
         default=1.5,
@@ -102,57 +117,89 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
     )
     length: FloatProperty(
         name="Length",
-        description="mm, of the cylinder",
+        description="Length of the cylinder, mm",
         min=0.01,
         max=1000.0,
         default=8.0,
         update=_contact_changed,
     )
     tilt: FloatVectorProperty(
-        name="Tilt", description="Degrees about x and y", size=2, min=-80.0, max=80.0,
+        name="Tilt",
+        description="Rotation of the plane about x and y, degrees",
+        size=2,
+        min=-80.0,
+        max=80.0,
         update=_contact_changed,
-    )  # fmt: skip
+    )
     size: FloatProperty(
-        name="Size", description="mm, width of the plane", min=0.01, max=1000.0, default=8.0,
+        name="Size", description="Width of the plane, mm", min=0.01, max=1000.0, default=8.0,
         update=_contact_changed,
     )  # fmt: skip
     file: StringProperty(
-        name="Mesh", description="A file (OBJ, STL, PLY) whose lowest point touches first",
+        name="Mesh", description="File of the indenter (OBJ, STL, PLY); its lowest point touches "
+        "first",
         subtype="FILE_PATH", update=_contact_changed,
     )  # fmt: skip
     shape: PointerProperty(
         type=bpy.types.Mesh, name="Shape", update=_contact_changed,
-        description="The reference's shape, which presses where no file is named",
+        description="Mesh of the indenter if no file is given",
     )  # fmt: skip
     scale: FloatProperty(
-        name="Scale", description="From the file's units to mm", min=1e-6, max=1e6, default=1.0,
+        name="Scale",
+        description="Factor from the units of the file to mm",
+        min=1e-6,
+        max=1e6,
+        default=1.0,
         update=_contact_changed,
-    )  # fmt: skip
+    )
     depth: FloatProperty(
-        name="Depth", description="mm, how far it is pressed in", min=0.001, max=100.0,
-        default=0.6, precision=3, update=_contact_changed,
-    )  # fmt: skip
+        name="Depth",
+        description="Depth to which the indenter is pressed in, mm",
+        min=0.001,
+        max=100.0,
+        default=0.6,
+        precision=3,
+        update=_contact_changed,
+    )
     rotation: FloatProperty(
-        name="Rotation", description="Degrees about the outward normal", update=_contact_changed
+        name="Rotation",
+        description="Rotation of the indenter about the outward normal, degrees",
+        update=_contact_changed,
     )
     press_by: EnumProperty(
         name="Press by", items=kinds.PRESSING, update=_contact_changed,
-        description="What is given: how deep it is, or how hard it presses",
+        description="Whether the depth or the force of the contact is given",
     )  # fmt: skip
     force: FloatProperty(
-        name="Force", description="N, along the inward normal; it is drawn as if it were at the "
-        "depth that was given last", min=0.001, max=1000.0, default=1.0, precision=3,
+        name="Force",
+        description="N, along the inward normal; it is drawn as if it were at the "
+        "depth that was given last",
+        min=0.001,
+        max=1000.0,
+        default=1.0,
+        precision=3,
         update=_contact_changed,
-    )  # fmt: skip
+    )
     shift: FloatVectorProperty(
-        name="Shift", description="mm along the skin by which it is dragged after it was pressed "
-        "in: the skin sticks to it as far as friction goes", size=2, min=-100.0, max=100.0,
-        precision=3, update=_contact_changed,
-    )  # fmt: skip
+        name="Shift",
+        description="Distance by which the indenter is moved along the skin after "
+        "it was pressed "
+        "in: the skin sticks to it as far as friction goes",
+        size=2,
+        min=-100.0,
+        max=100.0,
+        precision=3,
+        update=_contact_changed,
+    )
     twist: FloatProperty(
-        name="Twist", description="Degrees about the outward normal by which it is turned after "
-        "it was pressed in", min=-180.0, max=180.0, update=_contact_changed,
-    )  # fmt: skip
+        name="Twist",
+        description="Angle in degrees by which the indenter is rotated about the "
+        "outward normal after "
+        "it was pressed in",
+        min=-180.0,
+        max=180.0,
+        update=_contact_changed,
+    )
 
 
 PROPERTIES = {"Object": {"optisense": OPTISENSE_PG_object}}

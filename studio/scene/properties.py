@@ -32,7 +32,9 @@ class OPTISENSE_PG_coating(HasFields, bpy.types.PropertyGroup):
     """Coating of the sensing surface."""
 
     noun = "coating"
-    library: StringProperty(name="Library", description="The library coating it started from")
+    library: StringProperty(
+        name="Library", description="Coating of the library from which this one was made"
+    )
     kind_name: StringProperty(options={"HIDDEN"}, default=USUAL_COATING)
     fields: CollectionProperty(type=OPTISENSE_PG_field)
 
@@ -41,7 +43,9 @@ class OPTISENSE_PG_material(HasFields, bpy.types.PropertyGroup):
     """Optical material of parts; parts refer to its name."""
 
     noun = "material"
-    kind: EnumProperty(name="Kind", description="What it does with light", **kind_menu("material"))
+    kind: EnumProperty(
+        name="Kind", description="Optical model of the material", **kind_menu("material")
+    )
     kind_name: StringProperty(options={"HIDDEN"}, default="absorber")
     fields: CollectionProperty(type=OPTISENSE_PG_field)
 
@@ -83,7 +87,7 @@ class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
     """Lights of one type and colour; lights refer to its name."""
 
     noun = "emitter"
-    model: StringProperty(name="Model", description="A light of the library")
+    model: StringProperty(name="Model", description="Lamp of the library")
     colour: rgb(
         "Colour",
         "How the flux is shared among R, G, B; only ratios count",
@@ -94,21 +98,22 @@ class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
         update=_recolour,
     )
     flux: FloatProperty(
-        name="Flux", description="mW, radiant flux of each light", min=0.0, max=1e6, default=1.0,
+        name="Flux", description="Radiant flux of each light, mW", min=0.0, max=1e6, default=1.0,
         precision=3, update=_relight,
     )  # fmt: skip
     emitter: EnumProperty(
-        name="Lamp", description="How each light of the group radiates",
+        name="Lamp", description="Model of the light that each lamp of the group emits",
         **kind_menu("emitter", [("library", "Library", "As the library's light")]),
     )  # fmt: skip
     kind_name: StringProperty(options={"HIDDEN"}, default="library")
     fields: CollectionProperty(type=OPTISENSE_PG_field)
     shown: BoolProperty(
         name="Show", default=True, update=_show,
-        description="Show the group's lights, and its light in the picture; the design keeps them",
+        description="Show the lights of the group and their light in the picture; the design is "
+        "not changed",
     )  # fmt: skip
     drawn: StringProperty(
-        description="How its lamps are drawn, as the engine has told", options={"HIDDEN"}
+        description="Size of the lamps as the engine gives it, as JSON", options={"HIDDEN"}
     )
 
     def fields_changed(self) -> None:
@@ -130,17 +135,20 @@ class OPTISENSE_PG_design(bpy.types.PropertyGroup):
     """Design of a scene."""
 
     document: StringProperty(
-        description="The design file as it was read, with its numbers in full", options={"HIDDEN"}
+        description="Design file as it was read, in full precision", options={"HIDDEN"}
     )
-    folder: StringProperty(name="Folder", description="Where the design is saved")
+    folder: StringProperty(name="Folder", description="Folder in which the design is saved")
     is_saved: BoolProperty(options={"HIDDEN"})
-    title: StringProperty(name="Name", description="Of the sensor", maxlen=200)
-    description: StringProperty(name="Description", description="Of the sensor, in a line or two")
+    title: StringProperty(name="Name", description="Name of the sensor", maxlen=200)
+    description: StringProperty(
+        name="Description", description="Description of the sensor in a line or two"
+    )
     coating: PointerProperty(type=OPTISENSE_PG_coating)
     materials: CollectionProperty(type=OPTISENSE_PG_material)
     light_groups: CollectionProperty(type=OPTISENSE_PG_light_group)
     light_group_index: IntProperty(
-        name="Light group", description="A click on a group selects its lights",
+        name="Light group", description="Selected light group; a click on a group selects its "
+        "lights",
         options={"HIDDEN"}, update=_select_group,
     )  # fmt: skip
 

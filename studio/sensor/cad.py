@@ -38,19 +38,19 @@ UNITS = [
 class OPTISENSE_PG_body(bpy.types.PropertyGroup):
     """Body of the files; its name is that of the part that it becomes."""
 
-    use: EnumProperty(name="Use", items=USES, description="What this body is to the sensor")
-    size: StringProperty(description="Its size in words", options={"HIDDEN"})
+    use: EnumProperty(name="Use", items=USES, description="Function of this body in the sensor")
+    size: StringProperty(description="Size of the body in words", options={"HIDDEN"})
 
 
 class OPTISENSE_PG_cad(bpy.types.PropertyGroup):
     """Files of which a sensor is to be made; never saved."""
 
     bodies: CollectionProperty(type=OPTISENSE_PG_body)
-    files: StringProperty(description="Their paths, one a line", options={"HIDDEN"})
+    files: StringProperty(description="Paths of the files, one a line", options={"HIDDEN"})
     units: EnumProperty(
-        name="Units", items=UNITS, description="Of the lengths in files that do not say it"
+        name="Units", items=UNITS, description="Unit of the lengths in files that do not state it"
     )
-    has_units: BoolProperty(description="All files say their units", options={"HIDDEN"})
+    has_units: BoolProperty(description="Whether all files state their units", options={"HIDDEN"})
 
 
 def now() -> bpy.types.PropertyGroup:
@@ -61,10 +61,14 @@ def now() -> bpy.types.PropertyGroup:
 class ChoosingFiles:
     """Base of operators that ask for one or several CAD files of a folder, or for the folder."""
 
-    filepath: StringProperty(name="File", description="A CAD file", subtype="FILE_PATH")
-    directory: StringProperty(name="Folder", description="Of the files", subtype="DIR_PATH")
+    filepath: StringProperty(name="File", description="CAD file to read", subtype="FILE_PATH")
+    directory: StringProperty(
+        name="Folder", description="Folder of the selected files", subtype="DIR_PATH"
+    )
     files: CollectionProperty(
-        type=bpy.types.OperatorFileListElement, name="Files", description="In the folder"
+        type=bpy.types.OperatorFileListElement,
+        name="Files",
+        description="Selected files of the folder",
     )
     filter_glob: StringProperty(default=FORMATS, options={"HIDDEN"})
 

@@ -36,7 +36,7 @@ class OPTISENSE_OT_new(polls.Replacing, _Opens, Starting, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     sensor: StringProperty(
-        name="Sensor", description="The name of a built-in sensor", default="gelsight-mini"
+        name="Sensor", description="Name of a built-in sensor", default="gelsight-mini"
     )
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
@@ -85,7 +85,9 @@ class OPTISENSE_OT_open(polls.Replacing, _Opens, ChoosingFile, bpy.types.Operato
     bl_options = {"REGISTER"}
 
     filepath: StringProperty(
-        name="File", description="A design.yaml, or its folder", subtype="FILE_PATH"
+        name="File",
+        description="File design.yaml, or the folder that contains it",
+        subtype="FILE_PATH",
     )
     filter_glob: StringProperty(default="*.yaml", options={"HIDDEN"})
 
@@ -148,7 +150,9 @@ class OPTISENSE_OT_save_as(polls.Asking, _Saves, ChoosingFile, bpy.types.Operato
     bl_label = "Save As"
 
     filepath: StringProperty(
-        name="Folder", description="That does not exist yet", subtype="DIR_PATH"
+        name="Folder",
+        description="New folder for the design; it must not exist yet",
+        subtype="DIR_PATH",
     )
 
     def suggested(self, context: bpy.types.Context) -> str:

@@ -82,7 +82,7 @@ class OPTISENSE_OT_new_cage(polls.Checked, bpy.types.Operator):
 
     resolution: IntVectorProperty(
         name="Points along x, y, z", size=3, min=2, max=64, soft_max=9, default=(3, 3, 3),
-        description="Control points of the cage; more of them bend more finely",
+        description="Numbers of control points; more points allow finer shapes",
     )  # fmt: skip
 
     checks = (
@@ -154,7 +154,7 @@ class OPTISENSE_OT_set_bound(_OfCage, bpy.types.Operator):
 
     bound: EnumProperty(
         name="Bound", items=[("c_min", "C_min", "A = 0"), ("c_max", "C_max", "A = 1")],
-        description="Which end of the range",
+        description="End of the range that the present shape becomes",
     )  # fmt: skip
 
     def execute(self, context: bpy.types.Context) -> set[str]:

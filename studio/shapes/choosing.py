@@ -20,7 +20,7 @@ class OPTISENSE_OT_select_cage(polls.Arranging, bpy.types.Operator):
     bl_label = "Select Cage"
     bl_options = {"REGISTER", "UNDO"}
 
-    cage: StringProperty(name="Cage", description="Its name in the design")
+    cage: StringProperty(name="Cage", description="Name of the cage in the design")
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         found = object_of(context.scene, "CAGE", self.cage)

@@ -54,7 +54,7 @@ class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFiles, bpy.types.Operator):
 
     scale: FloatProperty(
         name="Scale",
-        description="From the file's units to mm: 1000 for metres, 25.4 for inches",
+        description="Factor from the units of the file to mm: 1000 for metres, 25.4 for inches",
         min=1e-6,
         max=1e6,
         default=1.0,
@@ -101,7 +101,7 @@ class OPTISENSE_OT_set_reference(polls.Checked, ChoosingProperties, bpy.types.Op
     bl_options = {"REGISTER", "UNDO"}
 
     reference: EnumProperty(
-        name="Reference", items=kinds.REFERENCES, description="What the selected meshes are for"
+        name="Reference", items=kinds.REFERENCES, description="Use of the selected meshes"
     )
 
     checks = (

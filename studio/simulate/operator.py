@@ -31,7 +31,7 @@ class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
 
     wait: BoolProperty(
         name="Wait",
-        description="Return when the picture is there; a click never waits",
+        description="Return only when the picture is ready; for scripts",
         default=True,
         options={"HIDDEN", "SKIP_SAVE"},
     )

@@ -33,15 +33,20 @@ class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
 
     size: EnumProperty(
         name="Size", items=SIZES, default="320",
-        description="Of the picture; it keeps the camera's proportions",
+        description="Width of the picture; its height follows from the proportions of the camera",
     )  # fmt: skip
     noise: FloatProperty(
-        name="Noise", description="Per cent; simulate until no more is left", min=0.5, max=100.0,
-        default=5.0, precision=1,
-    )  # fmt: skip
+        name="Noise",
+        description="Noise in per cent down to which the picture is simulated",
+        min=0.5,
+        max=100.0,
+        default=5.0,
+        precision=1,
+    )
     auto_exposure: BoolProperty(
         name="Automatic exposure", default=True,
-        description="As bright as fits into the picture; off keeps it as it is, so that pictures "
+        description="Set the exposure of each picture by its brightness; otherwise it is fixed, "
+        "so that pictures "
         "can be compared",
         update=exposure_changed,
     )  # fmt: skip
@@ -52,11 +57,11 @@ class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
     )  # fmt: skip
     skin: EnumProperty(
         name="Skin", items=kinds.SKINS, default="elastic",
-        description="How the skin gives way to contacts",
+        description="Model of how the skin deforms under contacts",
     )  # fmt: skip
     seed: IntProperty(
         name="Seed", min=0, max=2**31 - 1,
-        description="Of the noise: the same seed gives the same picture",
+        description="Seed of the noise: the same seed gives the same picture",
     )  # fmt: skip
     draft: BoolProperty(
         name="Draft while editing",
@@ -68,12 +73,13 @@ class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
 class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
     """Picture that is shown; never saved."""
 
-    image: StringProperty(description="The engine's name of it", options={"SKIP_SAVE"})
+    image: StringProperty(description="Name of the picture in the engine", options={"SKIP_SAVE"})
     shown: BoolProperty(options={"SKIP_SAVE"})
     is_draft: BoolProperty(options={"SKIP_SAVE"})
     is_relit: BoolProperty(options={"SKIP_SAVE"})
     is_before: BoolProperty(
-        description="It is a picture of the sensor that was open before", options={"SKIP_SAVE"}
+        description="Whether the picture shows the sensor that was open before",
+        options={"SKIP_SAVE"},
     )
     summary: StringProperty(options={"SKIP_SAVE"})
     presses: StringProperty(

@@ -54,7 +54,7 @@ class OPTISENSE_PG_view(bpy.types.PropertyGroup):
 
     channel: EnumProperty(
         name="Channel", items=CHANNELS, default="COLOUR", update=_changed,
-        description="What of the picture is shown", options={"SKIP_SAVE"},
+        description="Channels of the picture that are shown", options={"SKIP_SAVE"},
     )  # fmt: skip
     false_colour: BoolProperty(
         name="False Colours", update=_changed, options={"SKIP_SAVE"},
@@ -63,17 +63,25 @@ class OPTISENSE_PG_view(bpy.types.PropertyGroup):
     )  # fmt: skip
     compare: EnumProperty(
         name="Compare", items=COMPARISONS, default="NONE", update=_changed,
-        description="With the pinned picture", options={"SKIP_SAVE"},
+        description="How the picture is compared with the pinned one", options={"SKIP_SAVE"},
     )  # fmt: skip
     wipe: FloatProperty(
-        name="Wipe", subtype="FACTOR", min=0.0, max=1.0, default=0.5, precision=2, update=_changed,
-        description="Where the pinned picture ends and this one begins", options={"SKIP_SAVE"},
-    )  # fmt: skip
+        name="Wipe",
+        subtype="FACTOR",
+        min=0.0,
+        max=1.0,
+        default=0.5,
+        precision=2,
+        update=_changed,
+        description="Position of the border between the pinned picture (left) and the present one "
+        "(right)",
+        options={"SKIP_SAVE"},
+    )
     gain: FloatProperty(
         name="Gain", min=1.0, max=64.0, default=4.0, precision=0, step=100, update=_changed,
-        description="What the difference is multiplied by", options={"SKIP_SAVE"},
+        description="Factor by which the difference is multiplied", options={"SKIP_SAVE"},
     )  # fmt: skip
-    pinned: StringProperty(description="Which picture is pinned", options={"SKIP_SAVE"})
+    pinned: StringProperty(description="Name of the pinned picture", options={"SKIP_SAVE"})
 
 
 def is_plain() -> bool:
