@@ -50,8 +50,6 @@ BOX = 3
 takes off most of the reference's noise."""
 RADIUS, DEPTH = 1.5, 0.8
 """mm: the ball that is pressed in."""
-WORTH = 0.1
-"""Relative change of error or time below which a refinement is not worth its code."""
 ERRORS = ("error_in_contact", "error_elsewhere")
 TIMES = ("cpu_s_new_light", "cpu_s_kept_light")
 

@@ -32,7 +32,6 @@ from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.photons import Emission
 
 FloatArray = NDArray[np.floating]
-Mask = NDArray[np.bool_]
 Window = tuple[slice, slice]
 
 CACHE = Path(__file__).parent / ".cache"

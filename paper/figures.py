@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,8 +71,3 @@ def image(axes: Axes, picture: NDArray[np.uint8] | None, title: str) -> None:
         axes.imshow(picture)
     else:
         axes.text(0.5, 0.5, "none", ha="center", va="center", transform=axes.transAxes)
-
-
-def flat_axes(axes: Any) -> Sequence[Axes]:
-    """All axes of `Figure.subplots` in one row."""
-    return list(np.atleast_1d(axes).ravel())

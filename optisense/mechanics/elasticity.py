@@ -50,13 +50,6 @@ class Elasticity:
         """Shear modulus (MPa), E / (2 (1 + nu))."""
         return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
 
-    @property
-    def plane_modulus(self) -> float:
-        """Plane-strain modulus (MPa), E / (1 - nu^2), which governs Hertzian contact with a rigid
-        body.
-        """
-        return self.youngs_modulus / (1.0 - self.poisson_ratio**2)
-
 
 def youngs_modulus_of_shore_a(hardness: float) -> float:
     """Young's modulus (MPa) of a rubber from its Shore A hardness.

@@ -80,11 +80,6 @@ def show_icon(name: str, pixels: NDArray[np.float32]) -> None:
     preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
 
 
-def has(name: str) -> bool:
-    """Whether `show_icon` was given a picture with this name."""
-    return _previews is not None and name in _previews
-
-
 def icon(name: str = IMAGE) -> int:
     """Return the icon of a picture of `show_icon`; 0 if there is none, or no window."""
     preview = None if _previews is None else _previews.get(name)

@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -43,11 +44,15 @@ def calls(log: Path) -> Counter[float]:
 
 
 class Slow:
-    """An evaluator that takes forever."""
+    """An evaluator that stores its process id in a folder and never returns."""
 
     renders = False
 
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
     def __call__(self, vector: np.ndarray, seed: int) -> Outcome:
+        (self.folder / str(os.getpid())).touch()
         signal.pause()
         raise AssertionError
 
@@ -109,12 +114,12 @@ class TestPool:
         assert "died 2 times (exit code 3" in str(failed.failure)
 
     @pytest.mark.usefixtures("here")
-    def test_closing_ends_the_workers_at_once(self) -> None:
-        with ProcessPool(Slow(), 2) as pool:
+    def test_closing_ends_the_workers_at_once(self, tmp_path: Path) -> None:
+        with ProcessPool(Slow(tmp_path), 2) as pool:
             futures = [pool.submit(np.zeros(1), 0) for _ in range(3)]
-            while len(processes := pool.process_ids()) < 2:
-                pass
-        assert not pool.process_ids() or all(_gone(process) for process in processes)
+            while len(workers := [int(file.name) for file in tmp_path.iterdir()]) < 2:
+                time.sleep(0.01)
+        assert all(_gone(worker) for worker in workers)
         assert not any(future.done() and future.exception() is None for future in futures)
 
     @pytest.mark.usefixtures("here")

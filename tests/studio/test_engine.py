@@ -52,7 +52,7 @@ def test_a_contact_is_seen_and_relighting_is_exact(mini: Any) -> None:
     assert row > 60 and column < 80
     bright = shown()
     now = bpy.context.window_manager.optisense_picture
-    assert picture.has(picture.IMAGE)
+    assert picture._previews and picture.IMAGE in picture._previews
     assert now.shown and not now.is_draft and "160 x 120" in now.summary
     for group in ("green", "blue"):
         mini.optisense.light_groups[group].flux = 0.0
@@ -320,7 +320,7 @@ def test_scores_rays_a_search_and_its_best_design(
     found = manager.optisense_found
     assert "3 trials" in found.ended
     assert float(found.best) >= float(found.start)
-    assert picture.has("OptiSense search")
+    assert picture._previews and "OptiSense search" in picture._previews
     ghosts = [each.name for each in mini.objects if each.optisense.key.startswith("ghost")]
     assert "ghost skin" in ghosts
     bpy.ops.optisense.add_contact()

@@ -125,11 +125,6 @@ class ProcessPool(Runner):
         for process in processes:
             process.wait()
 
-    def process_ids(self) -> list[int]:
-        """Return the process ids of the workers that are running."""
-        with self._changed:
-            return [process.pid for process in self._processes.values()]
-
     def _keep(self, place: int) -> None:
         """Keep one place of the pool filled: start a new worker when the one there dies."""
         stillborn = 0
