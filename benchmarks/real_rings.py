@@ -28,6 +28,8 @@ WIDTH = 320
 """Pixels across the pictures; photographs are scaled to it."""
 INSIDE, RING = 0.9, (1.1, 1.6)
 """Contact radii up to which the contact's signal is taken, and between which the ring's is."""
+DEEPEST = 2.5
+"""Largest depth (mm), 60 % of the gel, at which linear elasticity is no longer accurate."""
 PHOTONS = 1_000_000
 
 Picture = NDArray[np.uint8]
@@ -51,15 +53,24 @@ def ring_share(picture: Picture, background: Picture) -> tuple[float, float]:
 
 
 def depth_of(model: ots.OpticalModel, ball: float, radius: float, skin: str) -> float:
-    """The depth (mm) at which a ball touches a disc of a radius (mm)."""
-    if skin == CONFORMING:
+    """The depth (mm) at which a ball touches a disc of a radius (mm).
+
+    Raises:
+        ValueError: no depth up to `DEEPEST` gives that radius.
+    """
+    if skin == CONFORMING and radius < ball:
         return ball - math.sqrt(ball**2 - radius**2)
 
     def excess(depth: float) -> float:
         pressed = model.pressed([Contact(Sphere(ball), at=(0.0, 0.0), depth=depth)])
         return math.sqrt(pressed.contacts[0].area / math.pi) - radius
 
-    return float(brentq(excess, 0.02, 2.2, xtol=2e-3))
+    if radius >= ball or excess(DEEPEST) < 0.0:
+        raise ValueError(
+            f"a ball of radius {ball:g} mm, {DEEPEST:g} mm deep in the elastic skin, touches no "
+            f"disc of radius {radius:.2f} mm"
+        )
+    return float(brentq(excess, 0.02, DEEPEST, xtol=2e-3))
 
 
 def main() -> None:
@@ -78,17 +89,18 @@ def main() -> None:
     rays = model.chief_rays((width, height))
     own_width = float(np.nanmax(rays.points[..., 0]) - np.nanmin(rays.points[..., 0]))
     print(f"a pixel is {options.width / width:.4f} mm, of the model {own_width / width:.4f} mm")
-    print("| ball (mm) | contact radius (mm) | ring, photograph | elastic | conforming | "
-          "radius found, elastic | conforming |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|")
+    print("| ball (mm) | contact radius (mm) | depth, elastic (mm) | ring, photograph | elastic | "
+          "conforming | radius found, elastic | conforming |")  # fmt: skip
+    print("|---|---|---|---|---|---|---|---|")
     step = max(1, len(photos.presses) // options.most)
     for press in photos.presses[::step]:
         try:
             share, pixels = ring_share(press.picture, photos.background)
             radius = pixels * options.width / width
-            cells = []
+            cells, depths = [], []
             for skin in (ELASTIC, CONFORMING):
                 depth = depth_of(model, press.diameter / 2.0, radius, skin)
+                depths.append(depth)
                 contact = Contact(Sphere(press.diameter / 2.0), at=(0.0, 0.0), depth=depth)
                 image = model.render([contact], (width, height), photons=PHOTONS, skin=skin)
                 cells.append(ring_share(image.picture(exposure), rest.picture(exposure)))
@@ -97,8 +109,9 @@ def main() -> None:
             continue
         scale = own_width / width
         print(
-            f"| {press.diameter:g} | {radius:.2f} | {share:.2f} | {cells[0][0]:.2f} | "
-            f"{cells[1][0]:.2f} | {cells[0][1] * scale:.2f} | {cells[1][1] * scale:.2f} |",
+            f"| {press.diameter:g} | {radius:.2f} | {depths[0]:.2f} | {share:.2f} | "
+            f"{cells[0][0]:.2f} | {cells[1][0]:.2f} | {cells[0][1] * scale:.2f} | "
+            f"{cells[1][1] * scale:.2f} |",
             flush=True,
         )
 

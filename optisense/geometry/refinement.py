@@ -13,6 +13,8 @@ IntArray = NDArray[np.int64]
 MAX_PASSES = 40
 """Number of passes after which refinement ends; each pass halves the area of the triangles that it
 cuts."""
+MOST_VERTICES = 2**31
+"""Number above all numbers of vertices: two of them in one integer of 64 bits name an edge."""
 
 
 def refine(
@@ -38,14 +40,19 @@ def refine(
     Returns:
         Vertices, faces and corner normals of the finer mesh. Vertices are only added.
     """
+    known = np.empty(0, dtype=np.int64)
     for _ in range(MAX_PASSES):
         ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        key, edge = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
+        key, edge = np.unique(ends[:, 0] * MOST_VERTICES + ends[:, 1], return_inverse=True)
         edge = edge.reshape(-1, 3)
-        first, second = key // len(vertices), key % len(vertices)
+        first, second = key // MOST_VERTICES, key % MOST_VERTICES
         middles = (vertices[first] + vertices[second]) / 2.0
         length = np.linalg.norm(vertices[first] - vertices[second], axis=1)
-        cut = length > wanted(middles)
+        # Edges of the pass before that are still there were short enough.
+        fresh = ~np.isin(key, known, assume_unique=True)
+        cut = np.zeros(len(key), dtype=bool)
+        cut[fresh] = length[fresh] > wanted(middles[fresh])
+        known = key
         # All triangles choose the same one of several edges of equal length.
         rank = np.empty(len(key), dtype=np.int64)
         rank[np.lexsort((np.arange(len(key)), length))] = np.arange(len(key))

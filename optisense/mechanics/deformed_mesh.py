@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from optisense.geometry import TriangleMesh
 from optisense.geometry.refinement import refine
 from optisense.mechanics.displacement_field import DECAY
-from optisense.mechanics.pressed_skin import Pressed, PressedSkin
+from optisense.mechanics.pressed_skin import PressedSkin
 
 FloatArray = NDArray[np.float64]
 
@@ -152,21 +152,12 @@ def _wanted(points: FloatArray, pressed: PressedSkin) -> FloatArray:
     result = np.full(len(points), np.inf)
     for contact in pressed.contacts:
         place = contact.place
-        away = _distance(points, contact)
         local = place.local(points)
-        at_rim = contact.field.distance_from_rim(local[:, 0], local[:, 1]) < RIM * place.pitch
-        finest = np.where(at_rim, EDGE_AT_RIM, EDGE_IN_CONTACT) * place.pitch
+        away, from_rim = contact.field.distances(local[:, 0], local[:, 1])
+        finest = np.where(from_rim < RIM * place.pitch, EDGE_AT_RIM, EDGE_IN_CONTACT) * place.pitch
         length = np.minimum(finest + GROWTH * away, LONGEST_EDGE * place.thickness)
         result = np.minimum(result, np.where(away < DECAY * place.thickness, length, np.inf))
     return result
-
-
-def _distance(points: FloatArray, contact: Pressed) -> FloatArray:
-    """Return the distance (mm) of points from the touching points of a contact, in its tangent
-    plane.
-    """
-    local = contact.place.local(points)
-    return contact.field.distance(local[:, 0], local[:, 1])
 
 
 def _on_border(faces: NDArray[np.int64], count: int) -> NDArray[np.bool_]:

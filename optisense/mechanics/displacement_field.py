@@ -198,18 +198,18 @@ class DisplacementField:
         rows, columns, inside = self._cells(x, y)
         return inside & self._touching[rows, columns]
 
-    def distance(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the distance (mm) of points of the tangent plane from the contact, accurate to
-        about a pitch.
+    def distances(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the distances (mm) of points of the tangent plane from the contact, 0 inside it,
+        and from its rim, on either side of it; accurate to about a pitch.
         """
-        rows, columns, _ = self._cells(x, y)
-        beyond = np.hypot(x - self.place.x[columns], y - self.place.y[rows])
-        return self._away[rows, columns] + np.where(beyond > self.place.pitch, beyond, 0.0)
-
-    def distance_from_rim(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the distance (mm) of points from the rim of the contact, on either side of it."""
-        rows, columns, _ = self._cells(x, y)
-        return np.maximum(self.distance(x, y), self._depth[rows, columns])
+        rows, columns, inside = self._cells(x, y)
+        away = self._away[rows, columns]
+        outside = ~inside
+        beyond = np.hypot(
+            x[outside] - self.place.x[columns[outside]], y[outside] - self.place.y[rows[outside]]
+        )
+        away[outside] += np.where(beyond > self.place.pitch, beyond, 0.0)
+        return away, np.maximum(away, self._depth[rows, columns])
 
     @cached_property
     def _depth(self) -> FloatArray:
