@@ -12,7 +12,7 @@ from annotated_types import Ge, Le
 from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 
-from optisense.commands.options import CommandOptions, Written
+from optisense.commands.options import CommandOptions, OptionNotation
 from optisense.text import lone_surrogate
 
 
@@ -97,11 +97,13 @@ def _plain(annotation: Any) -> tuple[Any, list[Any]]:
     return annotation, []
 
 
-def _written(notes: list[Any]) -> Written:
-    return next((note for note in reversed(notes) if isinstance(note, Written)), Written())
+def _written(notes: list[Any]) -> OptionNotation:
+    return next(
+        (note for note in reversed(notes) if isinstance(note, OptionNotation)), OptionNotation()
+    )
 
 
-def _flags(name: str, written: Written) -> tuple[str, ...]:
+def _flags(name: str, written: OptionNotation) -> tuple[str, ...]:
     return written.flags or ("--" + name.replace("_", "-"),)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 from annotated_types import Ge, Le
 from pydantic import Field
 
-from optisense.commands.options import CommandOptions, Photons, Seed, Written
+from optisense.commands.options import CommandOptions, OptionNotation, Photons, Seed
 from optisense.quality import PICTURE_PHOTONS
 
 LARGEST_BALL = 1000.0
@@ -19,7 +19,7 @@ unit.
 class PhotographOptions(CommandOptions):
     """Options of how photographs are read."""
 
-    ball: Annotated[float, Ge(0.01), Le(LARGEST_BALL), Written("MM")] | None = Field(
+    ball: Annotated[float, Ge(0.01), Le(LARGEST_BALL), OptionNotation("MM")] | None = Field(
         None,
         description="Diameter of the ball in mm; needed if the folder of photographs does not say "
         "it.",
@@ -43,27 +43,27 @@ class CompareOptions(PhotographOptions):
 class CalibrateOptions(PhotographOptions):
     """Options of a fit of a design to photographs."""
 
-    keep: Annotated[list[str], Written("NAME")] = Field(
+    keep: Annotated[list[str], OptionNotation("NAME")] = Field(
         [],
         description="What the fit does not change: powers, colours, tone, black, shading or view. "
         "May be given several times.",
     )
-    also: Annotated[list[str], Written("NAME")] = Field(
+    also: Annotated[list[str], OptionNotation("NAME")] = Field(
         [],
         description="What the fit also changes: lights, emission, edges, coating, gel or indices. "
         "May be given several times.",
     )
-    fit: Annotated[list[str], Written("PATH=LO:HI")] = Field(
+    fit: Annotated[list[str], OptionNotation("PATH=LO:HI")] = Field(
         [],
         description="Another number of the design that the fit changes, and its range, such as "
         "coating.specularity=0:0.4. May be given several times.",
     )
-    hold_out: Annotated[list[str], Written("PRESS")] = Field(
+    hold_out: Annotated[list[str], OptionNotation("PRESS")] = Field(
         [],
         description="The file name of a press that the fit does not use, and that tests the "
         "result; every third press if none is named. May be given several times.",
     )
-    rounds: Annotated[int, Ge(1), Le(20), Written("N")] = Field(
+    rounds: Annotated[int, Ge(1), Le(20), OptionNotation("N")] = Field(
         3, description="Number of rounds of rendering and fitting."
     )
     photons: Photons = Field(300_000, description="Photons to trace in each round.")

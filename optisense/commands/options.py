@@ -39,7 +39,7 @@ class CommandOptions(BaseModel):
 
 
 @dataclass(frozen=True)
-class Written:
+class OptionNotation:
     """Notation of an option on the command line.
 
     Attributes:
@@ -149,26 +149,28 @@ def one_of(names: Collection[str]) -> Callable[[str], str]:
     return check
 
 
-Seed = Annotated[int, Ge(0), Le(MOST_SEED), Written("N")]
+Seed = Annotated[int, Ge(0), Le(MOST_SEED), OptionNotation("N")]
 
 Resolution = Annotated[
-    tuple[int, int], BeforeValidator(read_resolution), Written("WIDTHxHEIGHT", is_text=True)
+    tuple[int, int], BeforeValidator(read_resolution), OptionNotation("WIDTHxHEIGHT", is_text=True)
 ]
 
-Photons = Annotated[int, BeforeValidator(photons_of), Written(f"N|{LEVELS}", is_text=True)]
+Photons = Annotated[int, BeforeValidator(photons_of), OptionNotation(f"N|{LEVELS}", is_text=True)]
 
 Exposure = Annotated[
-    float | Literal["auto"], BeforeValidator(read_exposure), Written("auto|VALUE", is_text=True)
+    float | Literal["auto"],
+    BeforeValidator(read_exposure),
+    OptionNotation("auto|VALUE", is_text=True),
 ]
 
-Skin = Annotated[str, AfterValidator(one_of(SKINS)), Written("|".join(SKINS))]
+Skin = Annotated[str, AfterValidator(one_of(SKINS)), OptionNotation("|".join(SKINS))]
 SKIN_HELP = (
     "How the skin deforms: as an elastic gel (elastic), or taking the shape of "
     "the indenter and staying flat around it (conforming)."
 )
 
 Range = Annotated[
-    tuple[float, float], BeforeValidator(read_range), Written("LOW:HIGH", is_text=True)
+    tuple[float, float], BeforeValidator(read_range), OptionNotation("LOW:HIGH", is_text=True)
 ]
 
 NamedValues = Annotated[dict[str, Any], BeforeValidator(read_named)]

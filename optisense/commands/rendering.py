@@ -12,11 +12,11 @@ from optisense.commands.options import (
     SKIN_HELP,
     CommandOptions,
     Exposure,
+    OptionNotation,
     Photons,
     Resolution,
     Seed,
     Skin,
-    Written,
 )
 from optisense.mechanics.skins import ELASTIC
 from optisense.quality import PICTURE_PHOTONS, photons_of
@@ -35,11 +35,11 @@ class RenderOptions(CommandOptions):
         description="Photons to trace: a number, draft (60,000), normal (1 million) or fine (5 "
         "million). Normal if no other limit is given.",
     )
-    noise: Annotated[float, Ge(0.01), Le(100.0), Written("PERCENT")] | None = Field(
+    noise: Annotated[float, Ge(0.01), Le(100.0), OptionNotation("PERCENT")] | None = Field(
         None,
         description="Trace photons until the noise of the light is at most this many per cent.",
     )
-    seconds: Annotated[float, Ge(0.01), Le(LONGEST_RENDER), Written("S")] | None = Field(
+    seconds: Annotated[float, Ge(0.01), Le(LONGEST_RENDER), OptionNotation("S")] | None = Field(
         None, description="Trace photons for this many seconds."
     )
     seed: Seed = Field(0, description="The same seed gives the same picture.")

@@ -12,12 +12,12 @@ from optisense.commands.options import (
     SKIN_HELP,
     CommandOptions,
     Exposure,
+    OptionNotation,
     Photons,
     Range,
     Resolution,
     Seed,
     Skin,
-    Written,
 )
 from optisense.mechanics.skins import ELASTIC
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
@@ -28,7 +28,7 @@ NOISE = 1.5
 GelSight Mini.
 """
 
-CameraNoise = Annotated[float, Ge(0.0), Le(255.0), Written("LEVELS")]
+CameraNoise = Annotated[float, Ge(0.0), Le(255.0), OptionNotation("LEVELS")]
 NOISE_HELP = "Camera noise to add to the pictures: its standard deviation in levels of "
 "255; a real GelSight Mini has 1.1 to 1.9."
 
@@ -54,7 +54,7 @@ class PictureOptions(CommandOptions):
 class EstimatorOptions(PictureOptions):
     """Options of pictures that either estimator can render."""
 
-    estimator: Annotated[str, Written("|".join(ESTIMATORS))] = Field(
+    estimator: Annotated[str, OptionNotation("|".join(ESTIMATORS))] = Field(
         RADIANCE_CACHE,
         description="How the light is computed: from a radiance cache, or by progressive photon "
         "mapping (sppm), which is slow, and exact also where plates cover the gel.",
@@ -64,10 +64,10 @@ class EstimatorOptions(PictureOptions):
 class SampleOptions(EstimatorOptions):
     """Options of the samples of a perception task."""
 
-    samples: Annotated[int, Ge(10), Le(MOST_THINGS), Written("N", ("--samples", "-n"))] = Field(
-        200, description="Number of random contacts."
+    samples: Annotated[int, Ge(10), Le(MOST_THINGS), OptionNotation("N", ("--samples", "-n"))] = (
+        Field(200, description="Number of random contacts.")
     )
-    neighbours: Annotated[int, Ge(2), Le(MOST_THINGS), Written("K")] = Field(
+    neighbours: Annotated[int, Ge(2), Le(MOST_THINGS), OptionNotation("K")] = Field(
         5,
         description="Number of nearest neighbours from which the signal-to-noise ratio is "
         "computed.",
@@ -92,7 +92,7 @@ class CylinderOptions(SampleOptions):
 class DatasetOptions(EstimatorOptions):
     """Options of the samples of a dataset."""
 
-    indenter: Annotated[list[str], Written("KIND:SIZE")] = Field(
+    indenter: Annotated[list[str], OptionNotation("KIND:SIZE")] = Field(
         ["sphere:1.5"],
         description="What presses (sizes in mm): sphere:1.5, cylinder:2,6, plane or mesh:FILE. "
         "May be given several times; all are equally likely.",
@@ -107,10 +107,10 @@ class DatasetOptions(EstimatorOptions):
         validate_default=True,
         description="Range of the rotation about the surface normal, degrees.",
     )
-    tilt: Annotated[float, Ge(0.0), Le(89.0), Written("DEGREES")] = Field(
+    tilt: Annotated[float, Ge(0.0), Le(89.0), OptionNotation("DEGREES")] = Field(
         0.0, description="Largest tilt about each of two axes, degrees."
     )
-    margin: Annotated[float, Ge(0.0), Le(49.0), Written("PERCENT")] = Field(
+    margin: Annotated[float, Ge(0.0), Le(49.0), OptionNotation("PERCENT")] = Field(
         2.0,
         description="Distance between a contact and the edge of the picture, per cent of the "
         "picture's width; with 0 the edge may cut contacts.",
@@ -122,7 +122,7 @@ class DatasetOptions(EstimatorOptions):
         description="Exposure of all pictures: a factor on the radiance; auto suits the untouched "
         "sensor.",
     )
-    hold_out: Annotated[list[str], Written("KIND:SIZE")] = Field(
+    hold_out: Annotated[list[str], OptionNotation("KIND:SIZE")] = Field(
         default_factory=list,
         description="An --indenter that only the test split contains. May be given several times.",
     )
@@ -145,14 +145,14 @@ class DatasetOptions(EstimatorOptions):
 class ReconstructionOptions(PictureOptions):
     """Options of reconstructions, which read the shape of an object from colours."""
 
-    method: Annotated[str, Written("network|table")] = Field(
+    method: Annotated[str, OptionNotation("network|table")] = Field(
         "network",
         description="What estimates normals from colours: a neural network or a lookup table.",
     )
-    presses: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] = Field(
+    presses: Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N")] = Field(
         40, description="Number of ball presses that calibrate the reader of normals."
     )
-    radius: Annotated[float, Ge(0.01), Written("MM")] = Field(
+    radius: Annotated[float, Ge(0.01), OptionNotation("MM")] = Field(
         1.5, description="Radius of these balls, mm."
     )
     depth: Range = Field(
@@ -194,16 +194,16 @@ class VerifyOptions(CommandOptions):
         False,
         description="Use six objects, small pictures and few photons; faster and less certain.",
     )
-    objects: Annotated[list[str], Written("NAME", ("--object",), "all twelve")] = Field(
+    objects: Annotated[list[str], OptionNotation("NAME", ("--object",), "all twelve")] = Field(
         [],
         description="An object to press: screw-head, coin, nut, ... May be given several times.",
     )
-    places: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N", usual="3, quick 2")] | None = Field(
-        None, description="Number of presses of each object."
-    )
-    presses: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N", usual="40, quick 20")] | None = (
-        Field(None, description="Number of ball presses that calibrate the reader of each sensor.")
-    )
+    places: (
+        Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N", usual="3, quick 2")] | None
+    ) = Field(None, description="Number of presses of each object.")
+    presses: (
+        Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N", usual="40, quick 20")] | None
+    ) = Field(None, description="Number of ball presses that calibrate the reader of each sensor.")
     seed: Seed = Field(0, description="Seed of the random places, presses and noise.")
     camera_noise: CameraNoise = Field(NOISE, description=NOISE_HELP)
     resolution: Resolution | None = Field(
@@ -211,11 +211,11 @@ class VerifyOptions(CommandOptions):
         description="Width and height of the pictures in pixels; if left out, 320 wide, or 160 "
         "with --quick.",
     )
-    photons: Annotated[Photons, Written("N", usual="fine, quick 500,000", is_text=True)] | None = (
-        Field(None, description="Photons of the light that all pictures of a sensor share.")
-    )
+    photons: (
+        Annotated[Photons, OptionNotation("N", usual="fine, quick 500,000", is_text=True)] | None
+    ) = Field(None, description="Photons of the light that all pictures of a sensor share.")
     skin: Skin = Field(ELASTIC, description=SKIN_HELP)
-    method: Annotated[str, Written("network|table")] = Field(
+    method: Annotated[str, OptionNotation("network|table")] = Field(
         "network",
         description="What estimates normals from colours: a neural network or a lookup table.",
     )

@@ -11,14 +11,16 @@ from optisense.commands.options import (
     MOST_THINGS,
     CommandOptions,
     NamedValues,
+    OptionNotation,
     Photons,
     Resolution,
     Seed,
-    Written,
 )
 from optisense.quality import LEVELS, photons_of
 
-ScorePhotons = Annotated[Photons, Written(f"N|{LEVELS}", usual="fine, 5 million", is_text=True)]
+ScorePhotons = Annotated[
+    Photons, OptionNotation(f"N|{LEVELS}", usual="fine, 5 million", is_text=True)
+]
 
 
 def _with_photons(settings: dict[str, Any]) -> dict[str, Any]:
@@ -28,7 +30,7 @@ def _with_photons(settings: dict[str, Any]) -> dict[str, Any]:
 
 
 ObjectiveSettings = Annotated[
-    NamedValues, AfterValidator(_with_photons), Written("NAME=VALUE", ("--set",))
+    NamedValues, AfterValidator(_with_photons), OptionNotation("NAME=VALUE", ("--set",))
 ]
 
 
@@ -60,13 +62,15 @@ class ScoreOptions(CommandOptions):
 class EvaluateOptions(ScoreOptions):
     """Options of the scores of a design."""
 
-    objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"), "all four")] = Field(
-        [],
-        description="rgb2normal, normdiff, aoap, 2to3pw, one that an installed package brings, or "
-        "your own as FILE.py:FUNCTION. May be given several times.",
+    objectives: Annotated[list[str], OptionNotation("NAME", ("--objective", "-b"), "all four")] = (
+        Field(
+            [],
+            description="rgb2normal, normdiff, aoap, 2to3pw, one that an installed package brings, or "
+            "your own as FILE.py:FUNCTION. May be given several times.",
+        )
     )
     seed: Seed = Field(0, description="The same seed gives the same scores.")
-    seeds: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] = Field(
+    seeds: Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N")] = Field(
         1, description="Number of seeds to score with; from 2 on the standard deviation is printed."
     )
 
@@ -74,19 +78,19 @@ class EvaluateOptions(ScoreOptions):
 class ToleranceOptions(ScoreOptions):
     """Options of the scores of a design with manufacturing errors."""
 
-    objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"))] = Field(
+    objectives: Annotated[list[str], OptionNotation("NAME", ("--objective", "-b"))] = Field(
         ["rgb2normal"],
         description="rgb2normal, normdiff, aoap, 2to3pw, or your own as FILE.py:FUNCTION. May be "
         "given several times.",
     )
-    errors: Annotated[list[str], Written("PATH=SIZE", ("--error",), "usual ones")] = Field(
+    errors: Annotated[list[str], OptionNotation("PATH=SIZE", ("--error",), "usual ones")] = Field(
         [],
         description="A value with a manufacturing error, and the error's standard deviation (mm, "
         "degrees, or the value's own unit), or PATH=+-LIMIT for an error uniformly "
         "distributed up to a limit. lights.position and lights.angle mean each light "
         "by itself. May be given several times.",
     )
-    sensors: Annotated[int, Ge(8), Le(MOST_THINGS), Written("N")] = Field(
+    sensors: Annotated[int, Ge(8), Le(MOST_THINGS), OptionNotation("N")] = Field(
         120, description="Approximate number of manufactured sensors to simulate."
     )
     seed: Seed = Field(0, description="The same seed gives the same sensors.")

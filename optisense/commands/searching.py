@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 from annotated_types import Ge, Le
 from pydantic import Field
 
-from optisense.commands.options import MOST_THINGS, CommandOptions, NamedValues, Seed, Written
+from optisense.commands.options import (
+    MOST_THINGS,
+    CommandOptions,
+    NamedValues,
+    OptionNotation,
+    Seed,
+)
 from optisense.commands.scoring import ObjectiveSettings, ScoreOptions
 
 if TYPE_CHECKING:
@@ -21,43 +27,43 @@ class SearchOptions(CommandOptions):
     study.
     """
 
-    vary: Annotated[list[str], Written("PATH=LO:HI[:N]")] = Field(
+    vary: Annotated[list[str], OptionNotation("PATH=LO:HI[:N]")] = Field(
         [],
         description="A value that may change, between two bounds (N values for a grid); "
         "PATH=+-REACH varies it around its present value, and PATH=NAME,NAME chooses "
         "one of several. May be given several times.",
     )
-    objectives: Annotated[list[str], Written("NAME", ("--objective", "-b"))] = Field(
+    objectives: Annotated[list[str], OptionNotation("NAME", ("--objective", "-b"))] = Field(
         [],
         description="What to maximise: rgb2normal, normdiff, aoap, 2to3pw, another objective, "
         "your own as FILE.py:FUNCTION, or arithmetic such as 'aoap + 0.5*coverage'. "
         "If it is given several times, the first is maximised and the others are only "
         "reported; --method pareto optimises all of them.",
     )
-    require: Annotated[list[str], Written("CONDITION", ("--require",))] = Field(
+    require: Annotated[list[str], OptionNotation("CONDITION", ("--require",))] = Field(
         [],
         description="A condition that the best design must meet, such as 'coverage>=0.55' or "
         "'distortion<=1.5': any objective, or one of its parts, such as "
         "'aoap.coverage_by_area>=0.5'. May be given several times.",
     )
-    method: Annotated[str, Written("NAME", usual="cma-es")] | None = Field(
+    method: Annotated[str, OptionNotation("NAME", usual="cma-es")] | None = Field(
         None, description="The search method; --methods lists all."
     )
-    budget: Annotated[int, Ge(1), Le(MOST_THINGS), Written("N")] | None = Field(
+    budget: Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N")] | None = Field(
         None,
         description="Total number of trials, including the finished ones with --resume; if left "
         "out, the method chooses it.",
     )
-    seed: Annotated[Seed, Written("N", usual="0")] | None = Field(
+    seed: Annotated[Seed, OptionNotation("N", usual="0")] | None = Field(
         None, description="The same seed gives the same search."
     )
     settings: ObjectiveSettings = Field({}, description=ScoreSettings.description)
-    options: Annotated[NamedValues, Written("NAME=VALUE", ("--option",))] = Field(
+    options: Annotated[NamedValues, OptionNotation("NAME=VALUE", ("--option",))] = Field(
         {},
         description="An option of the method, such as sigma=0.1 or population=20. May be given "
         "several times.",
     )
-    rules: Annotated[list[str], Written("FILE.py:FUNCTION", ("--rule",))] = Field(
+    rules: Annotated[list[str], OptionNotation("FILE.py:FUNCTION", ("--rule",))] = Field(
         [],
         description="A function of a design that returns False, or the reason as text, if the "
         "design is not allowed. May be given several times.",
@@ -67,13 +73,13 @@ class SearchOptions(CommandOptions):
         description="Allow parts that cut through one another, lose contact with the parts on "
         "which they rest, or make the sensor much larger.",
     )
-    errors: Annotated[list[str], Written("PATH=SIZE", ("--error",))] = Field(
+    errors: Annotated[list[str], OptionNotation("PATH=SIZE", ("--error",))] = Field(
         [],
         description="A manufacturing error, as in `optisense tolerance`: a value and the standard "
         "deviation of its error. The search then maximises the score that nine of ten "
         "manufactured sensors reach. May be given several times.",
     )
-    samples: Annotated[int, Ge(2), Le(MOST_THINGS), Written("N", usual="8")] | None = Field(
+    samples: Annotated[int, Ge(2), Le(MOST_THINGS), OptionNotation("N", usual="8")] | None = Field(
         None, description="With --error: number of manufactured sensors simulated for each trial."
     )
 

@@ -16,10 +16,10 @@ from optisense.commands.options import (
     CommandOptions,
     Exposure,
     NamedValues,
+    OptionNotation,
     Photons,
     Range,
     Resolution,
-    Written,
 )
 from optisense.commands.rendering import RenderOptions
 from optisense.commands.searching import SearchOptions
@@ -33,11 +33,15 @@ class _Common(CommandOptions):
 
 class _Options(_Common):
     resolution: Resolution = Field("8x6", validate_default=True, description="Pixels.")
-    share: Annotated[float, Ge(0.0), Le(1.0), Written("PART")] = Field(0.5, description="Of all.")
+    share: Annotated[float, Ge(0.0), Le(1.0), OptionNotation("PART")] = Field(
+        0.5, description="Of all."
+    )
     exposure: Exposure = Field("auto", description="Factor.")
     depth: Range | None = Field(None, description="How deep.")
-    names: Annotated[list[str], Written("NAME", ("--name", "-n"))] = Field([], description="Whose.")
-    settings: Annotated[NamedValues, Written("NAME=VALUE", ("--set",))] = Field(
+    names: Annotated[list[str], OptionNotation("NAME", ("--name", "-n"))] = Field(
+        [], description="Whose."
+    )
+    settings: Annotated[NamedValues, OptionNotation("NAME=VALUE", ("--set",))] = Field(
         {}, description="More."
     )
     quick: bool = Field(False, description="Or slow.")
