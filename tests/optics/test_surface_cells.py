@@ -62,3 +62,61 @@ def test_triangles_without_area_make_no_cells() -> None:
     cells = build_cells(np.concatenate([points, far]), with_line, SIZE)
     assert np.isfinite(cells.centres).all()
     assert cells.cells == build_cells(points, faces, SIZE).cells
+
+
+def corner() -> tuple[np.ndarray, np.ndarray]:
+    """A top of 8 x 8 mm in the plane z = 0, and a wall of 3 mm under its edge at x = 8."""
+    points = [(0, 0, 0), (8, 0, 0), (8, 8, 0), (0, 8, 0), (8, 0, -3), (8, 8, -3)]
+    faces = [(0, 1, 2), (0, 2, 3), (1, 4, 2), (4, 5, 2)]
+    return np.array(points, dtype=float), np.array(faces)
+
+
+def test_a_crease_divides_the_cells_that_it_runs_through() -> None:
+    use_variant("llvm")
+    from optisense.optics.scene.surface_cells import build_cells
+
+    cells = build_cells(*corner(), SIZE)
+    assert cells.creased
+    assert cells.areas.sum() == pytest.approx(8 * 8 + 8 * 3, rel=1e-3)
+    on_top, on_wall = np.abs(cells.normals[:, 2]) > 0.999, np.abs(cells.normals[:, 0]) > 0.999
+    assert (on_top ^ on_wall).all()
+    np.testing.assert_allclose(cells.centres[on_top][:, 2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(cells.centres[on_wall][:, 0], 8.0, atol=1e-9)
+    second = np.asarray(cells.others)
+    pairs = np.flatnonzero(second != np.arange(cells.cells))
+    np.testing.assert_array_equal(second[second[pairs]], pairs)
+    assert 16 <= len(pairs) / 2 <= 17  # along 8 mm of the edge
+
+
+def test_light_on_a_top_is_not_averaged_with_the_dark_wall_beside_it() -> None:
+    use_variant("llvm")
+    import drjit as dr
+    import mitsuba as mi
+
+    from optisense.optics.radiance_cache.smoothing import Kernels
+    from optisense.optics.scene.surface_cells import build_cells, cell_at, surface_samples
+
+    points, faces = corner()
+    cells = build_cells(points, faces, SIZE)
+    landings, owner, power = surface_samples(points, faces, 0.02)
+    lit = owner < 2
+    cell, found = cell_at(cells, mi.Point3f(*(mi.Float(each[lit]) for each in landings)), True)
+    dr.eval(cell, found)
+    assert np.asarray(found).all()
+    landed = np.bincount(np.asarray(cell), power[lit], cells.cells)[:, None]
+    kernel = Kernels(cells, np.full(cells.cells, 10.0), 1e-3).smoothing(1_000_000).kernel.matrix
+    light = (kernel @ landed)[:, 0]
+    on_top = np.abs(cells.normals[:, 2]) > 0.999
+    # Areas of cells are known to a few per cent; a cell of both faces would have half the light.
+    np.testing.assert_allclose(light[on_top], 1.0, atol=0.05)
+    np.testing.assert_allclose(light[~on_top], 0.0, atol=1e-3)  # landings on the edge itself
+
+
+def test_two_sides_of_a_sheet_are_one_cell() -> None:
+    use_variant("llvm")
+    from optisense.optics.scene.surface_cells import build_cells
+
+    points, faces = fan(60)
+    cells = build_cells(points, np.concatenate([faces, faces[:, ::-1]]), SIZE)
+    assert not cells.creased
+    assert cells.areas.sum() == pytest.approx(2 * np.pi * RADIUS**2, rel=5e-3)

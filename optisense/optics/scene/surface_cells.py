@@ -16,6 +16,11 @@ FloatArray = NDArray[np.floating]
 SAMPLES_ACROSS = 7
 """Samples of the surface along the side of a cell; they give its area to a few per cent."""
 
+CREASE_COSINE = 0.5
+"""Largest cosine between normals at one grid place whose surface is divided into two cells, as at
+an edge between a wall and a top: light from beside the wall reaches the top and not the wall.
+"""
+
 SEARCH_CELLS = 3
 """Distance from the surface, in cell sides, within which a point still finds the nearest cell."""
 
@@ -29,6 +34,9 @@ class SurfaceCells:
         inverse_size: inverse of the side of a cell, 1/mm.
         counts: number of grid places along each axis.
         index: number + 1 of the cell at each grid place (0: none).
+        others: number of the second cell at the place of each cell, on the other side of a crease;
+            the cell itself where there is none.
+        creased: whether any place has two cells.
         cells: number of cells.
         planes: normal and offset of the plane of each cell, four floats.
         centres: (cells, 3) centre of the surface in each cell, mm.
@@ -41,6 +49,8 @@ class SurfaceCells:
     inverse_size: mi.Float
     counts: mi.Vector3u
     index: mi.UInt32
+    others: mi.UInt32
+    creased: bool
     cells: int
     planes: mi.Float
     centres: FloatArray
@@ -96,19 +106,12 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
     counts = np.floor((points.max(axis=1) - lower) / size).astype(int) + 1 + SEARCH_CELLS
     x, y, z = (((points[k] - lower[k]) / size).astype(int) for k in range(3))
     place = x + counts[0] * (y + counts[1] * z)
-    places = int(np.prod(counts))
-    used = np.flatnonzero(np.bincount(place, minlength=places))
-    cells = len(used)
-
-    def total(values: FloatArray) -> FloatArray:
-        return np.asarray(np.bincount(place, values, places)[used], dtype=np.float64)
-
-    area = total(areas)
-    centre = np.stack([total(areas * points[k]) for k in range(3)], axis=1) / area[:, None]
+    used, owner = np.unique(place, return_inverse=True)
     cross, length = _twice_areas(vertices, faces)
-    normals = cross / np.maximum(length, 1e-30)[:, None]
-    normal = np.stack([total(areas * normals[:, k][face]) for k in range(3)], axis=1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    normals = (cross / np.maximum(length, 1e-30)[:, None])[face]
+    owner, other = _divided(np.asarray(owner).reshape(-1), points, normals, areas)
+    cells = len(other)
+    area, centre, normal = _means(owner, cells, points, normals, areas)
     index = _index(used, counts)
 
     lower3, counts3 = mi.Point3f(*lower.tolist()), mi.Vector3u(*counts.tolist())
@@ -121,6 +124,8 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
         inverse_size=dr.opaque(mi.Float, 1 / size),
         counts=counts3,
         index=mi.UInt32(index),
+        others=mi.UInt32(other.astype(np.uint32)),
+        creased=cells > len(used),
         cells=cells,
         planes=mi.Float(four.ravel()),
         centres=centre,
@@ -128,6 +133,81 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
         areas=area,
         axes=_frame(normal.sum(axis=0)),
     )
+
+
+def _means(
+    owner: NDArray[np.int64],
+    cells: int,
+    points: FloatArray,
+    normals: FloatArray,
+    areas: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return area (cells,), centre (cells, 3) and mean unit normal (cells, 3) of cells, whose
+    samples `owner` tells.
+    """
+
+    def total(values: FloatArray) -> FloatArray:
+        return np.asarray(np.bincount(owner, values, cells), dtype=np.float64)
+
+    area = total(areas)
+    divisor = np.maximum(area, 1e-30)[:, None]
+    centre = np.stack([total(areas * points[k]) for k in range(3)], axis=1) / divisor
+    normal = np.stack([total(areas * normals[:, k]) for k in range(3)], axis=1)
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    return area, centre, normal
+
+
+def _divided(
+    owner: NDArray[np.int64], points: FloatArray, normals: FloatArray, areas: FloatArray
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Divide the places that a crease runs through into two cells.
+
+    A sample belongs to the cell whose plane is nearer, as points do that look for their cell.
+
+    Args:
+        owner: number (n,) of the place of each sample.
+        points, normals, areas: (3, n) place, (n, 3) normal and (n,) area of each sample.
+
+    Returns:
+        The cell (n,) of each sample, and the second cell at the place of each cell, itself if none.
+    """
+    count = int(owner.max()) + 1
+    mean = _means(owner, count, points, normals, areas)[2]
+
+    def farthest(seeds: FloatArray) -> FloatArray:
+        """The normal (count, 3) at each place that differs most from its seed."""
+        order = np.lexsort((np.einsum("ij,ij->i", seeds[owner], normals), owner))
+        return normals[order[np.searchsorted(owner[order], np.arange(count))]]
+
+    one = farthest(mean)
+    two = farthest(one)
+    second = np.full(count, -1)
+    creased = np.flatnonzero(np.einsum("ij,ij->i", one, two) < CREASE_COSINE)
+    second[creased] = count + np.arange(len(creased))
+    inside = np.flatnonzero(second[owner] >= 0)
+    home, beyond = owner[inside], second[owner[inside]]
+    towards = np.einsum("ij,ij->i", (one - two)[home], normals[inside])
+    _, centre, normal = _means(
+        np.where(towards > 0, beyond, home),
+        count + len(creased),
+        points[:, inside],
+        normals[inside],
+        areas[inside],
+    )
+
+    def away(cell: NDArray[np.int64]) -> FloatArray:
+        offset = points[:, inside].T - centre[cell]
+        return np.asarray(np.abs(np.einsum("ij,ij->i", normal[cell], offset)))
+
+    # Where all samples lie in one plane, as on the two sides of a sheet, the place stays one cell.
+    other_side = away(beyond) < away(home)
+    sides = np.bincount(home, other_side, count), np.bincount(home, ~other_side, count)
+    creased = np.flatnonzero((sides[0] > 0) & (sides[1] > 0))
+    second = np.arange(count)
+    second[creased] = count + np.arange(len(creased))
+    divided = owner.copy()
+    divided[inside] = np.where(other_side, second[home], home)
+    return divided, np.concatenate([second, creased])
 
 
 def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uint32]:
@@ -159,14 +239,28 @@ def bin_axis(cells: SurfaceCells, number: int) -> mi.Vector3f:
 
 
 def cell_at(cells: SurfaceCells, point: mi.Point3f, active: mi.Bool) -> tuple[mi.UInt32, mi.Bool]:
-    """Return the number of the cell that holds each point, and whether there is one."""
+    """Return the number of the cell that holds each point, and whether there is one.
+
+    Of two cells beside a crease, it is that in whose plane the point lies.
+    """
     relative = (point - cells.lower) * cells.inverse_size
     inside = mi.Bool(active)
     for i in range(3):
         inside &= (relative[i] >= 0) & (relative[i] < mi.Float(cells.counts[i]))
     x, y, z = (mi.UInt32(dr.maximum(relative[i], 0)) for i in range(3))
     found = dr.gather(mi.UInt32, cells.index, x + cells.counts.x * (y + cells.counts.y * z), inside)
-    return dr.maximum(found, 1) - 1, inside & (found > 0)
+    cell, inside = dr.maximum(found, 1) - 1, inside & (found > 0)
+    if cells.creased:
+        other = dr.gather(mi.UInt32, cells.others, cell, inside)
+        away, beyond = (_distance(cells, each, point, inside) for each in (cell, other))
+        cell = dr.select(beyond < away, other, cell)
+    return cell, inside
+
+
+def _distance(cells: SurfaceCells, cell: mi.UInt32, point: mi.Point3f, active: mi.Bool) -> mi.Float:
+    """Return the distance (mm) of points from the planes of cells."""
+    normal, offset = plane_of(cells, cell, active)
+    return dr.abs(dr.dot(normal, point) - offset)
 
 
 def plane_of(cells: SurfaceCells, cell: mi.UInt32, active: mi.Bool) -> tuple[mi.Vector3f, mi.Float]:
