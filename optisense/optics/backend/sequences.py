@@ -6,8 +6,12 @@ ratio; Roberts 2018), so that every prefix of the sequence is spread evenly in f
 
 from __future__ import annotations
 
+from functools import cache
+
+import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 
 def _steps(dimensions: int) -> list[int]:
@@ -21,6 +25,8 @@ STEPS = _steps(4)
 """Steps of the four-dimensional sequence, in units of 2^-32."""
 STEPS_2D = _steps(2)
 """Steps of the two-dimensional sequence, in units of 2^-32."""
+STEPS_3D = _steps(3)
+"""Steps of the three-dimensional sequence, in units of 2^-32."""
 RICHTMYER_STEPS = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
 """Fractional parts of the square roots of primes (Richtmyer's sequence), in units of 2^-32. They
 are not close to simple fractions, so that a few elements are spread evenly in each single dimension
@@ -36,6 +42,11 @@ give similar shifts."""
 def unit_float(bits: mi.UInt32) -> mi.Float:
     """A number in [0, 1) from random bits."""
     return mi.Float(bits >> 8) * 2**-24
+
+
+def folded(value: mi.Float) -> mi.Float:
+    """The fold of [0, 1) about its middle, by which functions on it become periodic."""
+    return 1 - dr.abs(2 * value - 1)
 
 
 def next_random(state: mi.UInt32) -> mi.UInt32:
@@ -62,6 +73,50 @@ def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Poin
     for k, step in enumerate(STEPS_2D):
         shift = mi.sample_tea_32(stream * 4 + k, seed)[0]
         out.append(unit_float(index * mi.UInt32(step) + shift))
+    return mi.Point2f(*out)
+
+
+@cache
+def lattice_multipliers(most: int) -> NDArray[np.uint32]:
+    """Return the multiplier of the rank-1 lattice of n points, for n from 0 to ``most``.
+
+    Point i of the lattice is (i / n, i a / n), modulo 1. Of all multipliers a without a common
+    divisor with n, the one whose points are farthest apart is chosen.
+    """
+    out = np.ones(most + 1, dtype=np.uint32)
+    for n in range(3, most + 1):
+        steps = np.arange(1, n)
+        candidates = steps[np.gcd(steps, n) == 1]
+        away = steps * candidates[:, None] % n
+        squares = np.minimum(steps, n - steps) ** 2 + np.minimum(away, n - away) ** 2
+        out[n] = candidates[squares.min(axis=1).argmax()]
+    return out
+
+
+def folded_lattice(
+    index: mi.UInt32, count: mi.UInt32, most: int, stream: mi.UInt32, seed: mi.UInt32
+) -> mi.Point2f:
+    """Return points of the unit square from a lattice of ``count`` points that is shifted by random
+    numbers and folded.
+
+    The fold (the baker's transformation, 1 - abs(2 x - 1)) makes the mean of a smooth function over
+    all points of a lattice converge as 1 / ``count``^2 (Hickernell 2002).
+
+    Args:
+        index: number of the point.
+        count: number of points of its lattice, at least 1.
+        most: upper bound on ``count``.
+        stream: number of the shift.
+        seed: seed of the shifts.
+    """
+    multiplier = dr.gather(mi.UInt32, mi.UInt32(lattice_multipliers(most)), count)
+    out = []
+    # `index % count` would divide whole numbers by 0 in the lanes beyond the arrays' end.
+    share = 1 / mi.Float(count)
+    for k, place in enumerate((index, index * multiplier)):
+        shift = unit_float(mi.sample_tea_32(stream * 4 + k, seed)[0])
+        value = mi.Float(place) * share + shift
+        out.append(folded(value - dr.floor(value)))
     return mi.Point2f(*out)
 
 

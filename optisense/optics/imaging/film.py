@@ -124,31 +124,46 @@ class Film:
         return layers
 
     def spread_layers(
-        self, width: int, height: int, where: NDArray[np.bool_], reach: int
+        self, width: int, height: int, regions: list[tuple[NDArray[np.bool_], int]]
     ) -> NDArray[np.float32]:
-        """Return the layers with the pixels of a mask averaged over the samples of other pixels of
-        the mask around them.
+        """Return the layers with the pixels of each region averaged over the samples of other
+        pixels of the region around them.
 
         Args:
             width: number of pixels in a row.
             height: number of rows.
-            where: (h, w) mask of the pixels that are averaged with one another.
-            reach: half the side (pixels) of the square over which a triangular kernel averages.
+            regions: (h, w) mask of pixels that are averaged with one another, and half the side
+                (pixels, odd) of the square over which a triangular kernel averages them.
         """
         layers = self.layers(width, height)
-        inside = where.astype(np.float32)
-
-        def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
-            for _ in range(2):
-                image = ndimage.uniform_filter(image, reach, mode="constant")
-            return image
-
-        counts = np.asarray(self.counts).reshape(height, width) * inside
-        near = around(counts)
-        share = np.divide(1, near, out=np.zeros_like(near), where=where & (near > 0))
-        for layer in layers:
-            for k in range(3):
-                if layer[..., k].any():
-                    mean = around(layer[..., k] * counts) * share
-                    layer[..., k] = np.where(where, mean, layer[..., k])
+        samples = np.asarray(self.counts).reshape(height, width)
+        for where, reach in regions:
+            if reach > 1:
+                _average(layers, samples, where, reach)
         return layers
+
+
+def _average(
+    layers: NDArray[np.float32],
+    samples: NDArray[np.float32],
+    where: NDArray[np.bool_],
+    reach: int,
+) -> None:
+    """Average the pixels ``where`` of layers (groups, h, w, 3) as in `Film.spread_layers`.
+
+    ``samples`` is the number of samples of each pixel.
+    """
+
+    def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
+        for _ in range(2):
+            image = ndimage.uniform_filter(image, reach, mode="constant")
+        return image
+
+    counts = samples * where
+    near = around(counts)
+    share = np.divide(1, near, out=np.zeros_like(near), where=where & (near > 0))
+    for layer in layers:
+        for k in range(3):
+            if layer[..., k].any():
+                mean = around(layer[..., k] * counts) * share
+                layer[..., k] = np.where(where, mean, layer[..., k])

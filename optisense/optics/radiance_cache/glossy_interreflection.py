@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
+from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache.angular_variance import occluder_horizon
 from optisense.optics.radiance_cache.bin_sums import sum_bins
 from optisense.optics.radiance_cache.cache import RadianceCache
@@ -113,9 +113,11 @@ def _secondary_hits(scenes: ContactScenes, at: ShadingPoints) -> SecondaryHits |
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
     u = unit_float(points.series + points.number * STEPS_2D[0])
     v = unit_float(points.series * 277803737 + points.number * STEPS_2D[1])
-    state = (points.random ^ (points.number * 0x9E3779B9)) * 69069
+    # The samples of a pixel share their lobes evenly.
+    pick = unit_float(points.series * 69069 + points.number * GOLDEN_BITS)
+    state = (points.random ^ (points.number * GOLDEN_BITS)) * 69069
     way, weight = sample_coating(
-        at.coating, points.normal, -points.towards_eye, unit_float(state), mi.Point2f(u, v)
+        at.coating, points.normal, -points.towards_eye, pick, mi.Point2f(u, v)
     )
     weight = weight * points.weight
     start = leave(points.point, points.face_normal, way)

