@@ -37,19 +37,19 @@ COATINGS = {"diffuse": 0.0, "metallic": 0.6}
 """Specularity of each coating."""
 RESOLUTION = (160, 120)
 PHOTONS = 600_000
-"""Of an image."""
+"""Number of photons of an image."""
 SEEDS = (1, 2)
-"""Of the images; the first also compiles, so the last is timed."""
+"""Seeds of the images; the first run also compiles kernels, so that the last run is timed."""
 RUNS = 4
-"""Images in light that is there, of which the fastest counts."""
+"""Number of images with a kept radiance cache, of which the fastest is reported."""
 REFERENCE_PHOTONS = 6_000_000
-"""Of each seed of the reference, at most."""
+"""Largest number of photons of each seed of the reference."""
 REFERENCE_SEEDS = (101, 102)
 BOX = 3
 """Side (pixels) of the square over which pictures are averaged before they are compared, which
-takes off most of the reference's noise."""
+removes most of the reference's noise."""
 RADIUS, DEPTH = 1.5, 0.8
-"""mm: the ball that is pressed in."""
+"""Radius and depth (mm) of the ball that is pressed in."""
 ERRORS = ("error_in_contact", "error_elsewhere")
 TIMES = ("cpu_s_new_light", "cpu_s_kept_light")
 

@@ -16,10 +16,10 @@ FloatArray = NDArray[np.float32]
 
 DESIGN = "gelsight-mini"
 RADIUS, DEPTH = 1.5, 0.8
-"""mm: the ball of the OptiSense paper."""
+"""Radius and depth (mm) of the ball in the OptiSense paper."""
 RESOLUTION = (320, 240)
 PHOTONS = 560_000
-"""Of an image: about the fewest for 3 % of error in the contact."""
+"""Number of photons of an image, about the smallest for an error of 3 % in the contact."""
 CONTACT_TEXT = f"sphere:{RADIUS}@0,0:{DEPTH}"
 
 

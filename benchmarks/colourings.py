@@ -35,7 +35,7 @@ OBJECTIVES = ("rgb2normal", "normdiff")
 COLOURS = {"lights.lg*.colour": ["R", "G", "B"]}
 DRAWN = 5
 OTHER_SEED = 999
-"""Of the colourings' own renderings."""
+"""Seed of the separate renderings of colourings."""
 TARGET_SECONDS = 600.0
 
 PAPERS = ("GRRGGRRG", "GBBRRGGB", "GRRBBGGR", "GBRBRGBR", "RGBRGBRG")

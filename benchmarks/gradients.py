@@ -57,10 +57,10 @@ SHIFTS = 16
 """The differences are those of the mean of so many scores, whose rays go through other points of
 the pixels: an edge that is parallel to a row of pixels moves past all of the row's rays at once."""
 CAMERA = {"camera.position": Around(1.0), "camera.turn": Around(3.0), "camera.fov": Around(3.0)}
-"""mm and degrees."""
+"""Range of the camera's position (mm) and rotation (degrees)."""
 CAGE = Around(1.0)
 VIEW = {"camera.position.z": (0.0, 8.0), "camera.fov": Around(20.0)}
-"""What is searched on GelSight360: mm and degrees."""
+"""Parameters of the search on GelSight360, in mm and degrees."""
 VIEW_BUDGET = {"gradient": 40, "cma-es": 200}
 
 

@@ -26,12 +26,12 @@ FloatArray = NDArray[np.float64]
 
 FILE = Path(__file__).with_suffix(".md")
 THICKNESS, RADIUS = 4.25, 1.5
-"""mm, of GelSight Mini's gel and of the ball."""
+"""Thickness of GelSight Mini's gel and radius of the ball, mm."""
 GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49)
 INDENTATIONS = (0.01, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 """Depths over the thickness."""
 WIDTH = 25.0
-"""mm from the axis to the free side, six thicknesses."""
+"""Distance (mm) from the axis to the free side, six thicknesses."""
 ACROSS, DOWN = 64, 28
 """Elements along the radius and through the thickness; the finest are 0.05 mm at the contact."""
 STEP = 0.01
@@ -42,8 +42,8 @@ MOST_ITERATIONS = 100
 ENOUGH = 1e-8
 """Residual force (N) over the force on the ball at which Newton's method ends."""
 SMALLEST_PART = 0.01
-"""Part of Newton's step below which it is taken even if residuals grow, as they do where nodes
-touch anew."""
+"""Share of Newton's step below which the step is taken even if residuals grow, as they do when
+nodes come into contact."""
 LINE_POINTS = 130
 """Grid points across the linear solution."""
 

@@ -17,7 +17,7 @@ from optisense.optics.scene.surfaces import Region
 
 PASS_SAMPLES = 16
 DEPTH = 32
-"""Of paths; what is beyond is less than 0.1 % of the light."""
+"""Largest number of surfaces of a path; longer paths carry less than 0.1 % of the light."""
 
 
 def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:

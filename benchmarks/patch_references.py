@@ -36,21 +36,23 @@ Window = tuple[slice, slice]
 
 CACHE = Path(__file__).parent / ".cache"
 BATCHES = 8
-"""Independent pictures, whose scatter tells the reference's noise."""
+"""Number of independent pictures, whose scatter gives the noise of the reference."""
 PATH_SAMPLES = 16_384
-"""Of the path tracer, per pixel and batch."""
+"""Number of the path tracer's samples per pixel and batch."""
 PASS_SAMPLES = 1_024
-"""Of one call of the path tracer."""
+"""Number of samples per pixel in one call of the path tracer."""
 PATH_DEPTH = 64
-"""Surfaces of a path; with metal, less than a thousandth of the light is beyond."""
+"""Largest number of surfaces of a path; with metal, longer paths carry less than a thousandth of
+the light."""
 SPPM_PASSES = 8
-"""Photon passes of a batch."""
+"""Number of photon passes in a batch."""
 SPPM_PHOTONS = 1_000_000
-"""Of a pass."""
+"""Number of photons in a pass."""
 SPPM_RADIUS = 0.08
-"""mm: gather radius of the first pass of a batch; pass n gathers within n^(1/6) times less. It is
-two thirds of a pixel of GelSight Mini. With 0.3 mm, discs of the row of pixels at the rim lie half
-on the skin and half on the ball, and miss 20 to 30 % of a mirroring flank's light."""
+"""Gather radius (mm) of the first pass of a batch; that of pass n is smaller by a factor of
+n^(1/6). It is two thirds of a pixel of GelSight Mini. With 0.3 mm, discs of the row of pixels at
+the rim lie half on the skin and half on the ball, and miss 20 to 30 % of the light of a mirroring
+flank."""
 SPPM_SAMPLES = 8
 """Camera samples of each pixel in a pass, whose discs together cover the pixel several times. With
 one, the noise is twice as large."""

@@ -38,19 +38,19 @@ from optisense.optics import TactileImage
 FloatArray = NDArray[np.floating]
 RESOLUTION = (160, 120)
 RESOLUTIONS = {"gelbelt": (320, 240), "gelsight-svelte": (320, 240), "gelsight360": (480, 360)}
-"""Of the sensors whose pictures of `RESOLUTION` show a contact in few pixels."""
+"""Resolutions for the sensors whose pictures of `RESOLUTION` show a contact in few pixels."""
 RADIUS = 1.5
-"""mm: the ball that is pressed in."""
+"""Radius (mm) of the ball that is pressed in."""
 PHOTONS = 10_000_000
-"""Of each image."""
+"""Number of photons of each image."""
 SEEDS = (1, 2)
-"""Of the images, which are averaged: what is looked for is not their noise."""
+"""Seeds of the images, which are averaged to reduce their noise."""
 TILTS = 5
 """Bands of tilt in the contact, each of as many pixels."""
 QUARTERS = 4
 """Sectors of azimuth."""
 RING = 12
-"""Pixels: width of the ring of skin around the contact, beyond the rim."""
+"""Width (pixels) of the ring of skin around the contact, beyond the rim."""
 MARGIN = RING + 2
 
 

@@ -29,16 +29,16 @@ from dataclasses import dataclass, field
 import pyte
 
 LOOK_EVERY = 0.5
-"""Seconds between looks at the screen."""
+"""Time (s) between two readings of the screen."""
 
 ROWS = 50
 SHARES = (0.1, 0.25, 0.5, 0.75)
-"""Parts of the whole time at which the promised total is compared with the real one."""
+"""Shares of the total time at which the predicted total is compared with the real one."""
 
 LEFT = re.compile(r"((?:\d+:)?\d+:\d\d) left|left ((?:\d+:)?\d+:\d\d)")
 CLOCK = re.compile(r"(?:\d+:)?\d+:\d\d")
 LIVE = re.compile(r"[━─╸╺]|" + CLOCK.pattern)
-"""What tells a progress line from the messages above it: a bar or a clock."""
+"""Pattern of a bar or a clock, which distinguishes a progress line from the messages above it."""
 
 
 @dataclass

@@ -33,16 +33,16 @@ RECORDS = Path(__file__).parent.parent / "tests" / "assets" / "progress"
 PAGE = Path(__file__).parent / "progress.md"
 
 SHARES = (0.1, 0.25, 0.5, 0.75)
-"""Parts of the whole time at which the promised total is compared with the real one."""
+"""Shares of the total time at which the predicted total is compared with the real one."""
 
 PROCESSORS = 2
-"""Processors of the idle machine."""
+"""Number of processors of the idle machine."""
 
 SERIAL = ("loading", "building the scene", "writing the report")
-"""Steps that one thread does."""
+"""Steps that run in one thread."""
 
 OFTEN = 0.1
-"""Least processor seconds between noted parts of pieces."""
+"""Smallest processor time (s) between two recorded parts of a piece."""
 
 FEW = ["--set", "photons=1000000"]
 COMMANDS = {

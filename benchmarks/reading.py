@@ -35,18 +35,18 @@ SENSORS = (
 )
 SPECULARITIES = (0.0, 0.2, 0.4, 0.6, 0.8)
 WIDE = 320
-"""Pixels across the pictures of the scores; twice as many where contacts are small."""
+"""Width (pixels) of the pictures of the scores; twice as many where contacts are small."""
 SMALL_CONTACTS = ("gelsight360", "gelsight-svelte")
 """Sensors with a large view, in whose pictures a contact has few pixels."""
 TASK_WIDE = 160
-"""Pixels across the pictures of the task."""
+"""Width (pixels) of the pictures of the task."""
 BALLS = 24
 """Presses that the task's network learns from; 40 are usual, and take longer."""
 PHOTONS = 300_000
-"""Of each image."""
+"""Number of photons of each image."""
 OBJECTIVES = ("reading", "rgb2normal", "normdiff")
 SCORES = {"reading": -1.0, "mean_of_places": -1.0, "rgb2normal": 1.0, "normdiff": 1.0}
-"""Numbers of a row, and 1 where a higher value is better."""
+"""Scores of a row, with 1 if a higher value is better and -1 otherwise."""
 
 
 def main() -> None:

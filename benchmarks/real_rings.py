@@ -25,7 +25,7 @@ from optisense.geometry import Contact, Sphere
 from optisense.mechanics import CONFORMING, ELASTIC
 
 WIDTH = 320
-"""Pixels across the pictures; photographs are scaled to it."""
+"""Width (pixels) of the pictures; photographs are scaled to it."""
 INSIDE, RING = 0.9, (1.1, 1.6)
 """Contact radii up to which the contact's signal is taken, and between which the ring's is."""
 DEEPEST = 2.5

@@ -29,12 +29,13 @@ from optisense.optics.transport.photons import Emission
 CACHE = Path(__file__).parent / ".cache"
 SEEDS = 6
 PHOTONS = 60_000_000
-"""Of each seed."""
+"""Number of photons of each seed."""
 FIRST_RADIUS = 0.12
-"""mm; two pixels. Pass n gathers within n^(1/6) times less, so most within one pixel."""
+"""Gather radius (mm) of the first pass, two pixels. That of pass n is smaller by a factor of
+n^(1/6), so that most are within one pixel."""
 PASS_PHOTONS = 1_000_000
 MARGIN = 10
-"""Pixels around the contact."""
+"""Width (pixels) of the margin around the contact."""
 FIRST_SEED = 7_000
 
 

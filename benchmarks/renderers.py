@@ -21,7 +21,7 @@ from optisense.mechanics import CONFORMING
 
 MITSUBA = "Mitsuba path"
 BUDGET = 60.0
-"""Seconds for each renderer."""
+"""Time (s) for each renderer."""
 
 
 def compare_renderers(

@@ -31,7 +31,7 @@ from optisense.optics import OpticalModel
 FOLDER = Path(__file__).parent
 DESIGN = "gelsight-mini"
 SEEDS = 20
-"""They tell a standard deviation to a sixth."""
+"""Number of seeds; 20 give a standard deviation to a sixth of its value."""
 TIMED_SEEDS = 5
 WARM_UP_SEED = 1000
 RAY_RUNS = 7
@@ -41,7 +41,7 @@ DIRECTIONS = (0.0, 45.0, 90.0, 135.0)
 ANGLES = (20.0, 25.0, 30.0)
 DEPTHS = (0.1, 0.2, 0.5)
 PIXEL_NOISE = 1.5 / 255
-"""Of a real GelSight Mini: 1.1 to 1.9 grey levels."""
+"""Noise of a pixel of a real GelSight Mini, which is 1.1 to 1.9 grey levels."""
 
 TARGETS = {
     "rgb2normal": "standard deviation 0.003; 10 s for all nine places, light included",

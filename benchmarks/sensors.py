@@ -24,18 +24,18 @@ from optisense.optics import TactileImage
 NAMES = ("digit", "gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 RESOLUTION = (320, 240)
 WANTED_NOISE = 0.03
-"""Of the light in the contact."""
+"""Relative noise of the light in the contact."""
 TRIAL_PHOTONS, STEP, MOST_PHOTONS = 400_000, 50_000, 16_000_000
 SEEDS = 6
-"""Of images that tell the noise."""
+"""Number of images from which the noise is computed."""
 RUNS = 3
 CHILD_RUNS = 5
 RADIUS, DEPTH = 1.5, 0.8
-"""mm: the ball that is pressed in."""
+"""Radius and depth (mm) of the ball that is pressed in."""
 
 LOAD_AND_CHECK = "from optisense import sensors; sensors.check(sensors.build('{name}'))"
 TARGETS = {"load_and_check": 1.0, "image": 1.5, "first_image": 8.0}
-"""Seconds."""
+"""Wanted durations (s)."""
 
 
 def main() -> None:

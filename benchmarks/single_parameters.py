@@ -48,19 +48,20 @@ RAYS = (160, 120)
 """Chief rays of a trial and of a picture."""
 
 CHECK = 2.0
-"""mm, side of a field of the checkerboard."""
+"""Side (mm) of a field of the checkerboard."""
 
 COLUMNS = 6
 
 ANGLES = (0.01, 0.1, 1, 3, 10, 20, 30, 40, 50, 60, 80, 100, 120, 125, 140, 160, 179, 179.9)
 FISHEYE_ANGLES = (*ANGLES[:-1], 200, 240, 280, 320, 360)
-"""Degrees; a perspective camera of less than 180 is refused before anything is traced."""
+"""Fields of view (degrees) of fisheye lenses; `check` refuses such values for perspective lenses
+before anything is traced."""
 
 STEPS = (0.1, 0.3, 1, 3, 10, 30, 100, 300, LARGEST)
-"""mm to either side of what a place is."""
+"""Distances (mm) by which a position is changed to either side."""
 
 TURNS = (0.3, 1, 3, 10, 30, 60, 90, 120, 150, 180)
-"""Degrees to either side."""
+"""Angles (degrees) by which a rotation is changed to either side."""
 
 INDICES = (1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0, 2.5, 3.0, 4.0)
 CAGE_POINTS = (0, 14, 17, 26)

@@ -27,7 +27,7 @@ from optisense.optics import OpticalModel, TactileImage
 RUNS = 7
 LARGE = (640, 480)
 MANY_PHOTONS = 5_000_000
-"""What a program that keeps its model traces, unless it asks for another number."""
+"""Default number of photons of a program that keeps its model."""
 OTHER_PLACES = [(2.0, 1.0), (-3.0, 2.0), (1.0, -3.0), (-4.0, -2.0), (4.0, 3.0)]
 """Surface coordinates (mm) of other contacts."""
 COMMAND = ["-m", "optisense.cli", "render", DESIGN, "--contact", CONTACT_TEXT, "--out"]

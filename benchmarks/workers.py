@@ -24,7 +24,8 @@ from optisense.search.study.loop import StudyRun
 from optisense.search.study.store import Row
 
 BLEND = {"cages.M1.blend": (0.0, 1.0)}
-"""Between the flat and the most curved mirror: no part cuts through another, no trial fails."""
+"""Range between the flat and the most curved mirror, in which no parts intersect and no trial
+fails."""
 
 SHINE = {"coating.specularity": (0.0, 0.3), "lights.*.flux": (1.0, 2.0)}
 LIGHT = {

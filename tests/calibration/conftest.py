@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 PLACES = [(-4.0, 2.0), (3.0, -2.0), (0.5, 3.0)]
-"""mm, where the balls press."""
+"""Surface coordinates (mm) of the presses."""
 
 PHOTONS = 100_000
 """Photons of the light."""
 
 SIZE = (160, 120)
-"""Pixels of the photographs."""
+"""Size (pixels) of the photographs."""
 
 
 @pytest.fixture(scope="session")

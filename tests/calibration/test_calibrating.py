@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 CHEAP = ("powers", "colours", "tone", "black", "shading")
-"""What is fitted without a rendering."""
+"""Families of numbers that are fitted without a rendering."""
 
 HIDDEN = {
     "lights.red.flux": 1.5,
@@ -43,7 +43,7 @@ HIDDEN = {
     "camera.stray_light[1]": 0.06,
     "camera.shading.falloff": 0.35,
 }
-"""Numbers of the sensor that is photographed; the others are those of the start."""
+"""Numbers of the photographed sensor that differ from those of the start."""
 
 
 @pytest.fixture(scope="module")

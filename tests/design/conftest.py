@@ -41,7 +41,7 @@ OTHER_KINDS = {
     "blur": {"kind": "gaussian", "width": 0.8},
     "tone_curve": {"kind": "gamma", "gamma": 1.9},
 }  # fmt: skip
-"""Of what a camera has one of several kinds: those that `full_data` does not have."""
+"""Kinds of the camera's components that `full_data` does not use."""
 
 
 def full_data() -> dict[str, object]:

@@ -40,11 +40,11 @@ CLONED = (
     "requirements*.lock",
     "scripts",
 )
-"""What these pages use of a clone. The package itself is the one under test."""
+"""Files of a clone that these pages use. The package itself is the one under test."""
 
 LIMIT = 1200.0
-"""Seconds that a command or Python block may take. The slowest one takes 10 s on two processors, so
-only one that hangs takes so long."""
+"""Longest time (s) of a command or Python block. The slowest takes 10 s on two processors, so that
+only a block that hangs takes so long."""
 LONG_LIMIT = 6 * 3600.0
 """The same for blocks that say that they are long, of which the longest one takes an hour."""
 

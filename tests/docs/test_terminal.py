@@ -13,7 +13,7 @@ import pytest
 from .terminal import Terminal, reader_environment
 
 LIMIT = 300.0
-"""Seconds; only a command that hangs takes so long."""
+"""Longest time (s) of a command; only one that hangs takes so long."""
 
 
 @pytest.fixture

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 FLUX = 3.0
-"""mW of red of the real sensor; the design that is fitted has 2.1."""
+"""Flux (mW) of the red lights of the real sensor; the design that is fitted has 2.1."""
 
 PRESSES = {"a": (-4.0, 2.0), "b": (3.0, -2.0), "c": (0.5, 3.0)}
-"""mm, where balls of 6 mm press."""
+"""Surface coordinates (mm) of presses of balls of 6 mm."""
 
 
 def test_the_power_of_a_light_is_found_from_photographs(engine: Any, tmp_path: Path) -> None:

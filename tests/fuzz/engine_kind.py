@@ -24,8 +24,7 @@ from .kinds import ASSETS, DESIGN, RefusedError, kind
 from .strategies import from_schema, spoilt, spoilt_bytes
 
 ANSWER_TIME = 60.0
-"""Seconds in which a request must be answered where nothing else runs; the slowest one compiles
-kernels."""
+"""Longest time (s) of an answer on an idle machine; the slowest request compiles kernels."""
 
 
 def busy() -> float:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 KINDS = ("design", "mesh", "ies", "entry", "tuning", "recipe", "study", "dataset", "contact",
          "search-space", "options")  # fmt: skip
-"""What is read by OptiSense's own code."""
+"""Kinds of input that are parsed by code of OptiSense."""
 
 MOST_BYTES = 8192
 """Bytes from which a case is made at most; most cases take some hundred."""
@@ -31,7 +31,8 @@ SEEDS = 40
 
 LIBFUZZER = ("-verbosity=0", "-rss_limit_mb=6144", "-timeout=300", f"-max_len={MOST_BYTES}",
              "-len_control=0")  # fmt: skip
-"""libFuzzer's options: MiB and seconds of one case, and the bytes from which it is made."""
+"""Options of libFuzzer: memory (MiB) and time (s) of one case, and the number of bytes from which
+it is made."""
 
 
 def guided(kind: str, seconds: float, keep: Path, told: Path) -> None:

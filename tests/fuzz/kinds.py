@@ -453,4 +453,4 @@ WHOLE: dict[str, Case] = {
     "dataset": DATASET,
     "photographs": PHOTOGRAPHS,
 }
-"""What is spoilt, as it is before."""
+"""Valid cases, which are then damaged."""

@@ -28,7 +28,7 @@ from pathlib import Path
 from .cases import Case, keep_case, read_case, write_case
 
 CASE_TIME = 30.0
-"""Seconds of the processor for one case; the slowest that is right takes a few."""
+"""Longest processor time (s) of one case; the slowest valid case takes a few seconds."""
 
 PATIENCE = 20.0
 """Times these seconds that a case may take on the wall, where other programs work, too."""

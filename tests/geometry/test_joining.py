@@ -82,7 +82,7 @@ def dome(outer: float, inner: float, steps: int, segments: int) -> TriangleMesh:
 
 
 SAG = 11.0 * (1.0 - np.cos(np.radians(2.8125)))
-"""mm between the ball and the chords of 5.6 degrees that the gel has inside."""
+"""Distance (mm) between the ball and the chords of 5.6 degrees on the inside of the gel."""
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.01, -0.01])

@@ -15,7 +15,7 @@ from optisense.geometry.objects.relief import TOP
 from optisense.mechanics.height_map import heights
 
 FINE = 0.02
-"""mm, the pitch of the grids on which heights are looked at here."""
+"""Pitch (mm) of the grids on which heights are sampled."""
 
 
 def height_map(name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROUNDING = 2e-5
-"""Relative to the image's mean: sums of some thousand single-precision numbers in any order."""
+"""Largest difference relative to the image's mean: sums of some thousand single-precision numbers
+in any order."""
 
 TURNED_RAYS = 1e-3, 0.01
 """Part of an image's pixels where such rounding may draw another shadow ray, and what that may
@@ -22,7 +23,8 @@ LEAST_TURNED = 12
 elsewhere was seen to change 8 of 4,800, by 3e-4 of the mean."""
 
 SCORE_ROUNDING = 1e-3
-"""Relative: of a score over some hundred pixels, one of which a turned shadow ray changed."""
+"""Largest relative difference of a score over some hundred pixels, in one of which a shadow ray
+changed."""
 
 LEVELS = 8
 """What a turned shadow ray may change in a dark pixel of a picture, of 255 levels: 1 % of the mean,

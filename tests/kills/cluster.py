@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 LONGEST_START = 300.0
-"""Seconds in which the scheduler must start; on a busy machine it takes half a minute."""
+"""Longest time (s) until the scheduler runs; on a busy machine it takes half a minute."""
 
 
 class Cluster:

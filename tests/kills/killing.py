@@ -22,10 +22,10 @@ from .cluster import Cluster
 from .work import GOALS, WORK, half_files, whole_files
 
 LONGEST = 1800.0
-"""Seconds after which a command is said to hang; on a busy machine the slowest takes minutes."""
+"""Time (s) after which a command counts as hanging; on a busy machine the slowest takes minutes."""
 
 POLL = 0.002
-"""Seconds between looks at whether a command has begun to write."""
+"""Time (s) between two checks whether a command has begun to write."""
 
 
 @dataclass

@@ -14,7 +14,7 @@ from .killing import kill_repeatedly
 from .work import half_files, whole_files
 
 SEED = 7
-"""Of the moments, which depend on the machine's speed all the same."""
+"""Seed of the moments, which also depend on the speed of the machine."""
 
 
 @pytest.mark.slow

@@ -38,7 +38,7 @@ SMALL = ("--photons", "3000", "--resolution", "24x18", "--variant", "llvm")
 """Renders in which nearly all time is compilation."""
 
 PLACES = [(-4.0, 2.0), (3.0, -2.0), (0.5, 3.0), (-1.0, -3.0)]
-"""mm, where the balls press in photographs."""
+"""Surface coordinates (mm) of the presses in photographs."""
 
 NAMES_WITH_TIMES = ("run.json", "report.html", "dataset.json", "trials.sqlite")
 """Files of results that also tell when and how fast they came about."""

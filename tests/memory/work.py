@@ -22,7 +22,7 @@ FIRST = {"images": 8, "scores": 8, "designs": 7, "files": 5}
 """Rounds of each piece of work until all that is kept is there; of designs, each sensor once."""
 
 RESOLUTION = (24, 18)
-"""Pixels of the pictures: nearly all memory is that of the light."""
+"""Size (pixels) of the pictures; it is small, as nearly all memory is used for the light."""
 
 PHOTONS = 3000
 """Photons of the pictures; the memory for their light does not depend on it."""

@@ -25,7 +25,7 @@ SLOPE = np.tan(np.radians(FOV) / 2)
 PIXELS = (160, 120)
 
 PIXEL_MIDDLES = 2e-4
-"""Relative: a mean over pixel middles against the integral over the picture."""
+"""Relative error of a mean over pixel centres, compared with the integral over the picture."""
 
 
 class PlateModel:

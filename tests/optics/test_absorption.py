@@ -23,13 +23,13 @@ from optisense.optics.transport.photons import Emission, trace_photons
 
 INDEX = 1.5
 ABSORPTION: RGB = (0.05, 0.2, 0.4)
-"""Per mm at R, G, B."""
+"""Absorption coefficients per mm at R, G, B."""
 
 SINGLE = 1e-4
-"""Relative: one beam in single precision."""
+"""Relative error of one beam in single precision."""
 
 SUMMED = 0.01
-"""Relative: orders of reflection drawn at random, 100 000 photons."""
+"""Relative error of 100,000 photons whose orders of reflection are drawn at random."""
 
 
 def glass(inside: RGB = ABSORPTION, outside: RGB = CLEAR) -> Surface:
@@ -138,18 +138,19 @@ def gel_with_lamp(absorption: RGB) -> ReferenceScene:
 
 
 PATH_MEAN = (0.025257, 0.012802, 0.0026150)
-"""Of Mitsuba 3.9.1's volpath on this very scene: 100 images of 2048 samples a pixel; standard
-errors 0.00006, 0.000016 and 0.0000032."""
+"""Means of images by Mitsuba 3.9.1's volpath of this scene: 100 images of 2048 samples a pixel,
+with standard errors of 0.00006, 0.000016 and 0.0000032."""
 
 SHORT_PATH = 0.08
-"""Of volpath's own mean at 1024 samples a pixel: four standard deviations."""
+"""Four standard deviations of the relative error of volpath's mean at 1024 samples a pixel."""
 
 IN_CONTACT = 0.04
-"""Relative, of the mean over a contact of some 100 pixels and 8 million photons. Without the
-shorter way in the gel it is 0.18 off."""
+"""Relative error of the mean over a contact of some 100 pixels with 8 million photons. Without the
+shorter path in the gel, the error is 0.18."""
 
 AGAINST_PATH = 0.015
-"""Relative. Kernels make light that falls by a fifth in a millimetre 0.7 % too strong."""
+"""Relative error of the mean. Kernels overestimate light that falls by a fifth per millimetre by
+0.7 %."""
 
 
 def test_both_estimators_agree_with_mitsuba_in_an_absorbing_gel() -> None:

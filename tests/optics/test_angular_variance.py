@@ -24,7 +24,7 @@ TOWARDS = np.array([0.6, 0.0, 0.8])
 ALONG = np.array([0.0, 1.0, 0.0])
 UP = np.array([-0.8, 0.0, 0.6])
 VARIANCES = 0.012, 0.002
-"""Radians squared, along and up: discs of 13 and 5 degrees."""
+"""Angular variances (radians squared) along and up, those of discs of 13 and 5 degrees."""
 
 
 def light() -> AngularVariance:

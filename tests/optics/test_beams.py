@@ -12,9 +12,9 @@ from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.sensors import build
 
 MEAN = 0.001
-"""Relative, of each light group's mean over the picture."""
+"""Relative error of each light group's mean over the picture."""
 PER_PIXEL = 0.01
-"""RMS, relative to that mean."""
+"""RMS error of pixels, relative to that mean."""
 
 
 @pytest.mark.parametrize("name", ["gelbelt", "gelsight-mini"])

@@ -22,7 +22,7 @@ from optisense.optics.scene.surfaces import Surface, SurfaceKind
 SIGNIFICANCE = 0.001
 SAMPLES = 200_000
 ROUNDING = 2e-4
-"""Relative: single precision through a dozen operations, the steepest near grazing angles."""
+"""Relative error of a dozen operations in single precision, the steepest near grazing angles."""
 
 ETA, K = (1.43, 0.92, 0.69), (7.5, 6.4, 5.6)
 
@@ -70,7 +70,8 @@ def test_the_coating_is_mitsubas_blend_of_diffuse_and_rough_conductor(
 
 
 DISC_ERROR = 0.03
-"""Of the peak: the disc's shape among half vectors is an ellipse, which is taken as a disc."""
+"""Largest error relative to the peak: the disc becomes an ellipse among half vectors, which is
+approximated by a disc."""
 TAIL_ERROR = 0.02
 """Far from the mirror direction, where a disc of light is as good as its middle."""
 

@@ -29,13 +29,13 @@ PHOTONS = 400_000
 POWER = 1000.0
 
 LANDED = 0.004
-"""Relative, of sums over 100 000 landings and more; points are spread more evenly than random."""
+"""Relative error of sums over 100,000 landings and more; the points have a low discrepancy."""
 
 PER_PIXEL = 0.05
-"""RMS of single pixels: some 800 photons under each kernel give 4 %."""
+"""RMS error of single pixels; some 800 photons under each kernel give 4 %."""
 
 ON_AVERAGE = 0.01
-"""Relative, of an image's mean."""
+"""Relative error of an image's mean."""
 
 BLACK = diffuse_coating(0.0)
 GREY = diffuse_coating(0.5)

@@ -13,8 +13,8 @@ from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.photons import Emission
 
 SLOPE = (-0.85, -0.42)
-"""Of log error over log photons at a fixed radius: -1/2 for random points, steeper for evenly
-spread ones."""
+"""Range of the slope of log error over log photons at a fixed radius: -1/2 for random points,
+steeper for points of low discrepancy."""
 
 DRIFT = 0.01
 """Relative, of the mean for radii from 0.4 to 0.1 mm. Under a lamp at height h, flux across the
@@ -22,7 +22,8 @@ light falls as 1/d^2; the kernel (mean square radius r^2 / 3) takes r^2 / (3 h^2
 % for 0.4 mm and 4 mm. Noise is 0.2 %."""
 
 FACTOR = 1.4
-"""Between the noise that two halves tell and the true error, both over 768 pixels."""
+"""Largest ratio between the noise estimated from two halves and the true error, both over 768
+pixels."""
 
 HEIGHT = 4.0
 

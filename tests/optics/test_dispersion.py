@@ -22,7 +22,7 @@ from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.photons import Emission, trace_photons
 
 INDICES: RGB = (1.489, 1.494, 1.499)
-"""Of acrylic at R, G, B."""
+"""Indices of acrylic at R, G, B."""
 
 APEX = np.radians(50.0)
 
@@ -91,8 +91,8 @@ WIDE: RGB = (1.3, 1.45, 1.6)
 """Indices far apart, so that they matter to the mean of an image."""
 
 PATH_MEAN = (0.040967, 0.035074, 0.029092)
-"""Of Mitsuba 3.9.1's path on these very scenes, one for each channel: 20 images of 2048 samples a
-pixel; standard errors 0.1 %."""
+"""Means of images by Mitsuba 3.9.1's path of these scenes, one for each channel: 20 images of 2048
+samples a pixel, with standard errors of 0.1 %."""
 
 
 def path_mean(samples: int, seed: int) -> list[float]:

@@ -41,7 +41,7 @@ def named(design: SensorDesign, name: str) -> list[Piece]:
 BLACK = Absorber()
 RIGHT = {"direction": (1, 0, 0), "within": 10}
 SIDE = 20.75 * 4.0
-"""mm^2 of the guide's right side."""
+"""Area (mm^2) of the guide's right side."""
 
 
 def test_frost_divides_an_interface_and_nothing_else() -> None:

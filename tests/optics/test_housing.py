@@ -16,11 +16,11 @@ from optisense.optics.transport.photons import Emission, trace_photons
 
 RADIUS = 10.0
 PORT = 40.0
-"""Degrees from the axis to which the sensing surface reaches on the sphere."""
+"""Largest polar angle (degrees) of the sensing surface on the sphere."""
 
 PHOTONS = 200_000
 LANDED = 0.01
-"""Relative, of sums over tens of thousands of landings; the sphere is a polyhedron."""
+"""Relative error of sums over tens of thousands of landings; the sphere is a polyhedron."""
 
 
 def zone(first: float, last: float) -> TriangleMesh:
@@ -80,7 +80,7 @@ def landed(model: OpticalModel) -> float:
 
 
 SHARE = (1 - np.cos(np.radians(PORT))) / 2
-"""Of the sphere's area, the sensing surface's."""
+"""Share of the sphere's area that is the sensing surface."""
 
 
 @pytest.mark.parametrize("reflectance", [0.2, 0.8, 0.95])

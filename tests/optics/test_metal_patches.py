@@ -14,15 +14,16 @@ from optisense import OpticalModel
 PATH = json.loads((Path(__file__).parents[1] / "assets" / "metal-patches.json").read_text())
 PHOTONS = 3_000_000
 CONTACT = {0.6: 0.03, 1.0: 0.12}
-"""RMS over patches and channels, in relation to each channel's mean: with many photons 1.1 and
-1.5 %. Where metal reflects metal as if it were paint it is 5 and 40 %."""
+"""RMS error over patches and channels, relative to each channel's mean; it is 1.1 and 1.5 % with
+many photons. It is 5 and 40 % if metal reflects metal like paint."""
 RIM = {0.6: 0.03, 1.0: 0.2}
-"""Of the row of pixels around the contact, where skin and flank mirror each other: 0.6 and 6 % with
-many photons; without the lobes of the places seen half of the light is missing at 1."""
+"""The same for the row of pixels around the contact, where skin and flank mirror each other: 0.6
+and 6 % with many photons. Without the lobes of the secondary hits, half of the light is missing at
+a specularity of 1."""
 
 RING = 0.04
-"""Of the green light of the skin around the contact, a twentieth of which the contact throws back
-by way of the glass."""
+"""Relative error of the green light of the skin around the contact; a twentieth of it comes from
+the contact by reflection at the glass."""
 
 
 @pytest.mark.parametrize("specularity", CONTACT)

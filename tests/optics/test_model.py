@@ -30,14 +30,15 @@ MAPPED = {"gelsight-mini": 2, "gelsight-mini-cylindrical": 4}
 """Pictures by photon mapping that are averaged: an even number, as their halves tell the noise."""
 
 PER_PIXEL = {"gelsight-mini": 0.07, "gelsight-mini-cylindrical": 0.2}
-"""RMS over the contact's pixels, photon mapping's own noise taken off. Measured: flat 0.01 to 0.04;
-cylinder, where few photons reach the ball's flanks and photon mapping is noisy, 0.05 to 0.15."""
+"""RMS error over the contact's pixels without the noise of photon mapping. Measured: flat 0.01 to
+0.04; cylinder, where few photons reach the ball's flanks and photon mapping is noisy, 0.05 to 0.15.
+"""
 
 OUTSIDE = 0.02
 
 TURNED = 0.02
-"""Relative: an image's light where a contact is flat, with bins of directions that lie otherwise.
-Noise is 0.005."""
+"""Relative difference of an image's light where a contact is flat, between bins of directions in
+two orientations. The noise is 0.005."""
 
 
 @cache

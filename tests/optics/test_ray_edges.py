@@ -15,7 +15,7 @@ from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 WIDTH, HEIGHT = 96, 72
 HALF = 10.0
-"""mm that the camera's picture is wide to each side, on the skin 10 mm below it (90 degrees)."""
+"""Half of the width (mm) of the camera's picture on the skin 10 mm below it (90 degrees)."""
 PIXEL = 2 * HALF / WIDTH
 
 

@@ -19,11 +19,11 @@ from optisense.optics.scene.surfaces import Surface, SurfaceKind
 INDEX = 1.49
 SAMPLES = 400_000
 CELLS = (24, 48)
-"""Cells in the cosine (both hemispheres) and in the azimuth."""
+"""Numbers of cells in the cosine (both hemispheres) and in the azimuth."""
 FINE = 12
-"""Points a cell each way, over which the density is averaged."""
+"""Number of points along each side of a cell, over which the density is averaged."""
 LEAST_EXPECTED = 10
-"""Cells with fewer expected samples are put together, as usual."""
+"""Number of expected samples below which cells are merged, as is usual for chi-square tests."""
 SIGNIFICANCE = 1e-3
 
 Array = NDArray[np.float64]
@@ -126,8 +126,8 @@ def block_with_a_frosted_side() -> ReferenceScene:
 
 
 PATH_MEAN = 0.034288
-"""Of Mitsuba 3.9.1's path on this very scene: 24 images of 2048 samples a pixel; standard error
-0.08 %."""
+"""Mean of images by Mitsuba 3.9.1's path of this scene: 24 images of 2048 samples a pixel, with a
+standard error of 0.08 %."""
 
 
 def test_both_estimators_agree_with_mitsuba_behind_a_frosted_side() -> None:

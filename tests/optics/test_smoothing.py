@@ -8,13 +8,13 @@ import pytest
 from optisense.optics.backend.variant import use_variant
 
 SIZE = 0.3
-"""mm, of a cell."""
+"""Side (mm) of a cell."""
 HEIGHT = 4.0
-"""mm of a point light over a plane."""
+"""Height (mm) of a point light over a plane."""
 DENSITY = 5e-4
 """1/mm^2: photons that land on a mm^2, of one that is sent."""
 AT_DEFAULT = 0.004
-"""Relative: what is left of the blur under the light, with five million photons."""
+"""Relative error that remains of the blur under the light with five million photons."""
 
 
 @pytest.fixture(scope="module")

@@ -19,10 +19,11 @@ from optisense.optics.scene.surfaces import Region, Surface
 from optisense.optics.transport.chief_rays import trace_chief_rays
 
 REFLECTANCE = 0.02
-"""Little: light that the ball and the surface send to each other must not matter."""
+"""Reflectance of the coating, so low that interreflection between ball and surface does not matter.
+"""
 RADIUS, DEPTH = 1.5, 0.8
 ABOVE_RIM = 0.25
-"""mm; lower on the ball, pixels see the surface beside it, too."""
+"""Height (mm) on the ball below which pixels also see the surface beside it."""
 PHOTONS = 1_500_000
 AGREEMENT = 0.03
 """The noise of so many photons is 1.5 %. Read from where light lands, the flank lacks 20 %."""

@@ -12,7 +12,7 @@ import pytest
 from paper import Experiment, Finding, Record, Unit
 
 Score = Callable[[str, dict[str, Any], int], float | None]
-"""Of an objective, a design as plain values, and a seed."""
+"""Function of the name of an objective, a design as plain values, and a seed."""
 
 
 def alike(objective: str, design: dict[str, Any], seed: int) -> float:

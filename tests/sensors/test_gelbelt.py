@@ -19,10 +19,10 @@ from optisense.optics.transport.chief_rays import RayOutcome
 
 WIDTH, GEL, TAPE, FILM, WINDOW = 36.0, 3.0, 0.05, 0.02, 6.0
 WHEEL, ROLLER, DEFLECTION, INCLINE = 25.0, 1.0, 35.0, 25.0
-"""mm and degrees: the default dimensions."""
+"""Default dimensions, mm and degrees."""
 
 ROLLER_AT = 25.0 + 1.0 + ROLLER
-"""mm from the middle to where the belt meets the small roller."""
+"""Distance (mm) from the middle to the point where the belt meets the small roller."""
 
 
 @pytest.fixture(scope="module", params=[1, 2, 3])

@@ -17,10 +17,10 @@ from optisense.optics.transport.chief_rays import RayOutcome
 from optisense.sensors.tip_shape import TipShape
 
 R, HEIGHT, GEL, SHELL = 14.0, 34.0, 3.0, 2.5
-"""mm: the default dimensions."""
+"""Default dimensions, mm."""
 
 FACETS = 2e-3
-"""Of a volume or area, what is lost by cutting round shapes into facets of 0.5 mm."""
+"""Relative error of a volume or area of round shapes that are divided into facets of 0.5 mm."""
 
 
 @pytest.fixture(scope="module")

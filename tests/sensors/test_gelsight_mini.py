@@ -20,7 +20,7 @@ from optisense.picture_files import read_picture
 from optisense.report.real_sensor import BALL_PLACE, PICTURE
 
 FIELD_OF_VIEW = (18.6, 14.3)
-"""mm on the gel, by the maker's datasheet."""
+"""Field of view (mm) on the gel, from the maker's datasheet."""
 
 
 @pytest.fixture(scope="module", params=[n for n in sensors.SENSORS.names() if "mini" in n])

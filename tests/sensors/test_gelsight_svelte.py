@@ -20,7 +20,7 @@ from optisense.sensors.svelte_profile import Palm
 
 STRAIGHT = {"palm_outline": ((20.0, 22.0), (20.0, 60.0), (20.0, 90.0)), "m1_sagitta": 3.0}
 ARC_CENTRE, ARC_RADIUS = np.array([132.9, 43.1]), 130.5
-"""mm, (x, z): the arc that was measured for M1."""
+"""Centre (x, z) and radius (mm) of the arc that was measured for the mirror M1."""
 
 GEL_INDEX = 1.41
 

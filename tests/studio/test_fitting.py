@@ -8,7 +8,8 @@ import pytest
 from studio.core.fitting import ROOM, fitted, on_screen
 
 SIZE, FREE, FOCAL = (800.0, 600.0), (0.0, 500.0), 555.0
-"""Pixels: a view, what a sidebar on the right leaves free of it, and its focal length."""
+"""Sizes (pixels) of a view and of the part of it beside a sidebar on the right, and its focal
+length."""
 
 
 @pytest.mark.parametrize("stretched", [(1, 1, 1), (20, 1, 1), (1, 1, 20)])

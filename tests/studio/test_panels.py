@@ -129,7 +129,7 @@ def test_whatever_can_be_set_says_what_it_is(mini: Any, select: Callable[..., No
 
 
 TOLD = {"session", "picture", "score"}
-"""What panels tell, which nobody sets."""
+"""Properties that panels show and users do not set."""
 
 
 def _silent(group: Any) -> list[str]:

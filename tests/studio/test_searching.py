@@ -16,7 +16,7 @@ from studio.optimise.operator import TITLE
 from studio.scene.collections import objects_of
 
 TRIALS = 60
-"""Of a search that is cut short in its first trials."""
+"""Number of trials of a search that is stopped during its first trials."""
 
 GOAL = """
 import time

@@ -23,7 +23,7 @@ from mathutils import Vector
 
 SOON = 0.005
 MOST_TURNS = 200
-"""Of the timer, until the mouse is where it was sent."""
+"""Largest number of calls of the timer until the mouse is in its place."""
 
 
 def window() -> bpy.types.Window:

@@ -18,7 +18,7 @@ from .desktop import SIZE, Desktop, nothing
 from .sidebar import Sidebar
 
 PATIENCE = 300.0
-"""Seconds after which something that does not happen has failed the test."""
+"""Time (s) after which a test fails because an expected event has not occurred."""
 
 TRIES = 5
 """To close Blender: a key may come before the question that it answers."""

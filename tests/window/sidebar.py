@@ -20,7 +20,7 @@ HEAD = 28
 """Pixels from the head of a closed panel to the next one."""
 
 PANELS = 9
-"""Of the tab, where a sensor is open."""
+"""Number of panels of the tab while a sensor is open."""
 
 SCROLLED_TO = "region('VIEW_3D', 'UI').view2d.region_to_view(0, 0)[1]"
 """How far the sidebar is scrolled."""

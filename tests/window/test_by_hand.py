@@ -13,7 +13,7 @@ import yaml
 from .bench import Bench
 
 MOVED = 1.5
-"""mm, how far a light is moved."""
+"""Distance (mm) by which a light is moved."""
 
 LIGHTS, SIMULATE, REPORT = 3, 4, 7
 """Places of panels in the sidebar; the first is 0."""

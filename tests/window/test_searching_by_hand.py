@@ -36,7 +36,7 @@ MANY, TRIALS = 5000, 150
 """Trials of a search that is given up, and of one that is not over before Blender is closed."""
 
 RANGE = "cages.skin.points[14].z=2:12"
-"""What varies: how high the middle of the skin is."""
+"""Range of the height of the middle of the skin."""
 
 POINTS = "part('scene.cages').shown_points(kinds('CAGE')[0])"
 

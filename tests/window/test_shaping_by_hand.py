@@ -27,10 +27,11 @@ ON_SKIN, ON_GEL = (-6.0, -7.0, 0.0), (12.625, -5.0, -3.2)
 """mm, places that the view shows: on the skin, and on the side of the gel below it."""
 
 LIFTED = 2.0
-"""mm, how far the middle point of the cage's top is lifted; the skin's middle rises a quarter."""
+"""Distance (mm) by which the middle point of the cage's top is lifted; the middle of the skin rises
+by a quarter of it."""
 
 PLACE = (4.0, 3.0, 0.0)
-"""mm, where a contact is placed."""
+"""Position (mm) of a contact."""
 
 
 def see_soon(bench: Bench, expression: str, wanted: float) -> None:
