@@ -1,4 +1,4 @@
-"""What each acceleration and refinement of the optics brings: each is switched off in turn.
+"""Effect of each acceleration and refinement of the optics: each is switched off in turn.
 
 ``python -m benchmarks.ablation [--sensor NAME] [--only WORD ...] [--dry]`` writes ablation.json and
 ablation.md beside this file. The four built-in sensors, each with a diffuse and with a metallic
@@ -80,7 +80,7 @@ class Ablation:
 
     @contextmanager
     def applied(self) -> Iterator[None]:
-        """Switch it off while the context lasts."""
+        """Context in which the feature is switched off."""
         with ExitStack() as stack:
             for change in self.changes():
                 stack.enter_context(mock.patch.object(*change))
@@ -196,7 +196,7 @@ def ablations() -> list[Ablation]:
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Run the benchmark, print its results and write them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sensor", choices=SENSORS, help="measure one sensor only")
     parser.add_argument(
@@ -292,12 +292,12 @@ def judged(
 
 
 def masks(contact: NDArray[np.bool_], truth: FloatArray) -> list[NDArray[np.bool_]]:
-    """The pixels of the contact, and all others that are not dark."""
+    """Return masks of the pixels in the contact, and of all others that are not dark."""
     return [contact, ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())]
 
 
 def smooth(image: FloatArray) -> FloatArray:
-    """Averaged over `BOX` pixels."""
+    """Return a picture averaged over squares of `BOX` pixels."""
     return np.asarray(uniform_filter(image.astype(np.float64), (BOX, BOX, 1)))
 
 
@@ -332,7 +332,7 @@ def changes(rows: dict[str, dict[str, float]], what: str) -> dict[str, float]:
 
 
 def table(found: dict[str, Any]) -> str:
-    """The results as Markdown."""
+    """Return the results as Markdown."""
     lines = [
         "# What each refinement of the optics brings", "",
         "Written by `python -m benchmarks.ablation`; do not edit.", "",

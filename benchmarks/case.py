@@ -1,4 +1,4 @@
-"""The case that everything is measured on: GelSight Mini with one ball."""
+"""The scene of the benchmarks: GelSight Mini with one ball."""
 
 from __future__ import annotations
 
@@ -24,24 +24,24 @@ CONTACT_TEXT = f"sphere:{RADIUS}@0,0:{DEPTH}"
 
 
 def ball(u: float = 0.0, v: float = 0.0) -> optisense.Contact:
-    """The ball, pressed in at surface coordinates (mm)."""
+    """Return the contact of the ball at surface coordinates (mm)."""
     return optisense.Contact(optisense.Sphere(radius=RADIUS), at=(u, v), depth=DEPTH)
 
 
 @dataclass(frozen=True)
 class Case:
-    """The model, and what its camera sees of the ball."""
+    """The model, and the pixels in which its camera sees the ball."""
 
     model: OpticalModel
 
     @classmethod
     def load(cls, variant: str = "auto") -> Case:
-        """The case with a model of its own."""
+        """Return the case with a new model."""
         return cls(OpticalModel(optisense.load(DESIGN), variant))
 
     @cached_property
     def mask(self) -> NDArray[np.bool_]:
-        """(h, w): pixels whose middle sees the ball."""
+        """Mask (h, w) of the pixels whose centre sees the ball."""
         from optisense.optics.scene.surfaces import Region
 
         rays = self.model.chief_rays(RESOLUTION, [ball()], CONFORMING)

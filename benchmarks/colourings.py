@@ -1,4 +1,4 @@
-"""All 6,561 colourings of GelSight360, and five of them rendered by themselves.
+"""All 6,561 colourings of GelSight360, and separate renderings of five of them.
 
 ``python -m benchmarks.colourings [--photons MILLIONS] [--out STUDY] [--dry]`` writes
 colourings.json and colourings.md beside this file.
@@ -99,7 +99,7 @@ def main() -> None:
 
 
 def write(found: dict[str, Any]) -> None:
-    """Put a run among those of other numbers of photons."""
+    """Store a run beside those with other numbers of photons."""
     path = FOLDER / "colourings.json"
     runs = json.loads(path.read_text()) if path.is_file() else {}
     runs[str(found["photons_an_image"])] = found
@@ -139,7 +139,7 @@ class KeptRunner:
     evaluator: Evaluator | None = None
 
     def begin(self, evaluator: Evaluator) -> SerialRunner:
-        """A runner in this process."""
+        """Return a runner in this process."""
         self.evaluator = evaluator
         return SerialRunner(evaluator)
 
@@ -191,7 +191,7 @@ def rendered(design: SensorDesign, photons: int, seed: int) -> Scores:
 
 
 def scores_of(evaluation: Evaluation) -> Scores:
-    """The values of both objectives."""
+    """Return the values of both objectives."""
     found = optisense.evaluate(evaluation, list(OBJECTIVES))
     return {name: score.value for name, score in found.items()}
 

@@ -1,4 +1,4 @@
-"""How long a front end waits for the engine: the first picture, drafts, relighting.
+"""Time that a front end waits for the engine: first picture, drafts, relighting.
 
     python benchmarks/engine.py [--design gelsight-mini] [--drafts 10]
 
@@ -47,7 +47,7 @@ class Engine:
         return dict(message["result"])
 
     def processor_seconds(self) -> float:
-        """What the engine has used so far; NaN where the system does not tell."""
+        """Processor time that the engine has used; NaN if the system does not report it."""
         stat = Path(f"/proc/{self.process.pid}/stat")
         if not stat.exists():
             return float("nan")

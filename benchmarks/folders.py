@@ -44,7 +44,7 @@ sources: {{ior: {{status: assumed, source: a guess}}}}
 
 
 class Bench:
-    """Starts commands in a folder of their own."""
+    """Starter of commands in a folder that no other command uses."""
 
     def __init__(self, program: Sequence[str], here: Path) -> None:
         self.here = here
@@ -56,7 +56,7 @@ class Bench:
         }
 
     def start(self, *words: object) -> subprocess.Popen[str]:
-        """A command that runs."""
+        """A running command."""
         return subprocess.Popen(
             [*self._program, *map(str, words)],
             stdin=subprocess.DEVNULL,
@@ -91,7 +91,7 @@ class Bench:
         return process
 
     def go(self) -> None:
-        """Let that search go on."""
+        """Let the waiting search continue."""
         pipe = self.here / "wait"
         hidden = pipe.rename(pipe.with_name("wait-once"))
         hidden.write_text("go")

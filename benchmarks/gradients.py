@@ -1,4 +1,4 @@
-"""How near the gradient method's derivatives are to central differences of the true scores.
+"""Error of the gradient method's derivatives, compared with central differences of the scores.
 
 ``python -m benchmarks.gradients [--sensor NAME] [--dry]`` writes gradients.json and gradients.md
 beside this file.
@@ -65,7 +65,7 @@ VIEW_BUDGET = {"gradient": 40, "cma-es": 200}
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Run the benchmark, print its results and write them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--sensor", choices=(*SENSORS, "search"), help="measure one part only")
     parser.add_argument("--dry", action="store_true", help="print only, write no results")
@@ -120,7 +120,7 @@ class TrueScores:
         self.shifts = (np.arange(SHIFTS)[:, None] * steps + 0.5) % 1.0 - 0.5
 
     def __call__(self, point: FloatArray) -> FloatArray:
-        """(objectives,) at a point (n,) of the space."""
+        """Return the values (objectives,) at a point (n,) of the space."""
         self.model.set_design(self.space.apply(point))
         total = np.zeros(len(OBJECTIVES))
         for shift in self.shifts:

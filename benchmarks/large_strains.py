@@ -1,4 +1,4 @@
-"""How far the linear layer is off at large strains: a neo-Hookean layer under a ball.
+"""Error of the linear layer at large strains, from a neo-Hookean layer under a ball.
 
 ``python -m benchmarks.large_strains`` writes large_strains.md beside this file. The reference is an
 axisymmetric finite element model of its own: a compressible neo-Hookean layer bonded to a rigid
@@ -188,7 +188,7 @@ class Layer:
         raise RuntimeError(f"no equilibrium at {depth:g} mm: {np.abs(off).max():.2g} N remain")
 
     def _state(self, depth: float) -> State:
-        """What acts where the nodes are now."""
+        """Return the forces at the current positions of the nodes."""
         size = self.moved.size
         force, stiff = self.forces()
         residual = np.zeros(size)
@@ -245,7 +245,7 @@ def linear(depth: float) -> Press:
 
 
 def main() -> None:
-    """Press, compare, write."""
+    """Press the ball, compare the results and write them."""
     layer, reached = Layer(), 0.0
     rows = []
     for wanted in INDENTATIONS:

@@ -57,7 +57,7 @@ ENGINES: dict[str, dict[str, Any]] = {
 
 
 def render_luxcore(scene: dict[str, Any], engine: str, budget: float) -> list[Snapshot]:
-    """Images of the whole budget (seconds) and of halves of it.
+    """Return images after the whole budget (seconds) and after halves of it.
 
     Args:
         scene: see ``plain_scene``.

@@ -1,4 +1,4 @@
-"""The case in Mitsuba's own ``path`` integrator."""
+"""The case rendered by Mitsuba's ``path`` integrator."""
 
 from __future__ import annotations
 

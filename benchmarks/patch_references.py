@@ -60,7 +60,7 @@ FIRST_SEED = 9_000
 
 
 class Referee(StrEnum):
-    """What makes a reference."""
+    """Settings of a reference."""
 
     PATH = "path"
     SPPM = "sppm"
@@ -68,7 +68,7 @@ class Referee(StrEnum):
 
 @dataclass(frozen=True)
 class Reference:
-    """Independent pictures of a referee.
+    """Return independent pictures of a reference renderer.
 
     Attributes:
         batches: (n, h, w, 3) radiance, zero outside the window.
@@ -82,7 +82,7 @@ class Reference:
 def reference(
     referee: Referee, model: OpticalModel, contact: Contact, image: TactileImage, margin: int
 ) -> Reference:
-    """The pictures of a referee, kept in a file.
+    """Return the pictures of a reference renderer, which are cached in a file.
 
     Args:
         referee: which.

@@ -80,7 +80,7 @@ class PatchCase:
 
     @property
     def resolution(self) -> tuple[int, int]:
-        """Pixels of its images."""
+        """Resolution of its images."""
         return RESOLUTIONS.get(self.sensor, RESOLUTION)
 
     def design(self) -> SensorDesign:
@@ -156,7 +156,7 @@ def means(image: FloatArray, patch: NDArray[np.integer]) -> FloatArray:
 def compare(
     images: FloatArray, truth: Reference, patch: NDArray[np.integer], scale: FloatArray
 ) -> dict[str, float]:
-    """How far images are off over patches.
+    """Errors of images over patches.
 
     Args:
         images: (n, h, w, 3), of several seeds.
@@ -194,7 +194,7 @@ def _mean_and_variance(each: FloatArray) -> tuple[FloatArray, float]:
 
 
 def measure(case: PatchCase, photons: int = PHOTONS) -> dict[str, Any]:
-    """All numbers of a case."""
+    """Return all numbers of a case."""
     model = OpticalModel(case.design())
     contact = case.contact(model)
     images = [
@@ -218,13 +218,13 @@ def measure(case: PatchCase, photons: int = PHOTONS) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Run the benchmark, print its results and write them."""
     measures = {case.name: partial(measure, case) for case in CASES}
     measure_parts("patches", __doc__, measures, table)
 
 
 def table(found: dict[str, Any]) -> str:
-    """The results as Markdown."""
+    """Return the results as Markdown."""
     lines = [
         "# Errors of the light by patches of contacts", "",
         "Written by `python -m benchmarks.patches`; do not edit.", "",

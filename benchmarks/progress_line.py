@@ -1,4 +1,4 @@
-"""What a command shows of its progress on a terminal of 80 columns, held against the truth.
+"""Comparison of a command's progress line on a terminal of 80 columns with its real progress.
 
 Runs a command in a pseudo-terminal, looks at the screen twice a second, and tells how wide the
 progress line is, which stages it names, how good its time left is, how long it stands still, and
@@ -43,7 +43,7 @@ LIVE = re.compile(r"[━─╸╺]|" + CLOCK.pattern)
 
 @dataclass
 class DesignView:
-    """What the screen showed."""
+    """Content of the screen at one time."""
 
     seconds: float
     line: str

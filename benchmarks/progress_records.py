@@ -1,4 +1,4 @@
-"""How good the time left of each long command is, on a machine that does nothing else.
+"""Accuracy of the time left of each long command, on an idle machine.
 
 Runs commands in this process and notes what their progress line is told, with the processor time
 spent until then. Other processes that want the processors hardly change that time, so the same run
@@ -77,10 +77,10 @@ COMMANDS = {
 
 
 class IdleClock:
-    """Tells the seconds that a record gives it."""
+    """Clock that returns the times of a record."""
 
     def __init__(self) -> None:
-        """At 0."""
+        """Start at 0."""
         self.now = 0.0
 
     def __call__(self) -> float:

@@ -1,4 +1,4 @@
-"""Photons and rays a second, against what the ray tracer alone can do on the same scene."""
+"""Photons and rays per second, compared with the ray tracer alone in the same scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Do the objectives follow what the full reconstruction task finds?
+"""Rank correlation of the objectives with the errors of the full reconstruction task.
 
 ``python -m benchmarks.reading [--sensor NAME ...] [--specularity S ...] [--wide W] [--again]``
 writes reading.json and reading.md beside this file, sensor by sensor; what is there is not measured

@@ -1,4 +1,4 @@
-"""How strong the ring around a contact is, in photographs and in pictures of either skin.
+"""Signal in the ring around a contact, in photographs and in pictures of both skins.
 
 ``python -m benchmarks.real_rings PHOTOS [DIAMETER] [--width MM]`` prints a table. PHOTOS is a
 folder of photographs as `optisense compare` reads them (of gs_sdk, or Taxim's dataPack.npz, which
@@ -74,7 +74,7 @@ def depth_of(model: ots.OpticalModel, ball: float, radius: float, skin: str) -> 
 
 
 def main() -> None:
-    """Read, press, print."""
+    """Read the photographs, simulate the presses and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("photos", type=Path)
     parser.add_argument("diameter", type=float, nargs="?", help="of the ball, mm")

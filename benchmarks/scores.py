@@ -1,4 +1,4 @@
-"""How far scores scatter, how far they are off, what they cost, and what they depend on.
+"""Scatter, bias and cost of scores, and their dependence on settings.
 
 ``python -m benchmarks.scores [--seeds N] [--dry]`` writes scores.json and scores.md beside this
 file. The sensor is GelSight Mini with its flat gel, at the default settings of `evaluate`.
@@ -61,7 +61,7 @@ class GivenPresses:
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Run the benchmark, print its results and write them."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, default=SEEDS)
     parser.add_argument("--dry", action="store_true", help="print only, write no results")

@@ -1,4 +1,4 @@
-"""What a search costs beside its trials, what a second process brings, and two whole searches.
+"""Overhead of a search, gain from a second process, and two complete searches.
 
 ``python -m benchmarks.search [--only PART] [--dry]`` writes search.json and search.md beside this
 file. It needs a machine that does nothing else.
@@ -59,7 +59,7 @@ def nothing(design: SensorDesign) -> float:
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Run the benchmark, print its results and write them."""
     parts = (overhead, workers, coatings, gradient, mirror)
     measure_parts("search", __doc__, {each.__name__: each for each in parts}, _table)
 

@@ -1,4 +1,4 @@
-"""How long each built-in sensor takes: to load and check, to a picture, to a first picture.
+"""Times of each built-in sensor: loading and checking, a picture, and the first picture.
 
 ``python -m benchmarks.sensors [--only NAME] [--dry]`` writes sensors.json and sensors.md beside
 this file. It needs a machine that does nothing else; where it has to share one, the processor
@@ -39,12 +39,12 @@ TARGETS = {"load_and_check": 1.0, "image": 1.5, "first_image": 8.0}
 
 
 def main() -> None:
-    """Measure, print and write."""
+    """Run the benchmark, print its results and write them."""
     measure_parts("sensors", __doc__, {name: partial(measure, name) for name in NAMES}, table)
 
 
 def measure(name: str) -> dict[str, Any]:
-    """All numbers of a sensor."""
+    """Return all numbers of a sensor."""
     design = sensors.build(name)
     inside = medians([timed(lambda: sensors.check(sensors.build(name))) for _ in range(CHILD_RUNS)])
     child = [sys.executable, "-c", LOAD_AND_CHECK.format(name=name)]
@@ -111,12 +111,12 @@ def noise_in_contact(model: OpticalModel, ball: Contact, photons: int) -> float:
 
 
 def plain(time: Time) -> dict[str, float]:
-    """Ready for JSON."""
+    """Return the results as plain data for JSON."""
     return {"wall_s": round(time.wall, 3), "cpu_s": round(time.cpu, 3)}
 
 
 def table(found: dict[str, Any]) -> str:
-    """The results as Markdown."""
+    """Return the results as Markdown."""
     head = ("sensor", "build and check", "load and check in a new process", "photons",
             "noise in the contact", "image, new photons", "image, light kept",
             "first image in a new process")  # fmt: skip

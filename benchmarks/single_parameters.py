@@ -69,7 +69,7 @@ CAGE_POINTS = (0, 14, 17, 26)
 
 
 def values_of(design: SensorDesign) -> dict[str, list[Any]]:
-    """What is tried, by path: the values that the design file allows."""
+    """Return the values to try, by path, that a design file may have."""
     camera = design.camera
     angles = FISHEYE_ANGLES if camera.projection == "equidistant" else ANGLES
     wanted: dict[str, list[Any]] = {
@@ -121,7 +121,7 @@ def _around(design: SensorDesign, path: str, steps: tuple[float, ...]) -> list[f
 
 
 def _allowed(design: SensorDesign, path: str, values: list[Any]) -> list[Any]:
-    """Those values that the design file takes, and what it is now."""
+    """Return the values that a design file may have, and the current one."""
     found = []
     for value in dict.fromkeys([get_value(design, path), *values]):
         try:
@@ -247,7 +247,7 @@ def _sheet(tiles: list[Image.Image]) -> Image.Image:
 
 
 def main() -> None:
-    """Search, keep what was found, and draw."""
+    """Run the searches, store their results and draw the contact sheets."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.single_parameters")
     parser.add_argument("folder", type=Path)
     parser.add_argument("--sensor", choices=SENSORS.names(), action="append")

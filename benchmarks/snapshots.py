@@ -1,4 +1,4 @@
-"""What a progressive renderer had after so many seconds."""
+"""Images of a progressive renderer at several times."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long the case takes, how exact it is then, and where the time goes."""
+"""Time of the case, its accuracy, and the shares of its parts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How long a user of the studio waits: first picture, drafts, relighting, cages.
+"""Time that a user of the studio waits: first picture, drafts, relighting, cages.
 
     .venv-blender/bin/python benchmarks/studio.py [--drafts 20]
 
@@ -28,7 +28,7 @@ SIDE = 101
 
 
 def processor_seconds(pid: int) -> float:
-    """What this process and the engine have used so far; NaN where the system does not tell."""
+    """Processor time of this process and the engine; NaN if the system does not report it."""
     stat = Path(f"/proc/{pid}/stat")
     if not stat.exists():
         return float("nan")
@@ -70,7 +70,7 @@ def main() -> None:
     pid = session.engine().pid
 
     def answered(request: Any) -> None:
-        """As Blender's timer does it in a window."""
+        """Read the engine's answers, as Blender's timer does in a window."""
         while True:
             pause = session._tick() or 0.0
             if request is not None and request.done:

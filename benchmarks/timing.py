@@ -29,7 +29,7 @@ class Time:
 
 
 def timed(action: Callable[[], object]) -> Time:
-    """How long a call takes."""
+    """Return the wall and processor time of a call."""
     began, cpu = time.perf_counter(), time.process_time()
     action()
     return Time(time.perf_counter() - began, time.process_time() - cpu)

@@ -1,4 +1,4 @@
-"""Trials a second of two worker processes, of one, and of one that has all threads.
+"""Trials per second of two worker processes, of one, and of one with all threads.
 
 Counted from when each worker has built its model and compiled, as in a study of many trials. Next
 to the wall time stands the processor time of a trial in its worker, which tells what two workers
@@ -87,7 +87,7 @@ def workers() -> dict[str, Any]:
 
 
 def _measured(design: SensorDesign, plan: Plan, count: int, threads: int) -> dict[str, Any]:
-    """What workers do once all of them are warm."""
+    """Throughput of workers after all of them have warmed up."""
     study = Study.create(None, design, plan)
     counted: list[list[Row]] = []
 

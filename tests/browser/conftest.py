@@ -42,7 +42,7 @@ def pages(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> dict[st
 
 @pytest.fixture
 def visit(browser: Browser) -> Iterator[Open]:
-    """Opens a page in a window of its own; all that was opened must have been quiet."""
+    """Opener of pages in new windows; none of them may report an error."""
     visits: list[Visit] = []
 
     def open_page(page: Path | str, size: tuple[int, int] = DESKTOP, **context: object) -> Visit:

@@ -1,4 +1,4 @@
-"""One page of each kind, of a sensor whose names and texts would like to be more than text."""
+"""One page of each kind, of a sensor whose names and texts contain HTML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pages in a browser are quiet, fit a telephone, and can be used by keys and by ear.
+"""Pages cause no errors, fit a small screen, and work with keyboard and screen reader.
 
 That no page complains or asks for anything is looked at after each of these tests.
 """

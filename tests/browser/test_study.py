@@ -139,7 +139,7 @@ def test_the_panel_fits_a_telephone(visit: Open, result: SearchResult, page: Pat
 
 
 class Running:
-    """A search that goes on when it is told to."""
+    """Search that continues when the test allows it."""
 
     def __init__(self, folder: Path) -> None:
         self.may = threading.Semaphore(0)

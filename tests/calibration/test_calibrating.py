@@ -1,4 +1,4 @@
-"""A fit finds the numbers that photographs were made with, and says what they do not tell."""
+"""A fit finds the numbers of synthetic photographs, and names those that they do not determine."""
 
 from __future__ import annotations
 

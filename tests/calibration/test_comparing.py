@@ -1,4 +1,4 @@
-"""Contacts are found where they are, and figures tell how far pictures differ."""
+"""Contacts are located, and measures of realism give the difference of pictures."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ def test_found_contacts_are_told_and_shown_for_correction(
 def test_readers_of_pictures_that_are_alike_read_each_others_balls(
     mini: OpticalModel, photographs: Photographs
 ) -> None:
-    """Of a model's own pictures the balls are read as large as they are; stronger ones are not."""
+    """The reader finds the true size of balls in a model's pictures, but not in amplified ones."""
     found = compare(mini, photographs, photons=PHOTONS, seed=5)
     assert [each.name for each in found.realism.readings] == [
         press.name for press in photographs.presses

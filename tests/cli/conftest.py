@@ -1,4 +1,4 @@
-"""What holds for tests of commands."""
+"""Fixtures of the tests of commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What `optisense check` says of cameras that look by mirrors, or past them."""
+"""Messages of `optisense check` on cameras that see the skin in mirrors, or miss them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from optisense.search import SearchSpace
 
 
 def checked(design: str) -> tuple[str, list[str]]:
-    """All that is printed, and what of it is odd, in one line each."""
+    """Return the printed text, and its warnings, one per line."""
     result = CliRunner().invoke(app, ["check", design])
     assert result.exit_code == 0, result.output
     text = " ".join(result.output.split())

@@ -1,4 +1,4 @@
-"""However a command ends, its output is complete and its exit code arrives."""
+"""The output of a command is complete and its exit code is right, however it ends."""
 
 from __future__ import annotations
 

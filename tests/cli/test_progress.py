@@ -1,4 +1,4 @@
-"""What a long command says of itself, on a terminal and in a log."""
+"""Progress of a long command on a terminal and in a log."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from optisense.time_left import TimedStep
 
 
 class Clock:
-    """Tells the time that it was set to."""
+    """Clock whose time the test sets."""
 
     def __init__(self) -> None:
         self.now = 0.0

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: an answer at once, and an end that can be relied on."""
+"""Ctrl-C and SIGTERM are acknowledged at once and reliably end a command."""
 
 from __future__ import annotations
 

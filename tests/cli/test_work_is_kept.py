@@ -44,7 +44,7 @@ def score(evaluation):
 
 
 class Meeting:
-    """A place in the user's file where processes wait for the test."""
+    """Barrier in the user's file at which processes wait for the test."""
 
     def __init__(self, folder: Path, name: str) -> None:
         self._here, self._go = folder / name, folder / f"{name}-go"
@@ -52,12 +52,12 @@ class Meeting:
         os.mkfifo(self._go)
 
     def wait(self) -> None:
-        """Until a process is there."""
+        """Wait until a process has reached the barrier."""
         with self._here.open() as place:
             place.read()
 
     def go(self) -> None:
-        """Let it go on, and let no other one stop here."""
+        """Release the process, and let all others pass."""
         self._here.unlink()
         with self._go.open("w") as place:
             place.write("go")
@@ -314,7 +314,7 @@ def test_looking_at_a_study_leaves_its_folder_as_it_was(study: Path) -> None:
 
 @contextlib.contextmanager
 def small_disk(place: Path, size: str) -> Iterator[Path]:
-    """A file system in memory that holds so much."""
+    """A file system in memory of the given size."""
     place.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(place)]
     if subprocess.run(mount, capture_output=True).returncode:

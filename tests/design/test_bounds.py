@@ -1,4 +1,4 @@
-"""What is too large, too many or no file at all is refused before it is worked on."""
+"""Files that are too large, too many or not regular are refused before they are processed."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def appended(text: str) -> Callable[[Path], None]:
 
 
 def replaced(name: str, make: Callable[[Path], object]) -> Callable[[Path], None]:
-    """Puts something else in the place of a file."""
+    """Replacement of a file by something else."""
 
     def spoil(folder: Path) -> None:
         path = folder / name
@@ -75,7 +75,7 @@ def sparse(path: Path) -> None:
 
 
 def many_triangles(path: Path) -> None:
-    """An STL file that tells of two million triangles, and is as large, without having any."""
+    """An STL file whose header promises two million triangles, of this size but without any."""
     path.write_bytes(bytes(80) + struct.pack("<I", 2_000_000))
     os.truncate(path, 84 + 50 * 2_000_000)
 

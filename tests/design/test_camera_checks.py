@@ -1,4 +1,4 @@
-"""Cameras that there can't be."""
+"""Checks that refuse physically impossible cameras."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_a_camera_in_a_cavity_of_the_gel_is_fine(mini: SensorDesign) -> None:
 
 class TestFocus:
     def out_of_focus(self, design: SensorDesign, distance: float, number: float) -> list[str]:
-        """What is said of a lens of 3 mm that is focused at a distance."""
+        """Return the messages about a lens of 3 mm that is focused at a distance."""
         blur = {"kind": "defocus", "focal_length": 3.0, "f_number": number}
         camera = design.camera.model_dump(mode="json") | {
             "blur": blur | {"focus_distance": distance}

@@ -1,4 +1,4 @@
-"""What can be found wrong with a design without rendering it."""
+"""Problems of a design that are found without rendering it."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ class TestOverlaps:
 class TestView:
     @pytest.fixture
     def plain(self, design: SensorDesign) -> SensorDesign:
-        """Without its mirror, and with a narrow lens."""
+        """The design has no mirror and a narrow lens."""
         data = design.model_dump(mode="json")
         del data["parts"]["mirror"], data["cages"]["mirror"]
         data["camera"] |= {"projection": "perspective", "fov": 20.0}

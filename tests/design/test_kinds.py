@@ -1,4 +1,4 @@
-"""Kinds of other packages: found by their entry points, and by what they are asked."""
+"""Kinds of other packages are found by their entry points and used through their methods."""
 
 import json
 import os

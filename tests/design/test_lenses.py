@@ -1,4 +1,4 @@
-"""Distortion, shading and blur of lenses: closed forms, inverses, and what there can't be."""
+"""Distortion, shading and blur of lenses: closed forms, inverses, and impossible lenses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kinds of materials and coatings: what they tell is what everything else shows and simulates."""
+"""Kinds of materials and coatings define what is displayed and simulated."""
 
 from __future__ import annotations
 

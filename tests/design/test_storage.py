@@ -1,4 +1,4 @@
-"""Designs on disk: what is saved comes back, and what strangers wrote can do no harm."""
+"""Designs on disk: a saved design is read back unchanged, and untrusted files are harmless."""
 
 from __future__ import annotations
 
@@ -227,7 +227,7 @@ class TestErrors:
 
 
 class TestStrangers:
-    """A design file is data from strangers."""
+    """A design file is untrusted data."""
 
     @pytest.mark.parametrize(
         "path", ["../secret.obj", "/etc/passwd", "meshes/../../secret.obj", "C:\\x.obj", ""]

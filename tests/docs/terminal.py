@@ -1,4 +1,4 @@
-"""A reader's terminal and Python session: what is typed in one of them is seen by what follows."""
+"""A reader's terminal and Python session, which keep their state between blocks."""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def test_a_saved_file_is_named_in_the_text_beside_its_block() -> None:
 
 
 def test_commands_stand_in_console_blocks() -> None:
-    """Elsewhere nothing would type them."""
+    """Blocks outside these pages would not be tested."""
     for shown in BLOCKS.values():
         for block in shown:
             found = COMMAND.search(block.text)

@@ -1,4 +1,4 @@
-"""What the documents refer to is there: files, make's targets, public names."""
+"""Files, make targets and public names that the documents refer to exist."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A front end as short as can be, and engines that tests talk to."""
+"""A minimal front end, and engines for tests."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Client:
         self._messages.put(None)
 
     def write(self, line: bytes) -> None:
-        """Write whatever it is."""
+        """Write a line without checks."""
         assert self.process.stdin is not None
         self.process.stdin.write(line)
         self.process.stdin.flush()
@@ -65,7 +65,7 @@ class Client:
         return list(numbers)
 
     def next(self) -> dict[str, Any]:
-        """The next message, whatever it is.
+        """Return the next message of any kind.
 
         Raises:
             EOFError: the engine has ended.
@@ -120,7 +120,7 @@ class Client:
         return error
 
     def leave(self) -> int:
-        """Go away as a front end that is closed does; how the engine ended."""
+        """Close the connection as a front end does; return the engine's exit code."""
         assert self.process.stdin is not None
         self.process.stdin.close()
         return self.process.wait()
@@ -156,7 +156,7 @@ def engine(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Client]:
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Callable[..., Client]]:
-    """Starts engines of a test's own."""
+    """Starter of engines that one test uses alone."""
     clients: list[Client] = []
 
     def begin(hello: bool = True) -> Client:

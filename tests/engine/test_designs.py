@@ -30,7 +30,7 @@ def given(folder: Path, **values: object) -> DesignReference:
 
 
 def test_what_did_not_change_is_the_same_mesh(folder: Path) -> None:
-    """From which an optical model sees that it need not be built again."""
+    """An optical model recognises unchanged meshes by identity and is not built again."""
     designs = Designs()
     first = designs.read(given(folder))
     second = designs.read(given(folder, **{"lights.red.flux": 3.0}))

@@ -1,4 +1,4 @@
-"""What a line is, and how the engine takes what is none."""
+"""Lines of the protocol, and the engine's answers to malformed lines."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_messages_are_one_line_of_json_whatever_is_in_them() -> None:
 
 
 def test_nothing_but_messages_reaches_standard_output() -> None:
-    """Neither print, nor a library in C, nor a child process."""
+    """`print`, C libraries and child processes cannot write to the protocol's output."""
     program = """
 import ctypes, subprocess
 from optisense.engine.channel import Channel

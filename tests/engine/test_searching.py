@@ -1,4 +1,4 @@
-"""Searches by the engine: watched live, stopped, resumed, and outliving it."""
+"""Searches by the engine are watched, stopped and resumed, and can outlive it."""
 
 from __future__ import annotations
 

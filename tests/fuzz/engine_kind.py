@@ -99,7 +99,7 @@ def _requests(draw: st.DrawFn) -> Case:
 
 
 class FuzzedEngine:
-    """An engine that is asked one thing after another, and started anew where it has ended."""
+    """An engine that handles one request after another, and is restarted when it has ended."""
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None

@@ -1,4 +1,4 @@
-"""The kinds of input that strangers can give, and the door where each is read."""
+"""Kinds of untrusted input, and the function that reads each."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _json(data: Any) -> bytes:
 
 
 def _mostly(one: st.SearchStrategy[Any], other: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
-    """Four of five from the first."""
+    """Draw four of five values from the first strategy."""
     return st.integers(0, 4).flatmap(lambda number: one if number else other)
 
 
@@ -214,7 +214,7 @@ def _ies_words(draw: st.DrawFn) -> bytes:
 @kind("ies", st.one_of(_with_file({}, "lamp.ies", spoilt_bytes(IES)),
                        _with_file({}, "lamp.ies", _ies_words())))  # fmt: skip
 def read_lamp(folder: Path) -> None:
-    """Read it, and add up its light."""
+    """Read an IES file and integrate its intensity."""
     assert read_ies(folder / "lamp.ies").lumens >= 0.0
 
 
@@ -344,7 +344,7 @@ def _spoilt_rows(draw: st.DrawFn) -> Case:
     _with_file(STUDY, "trials.sqlite", spoilt_bytes(STUDY["trials.sqlite"])),
 ), 3.0)  # fmt: skip
 def read_study(folder: Path) -> None:
-    """Open it, look at all trials, and take the best one's design."""
+    """Open a study, read all its trials, and load the design of the best one."""
     with closing(Study.open(folder)) as study:
         for trial in study.trials:
             assert trial.values is not None and trial.number >= 0
@@ -396,7 +396,7 @@ def _member(array: Any) -> bytes:
     )],
 ), 3.0)  # fmt: skip
 def read_dataset(folder: Path) -> None:
-    """Open it, and look at every sample."""
+    """Open a dataset and read every sample."""
     dataset = Dataset.load(folder)
     shapes = {sample.depth.shape for sample in dataset}
     assert len(shapes) <= 1

@@ -56,7 +56,7 @@ Found = tuple[str, str, Case]
 
 
 def one_case(kind: str, case: Case, folder: Path) -> str:
-    """What came of a case: read, refused, or what went wrong and where."""
+    """Outcome of a case: read, refused, or the error and its place."""
     from optisense.errors import OptiSenseError
 
     from .every_kind import KINDS
@@ -211,7 +211,7 @@ def main() -> int:
 
 
 def print_table(rows: Mapping[str, Counter[str]]) -> None:
-    """Say how many cases of each kind there were so far, and what came of them."""
+    """Print the number of cases of each kind so far, and their outcomes."""
     print(f"{'kind':<14}{'cases':>9}{'read':>9}{'refused':>9}{'wrong':>7}")
     for name, counts in rows.items():
         fine = counts["read"], counts["refused"]

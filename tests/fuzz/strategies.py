@@ -1,4 +1,4 @@
-"""Hypothesis strategies that spoil whole files: their values by a JSON schema, and their bytes."""
+"""Hypothesis strategies that damage valid files: values by a JSON schema, and bytes."""
 
 from __future__ import annotations
 

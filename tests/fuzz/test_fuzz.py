@@ -75,7 +75,7 @@ def test_what_was_found_once_is_refused_in_words(
 
 @pytest.mark.parametrize("kind", sorted(WHOLE))
 def test_what_is_spoilt_can_be_read_before(kind: str, tmp_path: Path) -> None:
-    """Otherwise each case would be refused for a reason that is not its own."""
+    """Valid cases are accepted, so that damaged ones are refused for their damage alone."""
     assert one_case(kind, WHOLE[kind], tmp_path / "case") == "read"
 
 

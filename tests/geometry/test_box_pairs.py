@@ -1,4 +1,4 @@
-"""Boxes that meet are found, all of them and no others, however many there are."""
+"""All pairs of boxes that overlap are found, and no others, for any number of boxes."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def test_faces_that_look_inward_make_no_difference() -> None:
 
 @pytest.mark.parametrize("share", [0.0, 0.5])
 def test_a_ray_through_an_edge_or_a_corner(share: float) -> None:
-    """A ray that meets an edge is not counted twice, nor not at all."""
+    """A ray that meets an edge is counted exactly once."""
     box = TriangleMesh.box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), (2, 2, 2))
     on_edge = np.array([share, 0.0, 1.0])  # on an edge of the top's grid
     below, above = on_edge - 0.5 * WAY, on_edge + 0.5 * WAY

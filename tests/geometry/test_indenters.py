@@ -1,4 +1,4 @@
-"""Facts about the shapes that press: exact to well below a micrometre, where they can touch."""
+"""Meshes of indenters are exact to well below a micrometre where they can touch the skin."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Faces picked by where they look, and along smooth edges."""
+"""Faces selected by their normals, and across smooth edges."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is mended in a mesh from a CAD file, and what is refused with the place."""
+"""Defects of CAD meshes that are repaired, and defects that are errors with a position."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether two renderings are the same, however their threads took turns."""
+"""Comparison of renderings that may differ by the order of threads."""
 
 from __future__ import annotations
 

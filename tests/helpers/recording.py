@@ -1,4 +1,4 @@
-"""A layout that draws nothing, writes down what panels ask for, and refuses what is not there."""
+"""A layout that records what panels draw, and refuses unknown properties and operators."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Recording:
     row = column = box = split = grid_flow = column_flow = _sub
 
     def separator(self, **_: Any) -> None:
-        """Nothing is to be seen of it."""
+        """A separator records nothing."""
 
     def label(self, text: str = "", icon: str = "NONE", **_: Any) -> None:
         assert icon in ICONS, icon

@@ -1,4 +1,4 @@
-"""Whether two files say the same: pictures up to rounding, all others byte by byte.
+"""Comparison of files: pictures up to rounding errors, all others byte by byte.
 
 The same seed gives the same picture up to rounding, as threads add up light in any order.
 """

@@ -1,4 +1,4 @@
-"""Killing a command at a moment, judging what it left, and giving it again."""
+"""Killing of a command, checks of the files that it left, and its repetition."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class Target:
             self._cluster.end()
 
     def _again(self, out: Path) -> str:
-        """Give the command again; what is wrong with how it ended."""
+        """Repeat the command; return what is wrong with its end."""
         process = self._begin(out, *(self.work.again if (out / "study.json").exists() else ()))
         said = process.communicate(timeout=LONGEST)[0]
         other = self._difference(out)
@@ -160,7 +160,7 @@ class Target:
 
 
 def strays(folder: Path) -> list[str]:
-    """Temporary files that nobody will remove."""
+    """Return temporary files that no later command removes."""
     return [path.name for path in folder.rglob(".*") if path.name.startswith(".")]
 
 

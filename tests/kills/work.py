@@ -1,4 +1,4 @@
-"""The commands that are killed, and what of their results must be as if they had not been."""
+"""The commands that are killed, and the results that a kill must not change."""
 
 from __future__ import annotations
 
@@ -177,7 +177,7 @@ def trials(folder: Path) -> dict[str, Any]:
 
 
 def half_files(folder: Path, whole: dict[str, bytes | None]) -> list[str]:
-    """Files that look whole and are not, after a kill.
+    """Return incomplete files under final names after a kill.
 
     A file whose name begins with a dot is a temporary one. Renderings that a calibration keeps must
     be whole. A table to which lines are added has

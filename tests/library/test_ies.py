@@ -1,4 +1,4 @@
-"""IES files: what they say is what is read, and damaged ones are refused."""
+"""IES files are read correctly, and damaged ones are refused."""
 
 from __future__ import annotations
 

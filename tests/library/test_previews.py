@@ -1,4 +1,4 @@
-"""Preview pictures: the laws behind them hold, and what they draw is what the entry says."""
+"""Preview pictures obey the laws of reflection and show the values of the entry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A gel that nothing holds is told before it is pressed."""
+"""A gel without support is an error before a contact is computed."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Iterations that do not settle are told with what is left."""
+"""Iterations that do not converge are errors that give the residual."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""Work to be done again and again, and what of memory and files is in use meanwhile."""
+"""Repeated work, and the memory and open files that it uses."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def measured(name: str, times: int) -> Iterator[tuple[int, float, int]]:
 
 
 def wrong(name: str, rows: list[tuple[int, float, int]]) -> str:
-    """What is not as it must be in the rows of `measured`; empty where all is well.
+    """Return the violations in the rows of `measured`; empty if there are none.
 
     Memory may not grow by more than `SLACK` after the first rounds, nor beyond `MOST_IN_USE` where
     sensors come in turn; the number of open files may not grow at all.

@@ -1,4 +1,4 @@
-"""Scoring a sensor: what is shared, what fails and how, and settings at the door."""
+"""Scoring of a sensor: shared images, failures, and validation of settings."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_an_objective_that_does_not_say_what_it_reads_gets_all() -> None:
 
 
 def test_each_pixel_gets_the_most_that_any_objective_wants(model: OpticalModel) -> None:
-    """Lines in full, the crowd beside them nearly, and the flat middle roughly."""
+    """Lines get all samples, pixels beside them most, and the flat middle few."""
     press = Evaluation(model, Settings(**SMALL)).presses[0]
     reads = pixels_read([find("rgb2normal"), find("normdiff")], {})
     assert reads is not None

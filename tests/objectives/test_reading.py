@@ -1,4 +1,4 @@
-"""What a calibrated reader finds on presses new to it, whose colours follow from algebra."""
+"""Errors of a calibrated reader on new presses, whose colours follow from closed forms."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def nine(make_press: Callable[..., Press]) -> Callable[..., Presses]:
 def test_three_lights_and_no_noise_are_read_nearly_without_error(
     nine: Callable[..., Presses], turned: float
 ) -> None:
-    """Wherever the skin faces."""
+    """The colours do not depend on the direction of the skin."""
     value, parts, _ = reading(nine(lambertian, turned=turned), camera_noise=0.0)
     assert 0.0 < value < 1.0
     assert parts["level_skin"] < 0.5

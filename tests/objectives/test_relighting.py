@@ -105,7 +105,7 @@ def test_scores_of_cut_presses_are_those_of_whole_ones(
 
 
 def test_brighter_lights_of_the_same_colours_change_nothing(relighting: Relighting) -> None:
-    """Automatic exposure takes it back."""
+    """Automatic exposure compensates for the power of the lights."""
     design = recoloured(8)
     brighter = design
     for name, group in design.lights.items():

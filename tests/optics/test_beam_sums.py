@@ -1,4 +1,4 @@
-"""What indenters hide, and what is not looked at because nothing can hide it."""
+"""Light that indenters occlude, and beams that are culled because nothing occludes them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Weak bins of the radiance cache taken together show what the bins one by one show."""
+"""Merged weak bins of the radiance cache give the same image as separate bins."""
 
 from __future__ import annotations
 

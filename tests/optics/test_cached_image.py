@@ -1,4 +1,4 @@
-"""Where an image is found grainy, and that what is sampled again becomes smooth."""
+"""Detection of noisy pixels, and their noise after more samples."""
 
 from __future__ import annotations
 

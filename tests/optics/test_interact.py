@@ -1,4 +1,4 @@
-"""Rays of every kind obey the same laws at a surface, and are given up after the same number."""
+"""Rays of every kind obey the same laws at a surface and have the same depth limit."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SILVER = Surface(SurfaceKind.MIRROR, metal_eta=(0.1,) * 3, metal_k=(4.0,) * 3)
 
 
 def wide(surface: Surface, z: float = 0.0) -> RayScene:
-    """A square of 100 mm whose normal points to +z."""
+    """Return a square of 100 mm whose normal points to +z."""
     corners = [(-50, -50, z), (50, -50, z), (50, 50, z), (-50, 50, z)]
     return RayScene([quad("wide", corners, surface)])
 

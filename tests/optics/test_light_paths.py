@@ -1,4 +1,4 @@
-"""Ways of typical photons: they end as the light ledger says, and lie where light goes."""
+"""Paths of typical photons end as in the light ledger and follow the light."""
 
 from __future__ import annotations
 

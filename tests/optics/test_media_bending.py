@@ -1,4 +1,4 @@
-"""Boundaries that go along with solids which bend, against boundaries resolved anew."""
+"""Boundaries that follow deformed solids, compared with boundaries that are resolved again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Memory is given back when the work goes on to another sensor."""
+"""Memory is released when another sensor is rendered."""
 
 from __future__ import annotations
 

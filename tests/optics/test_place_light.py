@@ -1,4 +1,4 @@
-"""The light at a place: how much, on which ways, and from where."""
+"""The light at a point: irradiance, kinds of paths, and directions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the kernel of a radiance cache blurs: without any photons, against the light itself."""
+"""Blur of the radiance cache's kernel, compared with the exact light without photons."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Saved images: a folder holds one image and what was written about that one."""
+"""Saved images: a folder holds the files of one image only."""
 
 from __future__ import annotations
 

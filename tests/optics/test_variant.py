@@ -1,4 +1,4 @@
-"""A variant is chosen before the first kernel, and nothing takes Python down."""
+"""A variant is selected before the first kernel, and no choice crashes Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a ball raises into light that grazes the surface, against a closed form."""
+"""Light on a ball that is raised into grazing light, compared with a closed form."""
 
 from __future__ import annotations
 

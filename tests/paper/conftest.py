@@ -21,7 +21,7 @@ def alike(objective: str, design: dict[str, Any], seed: int) -> float:
 
 
 def values(unit: Unit, score: Score) -> dict[str, Any]:
-    """What a unit might find."""
+    """Made-up result of a unit."""
     asked: dict[str, Any] = dict(unit.inputs)
     seed = asked.get("seed", asked.get("settings", {}).get("seed", 0))
     design = asked["design"]

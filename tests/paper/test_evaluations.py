@@ -1,4 +1,4 @@
-"""What units ask of sensors, in small: real answers, in the form that experiments read."""
+"""Small real evaluations of units, in the form that experiments read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Spreads, and comparisons that know how sure they are."""
+"""Standard deviations, and comparisons with their uncertainty."""
 
 from __future__ import annotations
 

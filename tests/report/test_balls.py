@@ -1,4 +1,4 @@
-"""Balls in a picture are told apart, counted and outlined."""
+"""Balls in a picture are distinguished, counted and outlined."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page shows the render, and nothing in a design can get out of its place on it."""
+"""The page shows the render, and no text of a design is interpreted as HTML."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page's pictures hold what the arrays hold."""
+"""The pictures of the page have the content of the arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of scores: nothing in a design or an objective gets out of its place on it."""
+"""The page of scores escapes all texts of designs and objectives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of a study: it tells what its trials say, and nothing in them gets out of its place."""
+"""The page of a study shows its trials and escapes their texts."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ def svelte() -> SensorDesign:
 
 @pytest.fixture(scope="session")
 def two_numbers(mini: SensorDesign) -> BoundSpace:
-    """Two numbers that no check ties to each other."""
+    """Two numbers that are independent in all checks."""
     return SearchSpace(TWO_NUMBERS).bind(mini)
 
 

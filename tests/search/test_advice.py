@@ -1,4 +1,4 @@
-"""A search whose trials can't differ is told before it is begun."""
+"""A warning precedes a search whose trials cannot differ."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_only_what_is_bright_is_told_from_what_turns_rays() -> None:
 
 
 def test_chief_rays_stay_where_only_brightness_varies() -> None:
-    """What the paths are said to be, they are."""
+    """The paths have the stated effects on rays."""
     design = ots.load("gelsight-mini")
     model = OpticalModel(design)
     before = model.chief_rays((40, 30)).points

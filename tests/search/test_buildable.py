@@ -1,4 +1,4 @@
-"""Points of a search that nobody could build: parts and lights off their seats, vanished plates.
+"""Points of a search that cannot be built: detached parts and lights, vanished plates.
 
 The points are winners of `benchmarks/single_parameters.py` that a person would not accept.
 """

@@ -1,4 +1,4 @@
-"""Processes that work trials out: told once each, whoever dies."""
+"""Worker processes score each trial and report it once, even if some of them die."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LINE = {"coating.specularity": (0.0, 1.0, 11)}
 
 @pytest.fixture
 def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where the goals tell that they were asked, and what they need besides."""
+    """Log of the calls of objectives, and the files that they need."""
     monkeypatch.setenv("TRIAL_LOG", str(tmp_path / "log"))
     monkeypatch.setenv("STRUCK", str(tmp_path / "struck"))
     monkeypatch.setenv("CROWD", str(tmp_path / "crowd"))

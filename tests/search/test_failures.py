@@ -1,4 +1,4 @@
-"""Failed trials are grouped by what made them fail, and not by where."""
+"""Failed trials are grouped by the cause of the failure and not by its place."""
 
 from __future__ import annotations
 

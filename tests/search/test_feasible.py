@@ -24,7 +24,7 @@ def svelte() -> SensorDesign:
 
 
 def test_a_mirror_that_is_wanted_inside_a_part_is_moved_beside_it(svelte: SensorDesign) -> None:
-    """As a rule not so far as the straight way back, and at right angles to where it can slide."""
+    """The point usually is closer than on the straight way back, orthogonal to free directions."""
     space = SearchSpace(MIRROR).bind(svelte)
     region = FeasibleRegion(space, [NoCrossings(svelte)], ["M1"])
     start = space.to_unit(space.start)

@@ -36,7 +36,7 @@ ots.search.search(
 
 
 def calls(log: Path) -> Counter[tuple[float, float]]:
-    """How often each place was asked for."""
+    """Return the number of calls at each point."""
     lines = [line.split() for line in log.read_text().splitlines()]
     return Counter((float(first), float(second)) for first, second, _ in lines)
 

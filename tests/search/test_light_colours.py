@@ -49,7 +49,7 @@ def test_every_colouring_is_tried_once(result: SearchResult) -> None:
 
 
 def test_a_colouring_scores_as_its_own_rendering(result: SearchResult) -> None:
-    """With the same seed: the light is traced alike, so only rounding differs."""
+    """The same seed traces the same light, so that only rounding errors differ."""
     usual = DesignEvaluator(result.study.space, GOALS, QUICK)
     tried = [trial for trial in result.trials if not trial.is_start]
     for trial in np.random.default_rng(2).choice(np.array(tried, dtype=object), 2, replace=False):
