@@ -52,8 +52,9 @@ EMPTY_BIN_SHARE = 1e-7
 """Share of all the light below which a direction bin counts as empty."""
 
 BLOCK_BINS = 16
-"""Number of direction bins whose blur is undone at once. Temporary arrays of a few megabytes are
-reused by the allocator; with new pages for all bins together, this takes two to three times as long."""
+"""Number of direction bins whose blur is undone at once. The allocator reuses temporary
+arrays of a few megabytes; with new pages for all bins together, it takes two to three times as
+long."""
 
 
 class Tables(NamedTuple):
