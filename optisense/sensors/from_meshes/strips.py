@@ -91,9 +91,11 @@ def _outline(mesh: TriangleMesh, axis: int, height: float, frame: FloatArray) ->
     )
     polygons = list(shapely.polygonize(shapely.linestrings(np.round(pairs, 9))).geoms)
     if not polygons:
+        low, high = mesh.bounds[:, axis]
         raise DesignError(
-            f"the part has no outline at height {height:g} mm",
-            hint="Choose a height inside the part, or leave it out",
+            f"the part has no outline at height {height:g} mm: along {'xyz'[axis]} it reaches from "
+            f"{low:g} to {high:g} mm",
+            hint=f"Give a height between these, as {'xyz'[axis]} in the sensor, or leave it out",
         )
     rim = shapely.get_exterior_ring(max(polygons, key=lambda polygon: polygon.area))
     corners = shapely.get_coordinates(rim)

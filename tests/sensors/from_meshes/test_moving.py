@@ -16,7 +16,7 @@ from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe, read_recipe, save_recipe
 from optisense.sensors.from_meshes.moving import laid_on, posed, rotation
 from optisense.sensors.from_meshes.pick_and_place import BoardPart, read_pick_and_place
-from optisense.sensors.from_meshes.recipe_lights import Along, FromTable
+from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
 from optisense.sensors.from_meshes.recipe_parts import PartChoice
 from optisense.sensors.from_meshes.strips import along, from_table
 from tests.sensors.from_meshes.conftest import Cad
@@ -135,7 +135,7 @@ def test_file_names_tell_what_a_nameless_body_is(tmp_path: Path) -> None:
 class TestAlong:
     def test_it_follows_the_outline_around_corners(self) -> None:
         lights = along(
-            Along(edge_of="p", start="-y", count=3, pitch=10.0, gap=0.5, height=0.0),
+            LightsAlong(edge_of="p", start="-y", count=3, pitch=10.0, gap=0.5, height=0.0),
             TriangleMesh.box((-4.0, -10.0, -1.0), (4.0, 10.0, 2.0)),
         )
         places = np.array([light.position for light in lights])
@@ -149,7 +149,7 @@ class TestAlong:
     def test_on_a_round_part_lights_look_to_its_axis(self) -> None:
         cylinder = trimesh.creation.cylinder(radius=5.0, height=4.0, sections=64)
         mesh = TriangleMesh(cylinder.vertices, cylinder.faces)
-        lights = along(Along(edge_of="p", start="+x", shift=2.0, count=7, gap=0.0), mesh)
+        lights = along(LightsAlong(edge_of="p", start="+x", shift=2.0, count=7, gap=0.0), mesh)
         places = np.array([light.position for light in lights])
         ways = np.array([light.direction for light in lights])
         np.testing.assert_allclose(np.linalg.norm(places, axis=1), 5.0, rtol=2e-3)
@@ -161,7 +161,7 @@ class TestAlong:
         digit = sensors.digit()
         for name, shift in (("red", 34.0), ("green", -34.0), ("blue", 0.0)):
             (found,) = along(
-                Along(edge_of="acrylic", start="-y", shift=shift, height=-5.62),
+                LightsAlong(edge_of="acrylic", start="-y", shift=shift, height=-5.62),
                 digit.meshes["acrylic"],
             )
             (built,) = digit.lights[name].lights
@@ -169,8 +169,10 @@ class TestAlong:
             np.testing.assert_allclose(found.direction, built.direction, atol=0.02)  # of a polygon
 
     def test_a_height_beside_the_part_is_told(self) -> None:
-        with pytest.raises(DesignError, match="no outline at height 9 mm"):
-            along(Along(edge_of="p", start="+x", height=9.0), BOX)
+        with pytest.raises(
+            DesignError, match=r"no outline at height 9 mm: along z it reaches from"
+        ):
+            along(LightsAlong(edge_of="p", start="+x", height=9.0), BOX)
 
 
 KICAD_POS = """\
