@@ -87,12 +87,12 @@ def watch(command: list[str], columns: int, presses: list[float]) -> Watched:
         now = time.monotonic() - began
         if ready:
             try:
-                told = os.read(terminal, 65536)
+                data = os.read(terminal, 65536)
             except OSError:
                 break
-            if not told:
+            if not data:
                 break
-            stream.feed(told)
+            stream.feed(data)
             if pressed is not None and found.answered is None and _answers(screen):
                 found.answered = now - pressed
         if waiting and now >= waiting[0]:
@@ -138,7 +138,7 @@ def _stage(line: str) -> str:
     return re.sub(r"\s+", " ", re.sub(r"[-+]?\d[\d.,e]*", "#", plain)).strip()
 
 
-def told(found: Watched) -> dict[str, object]:
+def summary(found: Watched) -> dict[str, object]:
     """The figures of a run."""
     stages: list[str] = []
     for look in found.looks:
@@ -190,7 +190,7 @@ def main() -> None:
             print(f"{look.seconds:7.1f}  {look.line}")
     if given.screen:
         print("\n".join(found.screen))
-    print(json.dumps(told(found), indent=2, ensure_ascii=False))
+    print(json.dumps(summary(found), indent=2, ensure_ascii=False))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Accuracy of the time left of each long command, on an idle machine.
 
-Runs commands in this process and notes what their progress line is told, with the processor time
+Runs commands in this process and records the calls of their progress line, with the processor time
 spent until then. Other processes that want the processors hardly change that time, so the same run
 on two idle processors is worked out from it: loading and building take as long as their processor
 time, and the rest, which all processors share, half as long. Played back by that clock, the time
@@ -90,7 +90,7 @@ class IdleClock:
 
 @contextmanager
 def noted(found: list[dict[str, Any]]) -> Iterator[None]:
-    """Note what each `TimeLeft` is told; one dict for each that has steps."""
+    """Record the calls of each `TimeLeft`; one dict for each that has steps."""
     methods = {name: getattr(TimeLeft, name) for name in ("__init__", "begin", "expect", "advance")}
 
     def begun(self: TimeLeft, steps: Any, workers: int = 1, clock: Any = time.monotonic) -> None:
@@ -101,7 +101,7 @@ def noted(found: list[dict[str, Any]]) -> Iterator[None]:
             found.append(record | {"events": [], "of": id(self)})
 
     def noting(name: str) -> Callable[..., None]:
-        def told(self: TimeLeft, *args: Any, **named: Any) -> None:
+        def noted(self: TimeLeft, *args: Any, **named: Any) -> None:
             methods[name](self, *args, **named)
             if not found or found[-1]["of"] != id(self):
                 return
@@ -111,7 +111,7 @@ def noted(found: list[dict[str, Any]]) -> Iterator[None]:
                 return
             events.append([round(now, 3), name, list(args), named])
 
-        return told
+        return noted
 
     try:
         TimeLeft.__init__ = begun  # type: ignore[method-assign]
@@ -141,16 +141,16 @@ def record(arguments: list[str]) -> dict[str, Any]:
     return {"command": " ".join(arguments), **last, "ended": round(time.process_time(), 3)}
 
 
-def promised(told: dict[str, Any], shares: tuple[float, ...] = SHARES) -> list[float]:
-    """The promised total over the real one at parts of the whole time; NaN where none is told."""
+def promised(record: dict[str, Any], shares: tuple[float, ...] = SHARES) -> list[float]:
+    """The promised total over the real one at parts of the whole time; NaN where none is shown."""
     clock = IdleClock()
-    names = [step["name"] for step in told["steps"]]
+    names = [step["name"] for step in record["steps"]]
     known = names[0] in SERIAL
-    clock.now = told["began"]
-    left = TimeLeft([TimedStep(**step) for step in told["steps"]], told["workers"], clock)
+    clock.now = record["began"]
+    left = TimeLeft([TimedStep(**step) for step in record["steps"]], record["workers"], clock)
     moments = [(0.0, math.nan), (clock.now, left.seconds_left if known else math.nan)]
-    spent, step, ended = told["began"], names[0] if known else "", clock.now
-    for at, name, args, named in [*told["events"], [told["ended"], "end", [], {}]]:
+    spent, step, ended = record["began"], names[0] if known else "", clock.now
+    for at, name, args, named in [*record["events"], [record["ended"], "end", [], {}]]:
         while spent < at:  # look at the line in between, too
             slice_ = min(0.1, at - spent)
             spent += slice_

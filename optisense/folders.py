@@ -291,14 +291,14 @@ def holder_of(folder: Path) -> Holder | None:
     except OSError:
         return None
     try:
-        told = read_holder(file)
+        holder = read_holder(file)
         fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
-        return told or UNKNOWN
+        return holder or UNKNOWN
     except OSError:
         return None
     else:
-        return told if told is not None and told.is_elsewhere else None
+        return holder if holder is not None and holder.is_elsewhere else None
     finally:
         os.close(file)
 

@@ -155,8 +155,8 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
     if result["gaps"]:
         output.print(f"  {len(result['gaps'])} without a score; see the text", markup=False)
     minutes = result["seconds"]["processor"] / 60.0
-    told = f"  {result['units']} evaluations, {minutes:.1f} processor minutes"
-    output.print(f"{told}; results: {out / experiment.name}", markup=False)
+    summary = f"  {result['units']} evaluations, {minutes:.1f} processor minutes"
+    output.print(f"{summary}; results: {out / experiment.name}", markup=False)
 
 
 def main() -> None:

@@ -109,16 +109,16 @@ def claims(numbers: Values) -> list[Claim]:
     for name, title in OBJECTIVES.items():
         column = numbers["coatings"][name]
         top, alike = best(column)
-        told: bool | None = None
+        agrees: bool | None = None
         if top is not None:
-            told = float(top) < MOST_SPECULAR
-            if not told and any(float(value) < MOST_SPECULAR for value in alike):
-                told = None
+            agrees = float(top) < MOST_SPECULAR
+            if not agrees and any(float(value) < MOST_SPECULAR for value in alike):
+                agrees = None
         found.append(
             Claim(
                 f"A specularity below {MOST_SPECULAR:g} is best ({title}).",
                 told_best(column, top, alike),
-                told,
+                agrees,
                 WHY_COATING,
             )
         )

@@ -85,13 +85,13 @@ def _order(colourings: Values, name: str, title: str) -> Claim:
         if each[name]["mean"] is not None
     ]
     reached, chance = spearman([p for p, _ in pairs], [m for _, m in pairs])
-    told = None if reached != reached else reached >= MATCH
+    agrees = None if reached != reached else reached >= MATCH
     return Claim(
         f"The five colourings in the paper's order by {title}.",
         f"rank correlation {reached:+.2f}; by chance as high in {100 * chance:.0f} % of orders"
-        if told is not None
+        if agrees is not None
         else "no scores",
-        told,
+        agrees,
         WHY_NORMDIFF if name == "normdiff" else WHY_RGB,
     )
 
@@ -112,9 +112,9 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
     top, alike = best(tips)
     near = {str(PAPERS_TIP + step) for step in (-1, 0, 1)}
     score = None if top is None else float(tips[top]["mean"])
-    told: bool | None = None
+    agrees: bool | None = None
     if top is not None:
-        told = top in near or (None if near & set(alike) else False)
+        agrees = top in near or (None if near & set(alike) else False)
     return [
         Claim(
             f"Of the tips 0 (flat) to 10 (conical), {PAPERS_TIP} (or a neighbour) has the best "
@@ -122,7 +122,7 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
             "no scores"
             if top is None
             else f"tip {top} ({shown(tips[top])}); alike: {_all_but(alike, top)}",
-            told,
+            agrees,
             "What lies between the ends of the family is our choice, and so are height and width "
             "of the tip. 2to3PW grows with the evenness of the whole picture, so the wall and the "
             "field of the camera count as much as the tip does. A neighbour of the paper's number "
@@ -144,16 +144,16 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
 
 def _resin(column: Values, title: str) -> Claim:
     top, alike = best(column)
-    told: bool | None = None
+    agrees: bool | None = None
     if top is not None and len(alike) < len(column):
-        told = str(PAPERS_RESIN) in alike
+        agrees = str(PAPERS_RESIN) in alike
     return Claim(
         f"Of the resins 0 (even shell) to 10 (almost flat inside), {PAPERS_RESIN} is best "
         f"({title}).",
         "no scores"
         if top is None
         else f"{top} ({shown(column[top])}); alike: {_all_but(alike, top)}",
-        told,
+        agrees,
         "Gel and shell thickness, the places of the LEDs in the wall and the family between its "
         "ends are assumed. The resin bends the camera's view and the light at the tip only; most "
         "of the nine places are on the wall.",

@@ -115,26 +115,26 @@ def claims(numbers: Values) -> list[Claim]:
 
 def _cylinder(column: Values, title: str) -> Claim:
     top, alike = best(column)
-    told = None if top is None or len(alike) == len(column) else f"{CYLINDER_BEST:g}" in alike
+    agrees = None if top is None or len(alike) == len(column) else f"{CYLINDER_BEST:g}" in alike
     return Claim(
         f"On the cylinder a specularity of about {CYLINDER_BEST:g} scores best ({title}).",
         told_best(column, top, alike),
-        told,
+        agrees,
         WHY_COATING,
     )
 
 
 def _sphere(column: Values, title: str) -> Claim:
     top, alike = best(column)
-    told: bool | None = None
+    agrees: bool | None = None
     if top is not None:
-        told = float(top) <= SPHERE_MOST
-        if not told and any(float(value) <= SPHERE_MOST for value in alike):
-            told = None
+        agrees = float(top) <= SPHERE_MOST
+        if not agrees and any(float(value) <= SPHERE_MOST for value in alike):
+            agrees = None
     return Claim(
         f"On the sphere a specularity of up to {SPHERE_MOST:g} scores best ({title}).",
         told_best(column, top, alike),
-        told,
+        agrees,
         WHY_COATING,
     )
 

@@ -54,10 +54,10 @@ def steps(settings: Values) -> Steps:
             count = settings["seeds"] if name == AS_ASSUMED and question.has_chance else 1
             for seed in range(count):
                 units = question.units(dimensions, settings, seed)
-                told = [
+                own = [
                     Unit(u.work, u.inputs, f"{question.sensor}, {name}: {u.label}") for u in units
                 ]
-                asked.append((question, name, told))
+                asked.append((question, name, own))
     records = iter((yield [unit for _, _, units in asked for unit in units]))
     margins: dict[str, dict[str, list[float | None]]] = {name: {} for name in CONCLUSIONS}
     for question, geometry, units in asked:
@@ -95,18 +95,18 @@ def _claim(text: str, found: Values) -> Claim:
         here += f"; not with {', '.join(failing)}" if holding else ""
     if unsure:
         here += f"; within the noise or without a score: {', '.join(unsure)}"
-    told = True if holding and not failing and not unsure else None
+    agrees = True if holding and not failing and not unsure else None
     if failing and not holding:
-        told = False
+        agrees = False
     why = (
         "No change of the assumed dimensions within their plausible range brings it about, so "
         "something else than these explains the difference."
-        if told is False
+        if agrees is False
         else "It hangs on dimensions that are assumed here."
         if failing
         else "In some geometries the margin is no larger than its noise."
     )
-    return Claim(text, here, told, why)
+    return Claim(text, here, agrees, why)
 
 
 def notes(numbers: Values) -> list[str]:

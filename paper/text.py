@@ -122,8 +122,8 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         verdicts = [claim["verdict"] for claim in result["claims"]]
         for verdict in verdicts:
             counts[verdict] += 1
-        told = ", ".join(_counted(verdicts.count(v), v) for v in counts if v in verdicts)
-        rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {told} |")
+        counts_text = ", ".join(_counted(verdicts.count(v), v) for v in counts if v in verdicts)
+        rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {counts_text} |")
     head = [
         "# The paper's tables and figures, made again",
         "Written by `python -m paper all --page FILE`; do not edit.",

@@ -77,7 +77,7 @@ def calibrate(
     places = fit.places(fitted, exposure)
     comparisons = []
     for each, factor in ((design, None), (fitted, exposure)):
-        fit.told("comparing")
+        fit.report_step("comparing")
         model.set_design(each)
         photons = max(chosen_settings.photons, FIT_PHOTONS)
         shown = model_pictures(

@@ -70,7 +70,7 @@ class FitRounds:
         self._done = 0
         self._count = 2 * settings.rounds + len(self._rendering) + 3
 
-    def told(self, what: str) -> None:
+    def report_step(self, what: str) -> None:
         """Report the progress by one piece."""
         self._progress(what, self._done, self._count)
         self._done += 1
@@ -87,13 +87,13 @@ class FitRounds:
         slopes: dict[int, list[NDArray[np.float32]]] = {}
         for number in range(self._settings.rounds):
             seen = [self._seen[index] for index in self._used]
-            self.told("rendering")
+            self.report_step("rendering")
             layers = self._layers(small, seen, steps)
             if number == 0:
                 total = layers.background.sum(axis=0)
                 self.exposure = matched_exposure(total, layers.chain, small.background)
                 slopes = self._slopes(small, seen, steps, layers)
-            self.told("fitting")
+            self.report_step("fitting")
             fit = LayeredFit(small, seen, layers, self._chosen, self.exposure, steps, slopes)
             solution = fit.solve(steps, np.zeros((len(seen), 3)))
             steps = solution.steps
@@ -108,7 +108,7 @@ class FitRounds:
         Those that were held out are located here, with nothing else fitted.
         """
         if self.held_out:
-            self.told("placing what was held out")
+            self.report_step("placing what was held out")
             small = self._small.subset(self.held_out)
             self._model.set_design(fitted)
             for _ in range(2):
@@ -162,7 +162,7 @@ class FitRounds:
         found: dict[int, list[NDArray[np.float32]]] = {}
         for number in self._rendering:
             each = self._chosen[number]
-            self.told(f"rendering another {each.words}")
+            self.report_step(f"rendering another {each.words}")
             other = steps.copy()
             other[number] += DIFFERENCE
             if each.value(float(other[number])) == each.value(float(steps[number])):

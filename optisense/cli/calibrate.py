@@ -66,7 +66,7 @@ def calibrate(
         kept = KeptRenderings(out)
         line.begin(FITTING)
 
-        def told(what: str, done: int, count: int) -> None:
+        def report(what: str, done: int, count: int) -> None:
             line.time_left.expect(FITTING, count=count)
             line.time_left.advance(done)
             line.say(what, done, count)
@@ -86,7 +86,7 @@ def calibrate(
                 ),
                 variant=variant,
                 kept=kept,
-                progress=told,
+                progress=report,
             )
         except KeyboardInterrupt:
             messages.print("interrupted: the same command goes on with what is rendered")
@@ -119,7 +119,7 @@ def print_calibration(found: Calibration) -> None:
     output.print(table)
     for one, other, value in found.alike:
         output.print(
-            f"hardly told apart: {one}, and {other} (correlation {value:.2f})", style="dim"
+            f"strongly correlated: {one}, and {other} (correlation {value:.2f})", style="dim"
         )
     held = bool(found.held_out)
     what = "presses held out" if held else "fitted presses"

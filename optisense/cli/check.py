@@ -56,8 +56,8 @@ def _tell_views(design: SensorDesign) -> None:
         output.print(f"Its mirrors are not checked: {error}", markup=False, style="yellow")
         return
     if views:
-        told = f"Of what the camera sees of the sensing surface: {views_in_words(views)}."
-        output.print(told, markup=False)
+        sentence = f"Of what the camera sees of the sensing surface: {views_in_words(views)}."
+        output.print(sentence, markup=False)
     for problem in mirror_problems(design, views):
         output.print(f"odd: {problem}", markup=False, style="yellow")
 
@@ -106,8 +106,8 @@ def _describe(design: SensorDesign) -> None:
     if design.parts_of(Role.ELASTOMER):
         output.print(f"elasticity  {elasticity_in_words(design)}", markup=False)
         if not is_attached(design):
-            told = "odd: the gel is attached to nothing; its elastic skin can't be pressed"
-            output.print(told, style="yellow")
+            sentence = "odd: the gel is attached to nothing; its elastic skin can't be pressed"
+            output.print(sentence, style="yellow")
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

@@ -94,8 +94,8 @@ def evaluate(
         try:
             for number in range(seeds):
                 seed_of_run = {**settings, "seed": options.seed + number}
-                told = _Told(line, number, seeds, len(objectives), usual)
-                _score(model, objectives, seed_of_run, scored, told)
+                progress = ScoreProgress(line, number, seeds, len(objectives), usual)
+                _score(model, objectives, seed_of_run, scored, progress)
         except KeyboardInterrupt:
             if not scored.scores:
                 raise
@@ -122,7 +122,7 @@ def _score(
     objectives: list[Objective],
     settings: dict[str, Any],
     scored: Scored,
-    told: _Told,
+    progress: ScoreProgress,
 ) -> None:
     """Score with one seed, objective by objective, so that Ctrl-C keeps what is finished."""
     from optisense.objectives import Evaluation, Settings
@@ -131,12 +131,14 @@ def _score(
     from optisense.objectives.scoring import run_objective
 
     shared, own = split_settings(settings, objectives)
-    evaluation = Evaluation(model, Settings(**shared), told.images, pixels_read(objectives, own))
+    evaluation = Evaluation(
+        model, Settings(**shared), progress.images, pixels_read(objectives, own)
+    )
     scores = scored.add(evaluation)
     for each in objectives:
-        told.begin(each.title)
+        progress.begin(each.title)
         scores[each.name] = run_objective(each, evaluation, own[each.name])
-        told.end()
+        progress.end()
 
 
 def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
@@ -190,7 +192,7 @@ def _steps(seeds: int, photons: int) -> list[TimedStep]:
     ]
 
 
-class _Told:
+class ScoreProgress:
     """Progress of scoring with one seed: images, which objectives share, and objectives.
 
     Each part of the work counts as many pieces as the seconds that it usually takes.

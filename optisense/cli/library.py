@@ -259,7 +259,9 @@ def _say_added(added: Added) -> None:
     output.print(f"{added.kind} {added.name}: {added.file}", markup=False)
     unsourced = added.entry.unsourced()
     if unsourced:
-        output.print(f"no source is told for: {', '.join(unsourced)}", markup=False, style="yellow")
+        output.print(
+            f"no source is given for: {', '.join(unsourced)}", markup=False, style="yellow"
+        )
     output.print(f"Look at it:  optisense library show {added.name}", markup=False, style="dim")
 
 

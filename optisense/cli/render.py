@@ -75,11 +75,11 @@ def render(
         expect_here(line, sensor, lambda times: _steps(times, options, pixels))
         model = OpticalModel(sensor, variant=variant)
         interrupt.raise_if_requested()
-        told = RenderStages(line)
+        stages = RenderStages(line)
 
         def report_progress(progress: RenderProgress) -> None:
-            told(progress)
-            if progress.photons and told.stage == TRACING:  # a picture can be made of these
+            stages(progress)
+            if progress.photons and stages.stage == TRACING:  # a picture can be made of these
                 interrupt.raise_if_requested()
 
         image = model.render(

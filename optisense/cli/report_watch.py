@@ -112,11 +112,11 @@ def _version_of(study: Study) -> str:
     from optisense.search.study.folder import STORE_FILE
 
     assert study.folder is not None
-    told = []
+    parts = []
     for end in ("", "-wal"):
         try:
             found = (study.folder / f"{STORE_FILE}{end}").stat()
         except OSError:
             continue
-        told.append(f"{found.st_mtime_ns:x}.{found.st_size:x}")
-    return "-".join(told)
+        parts.append(f"{found.st_mtime_ns:x}.{found.st_size:x}")
+    return "-".join(parts)

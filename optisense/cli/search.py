@@ -113,7 +113,7 @@ def search(
                 limit=options.budget,
                 variant=variant,
                 progress=show,
-                told=stopping.say,
+                on_wait=stopping.say,
                 time_left=line.time_left,
             )
         best = result.study.best

@@ -98,7 +98,7 @@ def tolerance(
             settings=settings,
             variant=variant,
             progress=show,
-            told=stopping.say,
+            on_wait=stopping.say,
             time_left=line.time_left,
         )
     text = json.dumps(found.to_dict(), indent=2, allow_nan=False)

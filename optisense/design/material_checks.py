@@ -42,11 +42,11 @@ def index_problems(design: SensorDesign) -> list[Diagnostic]:
     A gas is allowed: air gaps lie between parts, and a membrane may be filled with it.
     """
     problems: list[Diagnostic] = []
-    told: set[str] = set()
+    reported: set[str] = set()
     for name, part in design.parts.items():
         material = design.materials.get(part.material or "")
         medium = None if material is None else material.medium()
-        if part.material is None or part.material in told or medium is None:
+        if part.material is None or part.material in reported or medium is None:
             continue
         if part.role not in TRANSPARENT_SOLIDS:  # the index of a sheet is relative
             continue
@@ -54,7 +54,7 @@ def index_problems(design: SensorDesign) -> list[Diagnostic]:
         most = MOST_OF_AN_ELASTOMER if soft else MOST_OF_A_SOLID
         if is_gas(medium) or LEAST_OF_A_SOLID <= medium.ior <= most:
             continue
-        told.add(part.material)
+        reported.add(part.material)
         what = "clear elastomer" if soft else "transparent solid"
         problems.append(
             Diagnostic(

@@ -58,7 +58,7 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
     give_back = hold(folder)
     try:
 
-        def told(what: str, done: int, count: int) -> None:
+        def report(what: str, done: int, count: int) -> None:
             job.progress(min(done / max(count, 1), 1.0), what)
 
         found = fit_design(
@@ -74,7 +74,7 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
                 held_out=tuple(fields.hold_out) or None,
             ),
             variant=session.renderer.variant,
-            progress=told,
+            progress=report,
         )
         save_design(found.design, folder)
         write_json(folder / "calibration.json", found.as_data())

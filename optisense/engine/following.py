@@ -56,7 +56,7 @@ class Following:
         self._job = job
         self._files = files
         self._child = child
-        self._told: set[int] = set()
+        self._reported: set[int] = set()
         self._best = -math.inf
         self._left = threading.Event()
         self._done = self._failed = 0
@@ -83,14 +83,14 @@ class Following:
             )
             self._job.on_cancel(self._cancel)
             self._follow(study)
-            told = self._outcome(study)
+            summary = self._outcome(study)
         finally:
             study.close()
         return {
             "study": str(self._folder),
             "done": self._done,
             "failed": self._failed,
-            **told,
+            **summary,
         }
 
     def _cancel(self, leaving: bool) -> None:
@@ -116,8 +116,8 @@ class Following:
     def _look(self, study: Study) -> None:
         """Report the trials that were finished since the last look."""
         rows = [row for row in study.store.rows() if row.outcome is not None]
-        new = [row for row in rows if row.number not in self._told]
-        self._told.update(row.number for row in new)
+        new = [row for row in rows if row.number not in self._reported]
+        self._reported.update(row.number for row in new)
         self._done = sum(row.generation >= 0 for row in rows)
         self._failed = sum(row.generation >= 0 and _failed(row) for row in rows)
         if self._time_left is None:

@@ -81,7 +81,7 @@ class Job:
         self.design: SensorDesign | None = None
         self._send = send
         self._cancelled = threading.Event()
-        self._told = -1.0
+        self._last_event = -1.0
         self._on_cancel: list[Callable[[bool], None]] = []
         self._leaving = False
         self._lock = threading.Lock()
@@ -101,8 +101,8 @@ class Job:
             self._wait_for_short_jobs()
         self.check()
         now = time.monotonic()
-        if now - self._told >= EVENTS_EVERY:
-            self._told = now
+        if now - self._last_event >= EVENTS_EVERY:
+            self._last_event = now
             self.send("progress", fraction=round(fraction, 4), text=text, **content)
 
     def check(self) -> None:

@@ -84,14 +84,14 @@ class SearchProcess:
             OptiSenseError: the search failed, or the process died.
         """
         assert self._process.stdout is not None
-        told = self._process.stdout.read()
+        output = self._process.stdout.read()
         code = self._process.wait()
         for stream in (self._process.stdin, self._process.stdout):
             with contextlib.suppress(OSError):
                 if stream is not None:
                     stream.close()
         try:
-            outcome: dict[str, Any] = json.loads(told)
+            outcome: dict[str, Any] = json.loads(output)
         except ValueError:
             way = f"signal {-code}" if code < 0 else f"exit code {code}"
             raise SearchError(

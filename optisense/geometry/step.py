@@ -121,9 +121,9 @@ def _read_apart(path: Path) -> list[StepBody]:
         )
         wrong = Path(folder, WRONG)
         if wrong.exists():
-            told = json.loads(wrong.read_text(encoding="utf-8"))
-            kind: type[OptiSenseError] = getattr(errors, told.pop("kind"))
-            raise kind(told.pop("message"), **told)
+            report = json.loads(wrong.read_text(encoding="utf-8"))
+            kind: type[OptiSenseError] = getattr(errors, report.pop("kind"))
+            raise kind(report.pop("message"), **report)
         if done.returncode:
             raise MeshError(
                 "reading the STEP file has failed: it is damaged, or takes too much time or memory",

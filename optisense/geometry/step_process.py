@@ -35,9 +35,9 @@ def main() -> int:
     try:
         bodies = bodies_of(path)
     except OptiSenseError as error:
-        told: dict[str, str | None] = {"kind": type(error).__name__, "message": error.message}
-        told |= {"where": error.where, "hint": error.hint}
-        (folder / WRONG).write_text(json.dumps(told), encoding="utf-8")
+        report: dict[str, str | None] = {"kind": type(error).__name__, "message": error.message}
+        report |= {"where": error.where, "hint": error.hint}
+        (folder / WRONG).write_text(json.dumps(report), encoding="utf-8")
         return 1
     arrays: dict[str, Any] = {}
     for number, body in enumerate(bodies):

@@ -61,15 +61,15 @@ def add_file(file: str | Path, kind: str | None = None, name: str | None = None)
     check_new_name(name)
     data, lines = read_yaml(file, LibraryError)
     if kind is None:
-        told = kind_of(data)
-        if told is None:
+        detected = kind_of(data)
+        if detected is None:
             raise LibraryError(
                 "can't tell what kind of part this is",
                 where=f"{file}:{lines.get(('value',), 1)}",
                 hint="Name it: --kind material, coating, light or camera; a file holds one entry "
                 "with 'description', 'value' and 'sources'",
             )
-        kind = told
+        kind = detected
     singular = kind_named(kind)
     entry = read_entry(singular, file)
     files = _taken_along(entry.value, name)

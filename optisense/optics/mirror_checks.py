@@ -65,8 +65,8 @@ def views_in_words(views: dict[frozenset[str], float]) -> str:
     """Describe the sets of mirrors by which the camera sees the sensing surface, the most used
     first.
     """
-    told = []
+    phrases = []
     for way, share in sorted(views.items(), key=lambda each: -each[1]):
         names = " and ".join(f"'{name}'" for name in sorted(way))
-        told.append(f"{100 * share:.0f} % {'by ' + names if names else 'straight'}")
-    return ", ".join(told)
+        phrases.append(f"{100 * share:.0f} % {'by ' + names if names else 'straight'}")
+    return ", ".join(phrases)

@@ -92,8 +92,8 @@ def conditions(study: Study, start: Trial | None, best: Trial | None) -> Table |
             for trial in (start, best)
         ]
         margin = wanted.margin(values[1])
-        told = "broken" if margin < 0.0 and wanted.breach(values[1]) else number(margin)
-        rows.append([str(wanted), *map(number, values), told])
+        shown = "broken" if margin < 0.0 and wanted.breach(values[1]) else number(margin)
+        rows.append([str(wanted), *map(number, values), shown])
     return Table(["", "before", "after", "margin"], rows) if rows else None
 
 

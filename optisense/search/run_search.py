@@ -135,7 +135,7 @@ def run_study(
     limit: int | None = None,
     variant: str = "auto",
     progress: SearchProgressCallback | None = None,
-    told: Callable[[], None] | None = None,
+    on_wait: Callable[[], None] | None = None,
     time_left: TimeLeft | None = None,
 ) -> SearchResult:
     """Run a study, or resume one.
@@ -147,7 +147,7 @@ def run_study(
         limit: total number of trials; the study's budget if None.
         variant: variant of the renderer, see `search`.
         progress: function that is called a few times a second.
-        told: function that is called when Ctrl-C waits for a trial in this process to finish.
+        on_wait: function that is called when Ctrl-C waits for a trial in this process to finish.
         time_left: time estimate of a command whose last steps are the stages of this search
             (`optisense.search.study.stages`).
 
@@ -163,7 +163,7 @@ def run_study(
         if executor is not None:
             return ExecutorRunner(evaluator, executor)
         if workers == 1 and not own_process:
-            return SerialRunner(evaluator, told)
+            return SerialRunner(evaluator, on_wait)
         return ProcessPool(evaluator, workers)
 
     try:
@@ -188,11 +188,11 @@ def _hint_after(error: OptiSenseError, study: Study) -> str | None:
     trials = study.trials
     if trials or not study.is_new:
         kept = f"{len(trials)} finished trial{'' if len(trials) == 1 else 's'}"
-        told = f"The study keeps its {kept}: go on with --resume --out {study.folder}"
+        advice = f"The study keeps its {kept}: go on with --resume --out {study.folder}"
     else:
         study.discard()
-        told = "No trial was finished and no study is left: give the same command again"
-    return f"{error.hint}. {told}" if error.hint else told
+        advice = "No trial was finished and no study is left: give the same command again"
+    return f"{error.hint}. {advice}" if error.hint else advice
 
 
 def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:

@@ -73,10 +73,10 @@ def _dimension_error(error: ValidationError, sensor: str) -> DesignError:
     usually is the argument.
     """
     report = error.errors(include_url=False)[0]
-    told = report["msg"].removeprefix("Value error, ").replace("Input should", "it should")
+    message = report["msg"].removeprefix("Value error, ").replace("Input should", "it should")
     field = ".".join(str(step) for step in report["loc"])
     what = f"{field} is {report['input']!r}" if field else f"the {error.title.lower()} can't be"
-    return DesignError(f"{what}: {told}", where=sensor, hint="Change that argument")
+    return DesignError(f"{what}: {message}", where=sensor, hint="Change that argument")
 
 
 def require(condition: bool, sensor: str, message: str, hint: str) -> None:

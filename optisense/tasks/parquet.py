@@ -98,7 +98,7 @@ def write_parquet(
     require_parquet()
     done, files = 0, []
 
-    def told(count: int) -> None:
+    def report(count: int) -> None:
         nonlocal done
         done += count
         if progress is not None:
@@ -114,7 +114,7 @@ def write_parquet(
                 of_file = numbers[part * SAMPLES_OF_A_FILE : (part + 1) * SAMPLES_OF_A_FILE]
                 name = f"{FOLDER}/{split}-{part:05d}-of-{count:05d}.parquet"
                 file = inside(dataset.folder, name)
-                write_whole(file, partial(_write, dataset=dataset, numbers=of_file, told=told))
+                write_whole(file, partial(_write, dataset=dataset, numbers=of_file, report=report))
                 files.append(file)
         if files:
             for other in files[0].parent.iterdir():
@@ -124,7 +124,7 @@ def write_parquet(
 
 
 def _write(
-    path: Path, dataset: Dataset, numbers: Sequence[int], told: Callable[[int], None]
+    path: Path, dataset: Dataset, numbers: Sequence[int], report: Callable[[int], None]
 ) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -139,7 +139,7 @@ def _write(
             columns = _columns(dataset, some, features)
             arrays = [columns[field.name] for field in schema]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
-            told(len(some))
+            report(len(some))
 
 
 def features_of(height: int, width: int) -> dict[str, Any]:
@@ -164,13 +164,13 @@ def _field(name: str, feature: dict[str, Any]) -> Any:
     """
     import pyarrow as pa
 
-    told = None
+    metadata = None
     if "shape" in feature:
-        told = {
+        metadata = {
             "ARROW:extension:name": f"datasets.features.features.{feature['_type']}ExtensionType",
             "ARROW:extension:metadata": json.dumps([feature["shape"], feature["dtype"]]),
         }
-    return pa.field(name, _arrow_type(feature), metadata=told)
+    return pa.field(name, _arrow_type(feature), metadata=metadata)
 
 
 def _arrow_type(feature: dict[str, Any]) -> Any:
@@ -225,5 +225,5 @@ def _nested(arrays: Sequence[NDArray[Any] | None], feature: dict[str, Any]) -> A
         values = pa.ListArray.from_arrays(pa.array(offsets), values)
     ends = (np.cumsum([0, *(each is not None for each in arrays)]) * shape[0]).tolist()
     missing = [*(each is None for each in arrays), False]
-    told = [None if gone else end for end, gone in zip(ends, missing, strict=True)]
-    return pa.ListArray.from_arrays(pa.array(told, pa.int32()), values)
+    offsets = [None if gone else end for end, gone in zip(ends, missing, strict=True)]
+    return pa.ListArray.from_arrays(pa.array(offsets, pa.int32()), values)

@@ -253,10 +253,12 @@ def verify(
     reach = 0.0
     trees = []
     for number, model in enumerate(models):
-        told = _told(progress, number, settings.reading.presses + len(chosen.presses))
-        sensor = CalibratedSensor(model, settings.reading, told, settings.readers)
+        on_press = _progress_of_sensor(
+            progress, number, settings.reading.presses + len(chosen.presses)
+        )
+        sensor = CalibratedSensor(model, settings.reading, on_press, settings.readers)
         areas = _areas(model, sensor)
-        readings.append(_read_all(sensor, areas, chosen.presses, number, settings, told))
+        readings.append(_read_all(sensor, areas, chosen.presses, number, settings, on_press))
         views.append(_view(model, areas, sensor))
         trees.append(cKDTree(sensor.untouched.points[areas > 0.0]))
         reach += NEAR * float(np.sqrt(np.median(areas[areas > 0.0])))
@@ -291,7 +293,7 @@ def verify(
     )
 
 
-def _told(
+def _progress_of_sensor(
     progress: Callable[[int, int, int], None] | None, sensor: int, count: int
 ) -> Callable[[int], None]:
     return lambda done: None if progress is None else progress(sensor, done, count)
@@ -326,17 +328,17 @@ def _read_all(
     presses: Sequence[UnseenPress],
     side: int,
     settings: VerificationSettings,
-    told: Callable[[int], None],
+    on_press: Callable[[int], None],
 ) -> list[PressReading]:
     """Return a sensor's readings of all presses, with pictures at the first place of each
     object.
     """
     found = []
     for number, press in enumerate(presses):
-        told(settings.reading.presses + number)
+        on_press(settings.reading.presses + number)
         keeps = number % settings.places == 0
         found.append(
             read_press(sensor, areas, press.contacts[side], number, settings.readers, keeps)
         )
-    told(settings.reading.presses + len(presses))
+    on_press(settings.reading.presses + len(presses))
     return found

@@ -314,7 +314,7 @@ def _is_seen(ring: shapely.Polygon, place: FloatArray, axis: int) -> bool:
 
 def _round(sheet: _Sheet, plate: Plate, corner: FloatArray) -> None:
     """Draw diameters and positions of holes, and radii of arcs, each radius once."""
-    told: set[str] = set()
+    known: set[str] = set()
     for outline in plate.outlines:
         if isinstance(outline, Circle):
             x, y = (outline.centre + corner).tolist()
@@ -330,9 +330,9 @@ def _round(sheet: _Sheet, plate: Plate, corner: FloatArray) -> None:
             assert centre is not None
             radius = float(np.linalg.norm(piece.points[0] - centre))
             words = f"R{number(radius)}"
-            if words in told:
+            if words in known:
                 continue
-            told.add(words)
+            known.add(words)
             tip = piece.points[1] + corner
             way = (piece.points[1] - centre) / radius
             inner = tip - LEADER * way

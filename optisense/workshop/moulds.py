@@ -90,7 +90,7 @@ class Mould:
             for end, mesh in (("front", self.front), ("back", self.back))
         ]
 
-    def told(self) -> str:
+    def note(self) -> str:
         """Return a sentence on the draft."""
         if self.undercut > 0.0:
             return (

@@ -11,7 +11,7 @@ LEAST = 0.002
 """Share of the light below which no line is written, 0.2 %: it would not be worth reading."""
 
 
-def told(ledger: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
+def group_rows(ledger: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
     """Return for each light group a title and lines (place, amount), the largest share first.
 
     Args:

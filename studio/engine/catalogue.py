@@ -70,12 +70,12 @@ def learn_kinds() -> None:
 def refresh_library(engine: Engine, kind: str, then: Callable[[], None] | None = None) -> None:
     """Request a kind of the library again, and call `then` when it has arrived."""
 
-    def told(result: dict[str, Any]) -> None:
+    def learn(result: dict[str, Any]) -> None:
         _keep(kind, result["entries"])
         if then is not None:
             then()
 
-    engine.send("library", kind=kind, on_result=told)
+    engine.send("library", kind=kind, on_result=learn)
 
 
 def _keep(name: str, rows: list[dict[str, Any]]) -> None:

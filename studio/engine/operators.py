@@ -20,10 +20,10 @@ def fail(operator: bpy.types.Operator, error: EngineError, title: str = "") -> s
     """Refuse like `refuse`, with the error on the panel that shows the job `title`."""
     session.state().about = title
     session.say(error)
-    return told(operator, error.text())
+    return report_error(operator, error.text())
 
 
-def told(operator: bpy.types.Operator, text: str) -> set[str]:
+def report_error(operator: bpy.types.Operator, text: str) -> set[str]:
     """Refuse like `refuse`, for errors that a panel shows: Blender opens no window for them."""
     operator.report({"ERROR" if bpy.app.background else "WARNING"}, text)
     return {"CANCELLED"}
@@ -47,7 +47,7 @@ def start(
     if session.start_job(title, what, on_result, wait=wait, **fields):
         return {"FINISHED"}
     now = session.state()
-    return told(operator, ". ".join(text for text in (now.problem, now.hint) if text))
+    return report_error(operator, ". ".join(text for text in (now.problem, now.hint) if text))
 
 
 def start_with_design(

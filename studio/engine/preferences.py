@@ -59,26 +59,26 @@ def engine_command() -> list[str]:
     studio` sets and which `register` copies into the preferences, then the search path.
     """
     own = preferences()
-    told = own.engine.strip() if own is not None else ""
-    told = told or os.environ.get(ENVIRONMENT, "")
-    if told:
-        return _split(told)
+    command = own.engine.strip() if own is not None else ""
+    command = command or os.environ.get(ENVIRONMENT, "")
+    if command:
+        return _split(command)
     found = shutil.which("optisense")
     return [found, "engine"] if found else []
 
 
-def _split(told: str) -> list[str]:
+def _split(command: str) -> list[str]:
     """Split a command into words; a path with spaces needs no quotes, and `engine` may be
     omitted.
     """
-    program = told.removesuffix(" engine").strip()
+    program = command.removesuffix(" engine").strip()
     if not Path(program).is_file():
-        return shlex.split(told)
+        return shlex.split(command)
     is_ours = Path(program).stem == "optisense"
-    return [program, "engine"] if is_ours or program != told else [program]
+    return [program, "engine"] if is_ours or program != command else [program]
 
 
 def register() -> None:
-    told, own = os.environ.get(ENVIRONMENT, ""), preferences()
-    if told and own is not None and own.engine != told:
-        own.engine = told  # so that a Blender started without `optisense studio` finds it too
+    command, own = os.environ.get(ENVIRONMENT, ""), preferences()
+    if command and own is not None and own.engine != command:
+        own.engine = command  # so that a Blender started without `optisense studio` finds it too

@@ -61,7 +61,7 @@ def draw(layout: bpy.types.UILayout) -> None:
     if not values.groups:
         return
     box = layout.box()
-    for title, lines in core.told(json.loads(values.groups)):
+    for title, lines in core.group_rows(json.loads(values.groups)):
         paragraph(box, title, "LIGHT_POINT", boxed=True)
         column = box.column(align=True)
         column.scale_y = 0.8

@@ -102,7 +102,7 @@ def is_current(scene: bpy.types.Scene) -> bool:
     return surface is not None and _shown.get("of") == surface.as_pointer()
 
 
-def told(scene: bpy.types.Scene) -> str:
+def in_words(scene: bpy.types.Scene) -> str:
     """Return the text about the footprint in a scene; empty if it is outdated."""
     text = str(bpy.context.window_manager.optisense_footprint.text)
     return text if is_current(scene) or not _shown else ""

@@ -37,7 +37,7 @@ def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict
     Raises:
         EngineError: the search can't succeed, or there is no engine.
     """
-    told = session.ask_and_wait(
+    answer = session.ask_and_wait(
         "advise",
         design=design,
         vary=vary.texts_of(search.vary),
@@ -45,10 +45,10 @@ def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict
         method=search.method,
         **fields,
     )
-    if told["advice"] is not None:
-        message, _, hint = told["advice"].partition(". ")
+    if answer["advice"] is not None:
+        message, _, hint = answer["advice"].partition(". ")
         raise EngineError({"kind": "SearchError", "message": message, "hint": hint})
-    return f"{told['trials']} trials usually take {duration(told['seconds'] / search.workers)}"
+    return f"{answer['trials']} trials usually take {duration(answer['seconds'] / search.workers)}"
 
 
 def duration(seconds: float) -> str:

@@ -137,11 +137,11 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
             return fail(self, error, TITLE)
         fields: dict[str, Any] = {"budget": search.budget} if search.budget else {}
         try:
-            told = advising.advice(design, search, fields)
+            expected = advising.advice(design, search, fields)
         except EngineError as error:
             return fail(self, error, TITLE)
         following.begin()
-        bpy.context.window_manager.optisense_found.expected = told
+        bpy.context.window_manager.optisense_found.expected = expected
         return start(
             self,
             TITLE,

@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 
 from ..core.engine import EngineError
 from ..engine import catalogue, handing, polls, session
-from ..engine.operators import ChoosingFile, Starting, fail, start, told
+from ..engine.operators import ChoosingFile, Starting, fail, report_error, start
 from ..scene.paths import chosen, suggested
 from .opening import open_empty, open_source
 
@@ -25,7 +25,7 @@ class _Opens:
             done = open_source(context.scene, source, folder, wait=wait)
         except EngineError as error:
             return fail(self, error)
-        return {"FINISHED"} if done else told(self, session.state().problem)
+        return {"FINISHED"} if done else report_error(self, session.state().problem)
 
 
 class OPTISENSE_OT_new(polls.Replacing, _Opens, Starting, bpy.types.Operator):

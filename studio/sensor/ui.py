@@ -47,7 +47,7 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
             row.prop(context.scene.optisense_looks, "footprint")
             if markers.of_design(context.scene):
                 row.prop(context.scene.optisense_looks, "markers")
-            text = footprint.told(context.scene)
+            text = footprint.in_words(context.scene)
             if text:
                 paragraph(layout, text, "CAMERA_DATA")
         if context.workspace is not None and context.workspace.name != TAB:

@@ -72,8 +72,8 @@ def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> N
     for problem in problems:
         message = problem["message"]
         hint = f" {problem['hint']}." if problem["hint"] else ""
-        told = f"{message[:1].upper()}{message[1:]}.{hint}"
-        paragraph(layout, told, "ERROR", boxed=True)
+        text = f"{message[:1].upper()}{message[1:]}.{hint}"
+        paragraph(layout, text, "ERROR", boxed=True)
     if problems:
         paragraph(layout, HOW_TO_CAGE_MORE, "BLANK1", boxed=True)
     row = layout.row(align=True)

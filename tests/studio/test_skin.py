@@ -76,7 +76,7 @@ def test_the_ledger_tells_where_the_light_goes(mini: Any) -> None:
     bpy.ops.optisense.add_contact()
     assert bpy.ops.optisense.ledger() == {"FINISHED"}
     values = bpy.context.window_manager.optisense_ledger
-    groups = words.told(json.loads(values.groups))
+    groups = words.group_rows(json.loads(values.groups))
     assert [title.split(":")[0] for title, _ in groups] == ["red", "green", "blue"]
     for _, lines in groups:
         shares = [float(share.split()[0]) for _, share in lines]

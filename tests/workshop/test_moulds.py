@@ -103,14 +103,14 @@ def test_a_half_with_draft_comes_off(lift: float) -> None:
     assert made.upright == made.undercut == 0.0
     lifted = made.front.with_vertices(made.front.vertices + lift * UP)
     assert common(lifted, body.mesh) < 1e-6 * body.mesh.volume
-    assert "draft of 1 degree or more" in made.told()
+    assert "draft of 1 degree or more" in made.note()
 
 
 def test_upright_sides_and_undercuts_are_told() -> None:
     upright = mould_of(cone(8.0, 8.0), UP)
     side = 2.0 * 64 * 8.0 * math.sin(math.pi / 64) * 5.0
     assert upright.upright == pytest.approx(side, rel=1e-6)
-    assert upright.undercut == 0.0 and "release agent" in upright.told()
+    assert upright.undercut == 0.0 and "release agent" in upright.note()
     narrow = mould_of(cone(8.0, 7.0), -UP)  # pulled the other way, it parts at its front
     assert narrow.undercut == 0.0
     waist = [[0.0, 0.0], [8.0, 0.0], [6.0, 2.5], [8.0, 5.0], [0.0, 5.0]]
@@ -119,7 +119,7 @@ def test_upright_sides_and_undercuts_are_told() -> None:
     slope = 64 * math.sin(math.pi / 64) * half_way  # sum of the sides of both rings, halved
     height = math.hypot(2.5, 2.0 * math.cos(math.pi / 64))
     assert made.undercut == pytest.approx(slope * height, rel=1e-6)
-    assert "undercut" in made.told()
+    assert "undercut" in made.note()
 
 
 def test_a_turned_sensor_has_the_same_mould(of_digit: Mould, digit: SensorDesign) -> None:

@@ -148,8 +148,8 @@ class _Media:
 def _media(
     scene: RayScene, ray: Ray, hit: SurfaceHit, side: mi.Float, interface: mi.Bool
 ) -> _Media:
-    told, before, behind = media_absorption(scene.table, hit.surface, interface)
-    known = interface & told
+    has_media, before, behind = media_absorption(scene.table, hit.surface, interface)
+    known = interface & has_media
     carried = mi.Color3f(0) if ray.absorption is None else ray.absorption
     here = dr.select(known, dr.select(side > 0, before, behind), carried)
     return _Media(known, before, behind, here)

@@ -24,15 +24,15 @@ class SerialRunner(Runner):
     shells arrange it for programs in the background, it stays ignored.
     """
 
-    def __init__(self, evaluator: Evaluator, told: Callable[[], None] | None = None) -> None:
+    def __init__(self, evaluator: Evaluator, on_wait: Callable[[], None] | None = None) -> None:
         """Store the evaluator; nothing is started yet.
 
         Args:
             evaluator: evaluator of the trials.
-            told: function that is called when Ctrl-C is pressed during a trial.
+            on_wait: function that is called when Ctrl-C is pressed during a trial.
         """
         self._evaluator = evaluator
-        self._told = told
+        self._on_wait = on_wait
         self._pressed = 0
         self._before: Callable[[int, FrameType | None], object] | int | None = None
 
@@ -77,5 +77,5 @@ class SerialRunner(Runner):
         self._pressed += 1
         if self._pressed > 1:
             raise KeyboardInterrupt
-        if self._told is not None:
-            self._told()
+        if self._on_wait is not None:
+            self._on_wait()

@@ -37,8 +37,8 @@ def main() -> None:
         send(answers, ("unfit", error))
         return
     except Exception as error:
-        told = SetupError(f"a worker can't be set up: {type(error).__name__}: {error}")
-        send(answers, ("unfit", told))
+        failure = SetupError(f"a worker can't be set up: {type(error).__name__}: {error}")
+        send(answers, ("unfit", failure))
         return
     send(answers, ("ready", os.getpid()))
     name = str(os.getpid())

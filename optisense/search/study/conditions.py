@@ -97,7 +97,7 @@ def worsened_note(best: Trial | None, start: Trial | None) -> str | None:
     worse = lost(best.outcome, start.outcome)
     if not worse:
         return None
-    told = ", ".join(
+    phrases = ", ".join(
         f"{name} is {now:.3g}, where the start has {before:.3g}"
         for name, (now, before) in worse.items()
     )
@@ -105,7 +105,7 @@ def worsened_note(best: Trial | None, start: Trial | None) -> str | None:
         f"--require '{name}{'<=' if objective_of(name).lower_is_better else '>='}{before:.3g}'"
         for name, (_, before) in worse.items()
     )
-    return f"the score rose, but {told}: search with {options} to keep it"
+    return f"the score rose, but {phrases}: search with {options} to keep it"
 
 
 def _shown(value: float | None) -> str:

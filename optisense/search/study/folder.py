@@ -64,7 +64,7 @@ def as_begun(folder: Path, settings: StudySettings, store: Store) -> SensorDesig
         begun = store.fact("study")
         raise SearchError(
             f"{STUDY_FILE} was edited since the study was begun"
-            + _told(plain_differences(begun, settings.comparable()) if begun else []),
+            + _changes_in_words(plain_differences(begun, settings.comparable()) if begun else []),
             where=str(folder / STUDY_FILE),
             hint="Undo the change, or begin a new study",
         )
@@ -73,14 +73,14 @@ def as_begun(folder: Path, settings: StudySettings, store: Store) -> SensorDesig
         noted = store.fact("design")
         raise SearchError(
             "the study's own copy of the design was edited since its trials were made"
-            + _told(differences_from(noted, own) if noted else []),
+            + _changes_in_words(differences_from(noted, own) if noted else []),
             where=str(folder / DESIGN_FOLDER),
             hint="Undo the change, or begin a new study of the edited design",
         )
     return own
 
 
-def _told(changed: list[str]) -> str:
+def _changes_in_words(changed: list[str]) -> str:
     return f":\n{listed(changed)}" if changed else ""
 
 

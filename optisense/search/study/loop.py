@@ -119,7 +119,7 @@ class StudyRun:
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
         self._tally = Tally(study.objective)
         self._first_seconds = 0.0
-        self._told = time.monotonic()
+        self._last_report = time.monotonic()
         self._stage = START_STAGE
         self._plain = self._evaluator is usual or settings.errors is not None
         steps = stages(self.limit, self._usual, plain_trials=self._plain)
@@ -173,9 +173,13 @@ class StudyRun:
             raise self._tally.all_failed()
         several = self.method.several  # the result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
-        told = [tie, condition_note(study.trials)]
-        told += [] if several else [worsened_note(study.best, study.start)]
-        notes = [*self._notes, *self.method.notes(), *(note for note in told if note is not None)]
+        found_notes = [tie, condition_note(study.trials)]
+        found_notes += [] if several else [worsened_note(study.best, study.start)]
+        notes = [
+            *self._notes,
+            *self.method.notes(),
+            *(note for note in found_notes if note is not None),
+        ]
         return SearchResult(study, interrupted, ended, tuple(notes))
 
     def _search(self, runner: Runner) -> str:
@@ -355,9 +359,9 @@ class StudyRun:
 
     def _report(self, now: bool = False) -> None:
         clock = time.monotonic()
-        if not now and clock - self._told < TICK / 2:
+        if not now and clock - self._last_report < TICK / 2:
             return
-        self._told = clock
+        self._last_report = clock
         fresh, tally = self._stage == FRESH, self._tally
         self._progress(
             SearchProgress(

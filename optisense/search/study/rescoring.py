@@ -103,8 +103,8 @@ def _score(
         if seed not in fresh[trial.number]
         and not _alike(fresh[trial.number][seeds[0]], trial.outcome)
     ]
-    told = fresh[trials[0].number][seeds[0]].scores.get(trials[0].objective, math.nan)
-    later = _likely(rivals, max(best, told) if math.isfinite(told) else best)
+    fresh_score = fresh[trials[0].number][seeds[0]].scores.get(trials[0].objective, math.nan)
+    later = _likely(rivals, max(best, fresh_score) if math.isfinite(fresh_score) else best)
     outcomes_of_more = work(more, 0, len(seeds) * later) if more else []
     for (trial, seed), outcome in zip(more, outcomes_of_more, strict=True):
         fresh[trial.number][seed] = outcome

@@ -166,7 +166,7 @@ def tolerance(
     settings: Mapping[str, Any] | None = None,
     variant: str = "auto",
     progress: ToleranceCallback | None = None,
-    told: Callable[[], None] | None = None,
+    on_wait: Callable[[], None] | None = None,
     time_left: TimeLeft | None = None,
 ) -> Tolerance:
     """Score sensors with manufacturing errors, all with the same seed of the light.
@@ -181,7 +181,7 @@ def tolerance(
         settings: settings of the objectives.
         variant: variant of the renderer: "auto", "llvm" or "cuda".
         progress: function that is called a few times a second.
-        told: function that is called when Ctrl-C waits for a sensor in this process to finish.
+        on_wait: function that is called when Ctrl-C waits for a sensor in this process to finish.
         time_left: time estimate of a command whose last steps are those of `tolerance_steps`.
 
     Returns:
@@ -208,7 +208,7 @@ def tolerance(
     nominal = bound.points(np.zeros(bound.size))
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
-    with _runner(evaluator, workers, told) as runner:
+    with _runner(evaluator, workers, on_wait) as runner:
         show = progress or (lambda done, of, left, doing: None)
         usual = evaluator.usual_trials()
         steps = tolerance_steps(len(jobs) - OWN_SCORES, usual, runner.workers)
@@ -298,8 +298,8 @@ def _score_distribution(
     )
 
 
-def _runner(evaluator: DesignEvaluator, workers: int, told: Callable[[], None] | None) -> Runner:
-    return SerialRunner(evaluator, told) if workers == 1 else ProcessPool(evaluator, workers)
+def _runner(evaluator: DesignEvaluator, workers: int, on_wait: Callable[[], None] | None) -> Runner:
+    return SerialRunner(evaluator, on_wait) if workers == 1 else ProcessPool(evaluator, workers)
 
 
 def _work(

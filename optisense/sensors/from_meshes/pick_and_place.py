@@ -123,8 +123,8 @@ def _unit(head: list[str], columns: dict[str, int | None], before: list[str]) ->
     """Return the unit in the head of the x column, or in a line above that mentions units."""
     x = columns["x"]
     assert x is not None  # a file without it is refused
-    told = [head[x].replace("_", " ")] + [line for line in before if _SAYS_UNIT.search(line)]
-    found = [match[1] for text in told if (match := _UNIT.search(text))]
+    unit_texts = [head[x].replace("_", " ")] + [line for line in before if _SAYS_UNIT.search(line)]
+    found = [match[1] for text in unit_texts if (match := _UNIT.search(text))]
     return found[0] if found else None
 
 
