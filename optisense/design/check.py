@@ -14,7 +14,7 @@ from optisense.design.camera_checks import lens_problems, place_problems, view_p
 from optisense.design.focus_checks import focus_problems
 from optisense.design.lens_checks import fold_problems
 from optisense.design.limits import placed_things, unit_slips
-from optisense.design.material_checks import index_problems
+from optisense.design.material_checks import absorption_problems, index_problems
 from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
@@ -47,11 +47,12 @@ def check_design(
     They are: meshes that are empty, not closed or not finite, wrong units, missing meshes, unknown
     lights, lights or a camera inside something opaque, a camera inside a solid or too near to a
     part, a field of view that no lens has, a distortion that shows a point twice, a refractive
-    index that no transparent material has, a sensing surface that faces the wrong way, lies off the
-    elastomer, is mostly out of the camera's view or out of its focus, parts that cages have folded
-    or pushed together, cages that would tear a sensing surface off its elastomer, solids that
-    overlap with one priority, and provenance of values that don't exist. (Fields, ranges and
-    references between parts are checked when a design is created.)
+    index that no transparent material has, transparent parts that absorb all light, a sensing
+    surface that faces the wrong way, lies off the elastomer, is mostly out of the camera's view or
+    out of its focus, parts that cages have folded or pushed together, cages that would tear a
+    sensing surface off its elastomer, solids that overlap with one priority, and provenance of
+    values that don't exist. (Fields, ranges and references between parts are checked when a design
+    is created.)
 
     Args:
         light_names: names of the lights of the library; None skips the check of light models.
@@ -82,6 +83,7 @@ def check_design(
             problems += place_problems(design, meshes)
             problems += view_problems(design, meshes)
             problems += focus_problems(design, meshes)
+            problems += absorption_problems(design, meshes)
             bent = cage_problems(design, meshes)
             problems += bent
             problems += half_caged(design, meshes)

@@ -1,11 +1,18 @@
-"""Checks of transparent materials: refractive indices that no material has."""
+"""Checks of transparent materials: refractive indices that no material has, and media that absorb
+all light.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
 
 from optisense.design.materials import Medium
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
+from optisense.geometry import TriangleMesh
 
 MOST_OF_A_GAS = 1.002
 """Largest refractive index of a gas: air has 1.0003, and at atmospheric pressure no gas has more
@@ -28,6 +35,11 @@ MOST_OF_AN_ELASTOMER = 1.65
 """Largest refractive index of a clear elastomer. Silicones for lamps reach 1.62 at 633 nm: Mosley
 et al., "High refractive index thermally stable phenoxyphenyl and phenylthiophenyl silicones for
 light-emitting diode applications", J. Appl. Polym. Sci. 131, 39824 (2014).
+"""
+
+LEAST_TRANSMITTED = 1.0 / 255.0
+"""Smallest share of the light that a useful transparent part transmits over its smallest extent:
+one level of a picture of eight bits whose brightest level is the light without absorption.
 """
 
 
@@ -62,6 +74,43 @@ def index_problems(design: SensorDesign) -> list[Diagnostic]:
                 f"'{part.material}' of part '{name}'",
                 design.where("materials", part.material, "ior"),
                 f"Give {LEAST_OF_A_SOLID:g} to {most:g}, or 1 for air",
+            )
+        )
+    return problems
+
+
+def absorption_problems(
+    design: SensorDesign, meshes: Mapping[str, TriangleMesh]
+) -> list[Diagnostic]:
+    """Return warnings about transparent solids that absorb practically all light, each material
+    once.
+
+    Args:
+        design: the design.
+        meshes: the meshes of its parts, mm.
+    """
+    problems: list[Diagnostic] = []
+    told: set[str] = set()
+    for name, part in design.parts.items():
+        material = design.materials.get(part.material or "")
+        medium = None if material is None else material.medium()
+        if part.material is None or part.material in told or medium is None:
+            continue
+        if part.role not in TRANSPARENT_SOLIDS or name not in meshes:
+            continue
+        extent = float(np.ptp(meshes[name].vertices, axis=0).min())
+        left = np.exp(-min(medium.absorption) * extent)
+        if left >= LEAST_TRANSMITTED:
+            continue
+        told.add(part.material)
+        problems.append(
+            Diagnostic(
+                f"part '{name}' absorbs practically all light: over its smallest extent of "
+                f"{extent:.3g} mm, material '{part.material}' transmits {left:.1g} of the "
+                "light of its clearest channel",
+                design.where("materials", part.material),
+                "The unit of 'absorption' is 1/mm; opaque parts are blockers",
+                severity="warning",
             )
         )
     return problems

@@ -159,6 +159,8 @@ def _sentence(message: str) -> str:
     text = message.removeprefix("Value error, ").replace("Input should be", "should be")
     for kind in ("Dictionary ", "List "):
         text = text.removeprefix(kind).replace(" after validation", "")
+    if text == "should be a valid tuple":  # files know lists only
+        return "should be a list of values"
     if "should match pattern" in text:
         return "should be letters, digits, '-' and '_' only, at most 64"
     return text

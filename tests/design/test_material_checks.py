@@ -1,4 +1,4 @@
-"""Refractive indices that no transparent material has."""
+"""Refractive indices that no transparent material has, and media that absorb all light."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from optisense import library, sensors
 from optisense.design import SensorDesign, check_design, set_value
 from optisense.design.material_checks import index_problems
 from optisense.design.materials import Dielectric
+from optisense.errors import DesignError
 
 
 @pytest.fixture(scope="module")
@@ -57,3 +58,23 @@ def test_a_sensor_of_an_impossible_material_has_no_score(mini: SensorDesign) -> 
     design = set_value(mini, "materials.silicone-xp565.ior", 4.0)
     score = ots.evaluate(ots.OpticalModel(design), "aoap", ray_resolution=(40, 30))
     assert "refractive index of 4" in str(score.failure)
+
+
+@pytest.mark.parametrize(
+    ("absorption", "told"),
+    [((0.2, 0.2, 0.2), False), ((50.0, 1.0, 50.0), False), ((2.0,) * 3, True)],
+)
+def test_a_gel_that_absorbs_all_light_is_a_warning(
+    mini: SensorDesign, absorption: tuple[float, float, float], told: bool
+) -> None:
+    """Over 4.25 mm, 1/mm leaves a seventieth of one channel, and 2/mm a five-thousandth."""
+    dark = set_value(mini, "materials.silicone-xp565.absorption", absorption)
+    said = [one for one in check_design(dark) if "absorbs practically all light" in one.message]
+    assert [one.severity for one in said] == ["warning"] * told
+    if told:
+        assert "4.25 mm" in said[0].message and "'silicone-xp565'" in said[0].message
+
+
+def test_one_number_for_three_is_refused_in_words() -> None:
+    with pytest.raises(DesignError, match="should be a list of values"):
+        set_value(sensors.gelsight_mini(), "materials.acrylic.absorption", -1)
