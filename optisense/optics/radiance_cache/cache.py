@@ -309,17 +309,17 @@ class CacheTally:
         many bins.
         """
         cells, count = self.cells.cells, self.directions.count
-        once, twice = (each.astype(np.float32) for each in (kernel / self.passes, correction))
+        # Elsewhere the correction is the identity; a copy of a table takes as long as a product.
+        near = np.flatnonzero(self.kernels.near)
+        once = (kernel / self.passes).astype(np.float32)
+        twice = correction[near].astype(np.float32)
 
         def summed(table: mi.Float) -> mi.Float:
-            values = np.asarray(table).reshape(cells, count, -1)
-            out = np.empty((cells, len(used), values.shape[2]), dtype=np.float32)
-            for first in range(0, len(used), BLOCK_BINS):
-                some = slice(first, first + BLOCK_BINS)
-                chosen = values.take(used[some], axis=1)
-                found = twice @ (once @ chosen.reshape(cells, -1))
-                out[:, some] = found.reshape(chosen.shape)
-            return floats(out)
+            whole = np.asarray(table).reshape(cells, count, -1)
+            chosen = whole if len(used) == count else whole[:, used]
+            light = once @ chosen.reshape(cells, -1)
+            light[near] = twice @ light
+            return floats(light)
 
         moments, heights = summed(tables.moments), summed(tables.heights)
         return Tables(moments, heights, summed(tables.colours) if self.coloured else moments)

@@ -224,19 +224,36 @@ def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
     The kernel is normalised by the surface's area under it, so that no light is lost at edges and
     on oblique cells. Cells with another orientation (`MIN_NORMAL_COSINE`) have no weight.
     """
-    tree = cKDTree(cells.centres)
-    near = tree.sparse_distance_matrix(tree, float(radii.max()), output_type="coo_matrix").tocsr()
-    near.setdiag(1e-9)
-    near.sort_indices()
-    rows = np.repeat(np.arange(cells.cells), np.diff(near.indptr))
-    columns = near.indices
+    rows, columns, distance = _pairs_within(cells.centres, radii)
     normals = cells.normals
     alike = np.einsum("ij,ij->i", normals[rows], normals[columns]) > MIN_NORMAL_COSINE
-    weight = np.maximum(1 - (near.data / radii[rows]) ** 2, 0.0) * alike
+    weight = np.maximum(1 - (distance / radii[rows]) ** 2, 0.0) * alike
     kept = weight > 0
     rows, columns, weight = rows[kept], columns[kept], weight[kept]
     weight /= np.bincount(rows, weight * cells.areas[columns], cells.cells)[rows]
     return csr_matrix((weight, (rows, columns)), shape=(cells.cells, cells.cells))
+
+
+def _pairs_within(
+    places: FloatArray, radii: FloatArray
+) -> tuple[NDArray[np.integer], NDArray[np.integer], FloatArray]:
+    """Return the pairs (m,) of places that are closer than the radius of the first, and their
+    distances (m,), mm, in ascending order of the first and of the second.
+
+    Places with small radii are looked up by themselves: outside of the view they are many.
+    """
+    tree = cKDTree(places)
+    narrow = radii <= np.sqrt(radii.min() * radii.max())
+    found = []
+    for part in (np.flatnonzero(narrow), np.flatnonzero(~narrow)):
+        if len(part):
+            pairs = cKDTree(places[part]).sparse_distance_matrix(
+                tree, float(radii[part].max()), output_type="ndarray"
+            )
+            found.append((part[pairs["i"]], pairs["j"], pairs["v"]))
+    rows, columns, distance = (np.concatenate(each) for each in zip(*found, strict=True))
+    order = np.lexsort((columns, rows))
+    return rows[order], columns[order], distance[order]
 
 
 @dr.syntax
