@@ -45,8 +45,10 @@ def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
     except OptiSenseError:  # the parser of objectives reports it
         return None
     what, which = _listed(named), _listed(varied)
+    one = len(named) == 1
     return (
-        f"{what} {'looks' if len(named) == 1 else 'look'} at where rays go, which {which} "
+        f"the objective{'' if one else 's'} {what} depend{'s' if one else ''} only on the paths of "
+        f"rays, which {which} "
         f"{'does' if len(varied) == 1 else 'do'} not change: all trials will score alike. Maximise "
         f"{' or '.join(LIGHT_OBJECTIVES)}, or vary shapes, mirrors, lights' places or the camera"
     )
