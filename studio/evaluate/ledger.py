@@ -14,6 +14,9 @@ from ..engine import handing, polls
 from ..engine.layout import paragraph, show_job, show_outcome
 from ..engine.operators import fail, start
 
+SHARE = 0.58
+"""Share of a line of the ledger that its text takes; the rest has room for `0.253 µW/mm²`."""
+
 TITLE = "Following light"
 
 
@@ -66,7 +69,7 @@ def draw(layout: bpy.types.UILayout) -> None:
         column = box.column(align=True)
         column.scale_y = 0.8
         for text, share in lines:
-            row = column.split(factor=0.72, align=True)
+            row = column.split(factor=SHARE, align=True)
             row.label(text=text)
             row.label(text=share)
     for place in json.loads(values.places):

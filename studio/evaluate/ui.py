@@ -15,6 +15,9 @@ TITLE, VALUE = 0.28, 0.78
 the bar takes what is left.
 """
 
+COLUMNS = 2
+"""Number of columns of the objectives to tick: one would take half a screen."""
+
 ARROWS = {"better": "TRIA_UP", "worse": "TRIA_DOWN"}
 """Icon of each change: up is better, even if a lower value is better."""
 
@@ -33,18 +36,18 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         values = context.window_manager.optisense_evaluation
-        column = layout.column(align=True)
         if catalogue.entries("objectives"):
+            grid = layout.grid_flow(columns=COLUMNS, row_major=True, even_columns=True, align=True)
             for name, title, _ in catalogue.items("objectives"):
                 is_chosen = name in values.chosen
-                column.operator(
+                grid.operator(
                     "optisense.choose_objective",
                     text=title,
                     icon="CHECKBOX_HLT" if is_chosen else "CHECKBOX_DEHLT",
                     depress=is_chosen,
                 ).objective = name
         else:
-            column.label(text=catalogue.items("objectives")[0][1])
+            layout.label(text=catalogue.items("objectives")[0][1])
         layout.prop(values, "own")
         layout.prop(values, "live")
         row = layout.row()
@@ -79,7 +82,7 @@ def _strip(layout: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:
         named = ", ".join(score.title for score in values.scores if score.is_live)
         notes.append(f"Scored while editing: {named}.")
     if any(score.has_share for score in values.scores):
-        notes.append("0 % is the poorest built-in sensor, 100 % the best.")
+        notes.append("Bars: worst to best built-in sensor.")
     if notes:
         paragraph(layout, " ".join(notes), boxed=True)
 

@@ -32,7 +32,7 @@ class OPTISENSE_OT_snap_moves(polls.Designing, bpy.types.Operator):
     middles of edges of parts; pressed again, they move freely"""
 
     bl_idname = "optisense.snap_moves"
-    bl_label = "Snap While Moving"
+    bl_label = "Snap Moves"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:

@@ -52,7 +52,8 @@ class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
         row.operator("optisense.set_group", icon="GROUP")
         row = layout.row(align=True)
         row.operator("optisense.snap_row", icon="SNAP_EDGE")
-        row.operator("optisense.snap_moves", icon="SNAP_ON", depress=snapping.is_on(scene))
+        is_on = snapping.is_on(scene)
+        row.operator("optisense.snap_moves", icon="SNAP_ON", depress=is_on)
         cameras = objects_of(scene, "CAMERA")
         if cameras:
             _camera(layout.box(), cameras[0].optisense)
@@ -73,7 +74,7 @@ def _camera(layout: bpy.types.UILayout, camera: bpy.types.PropertyGroup) -> None
     row.operator("optisense.look_through", text="", icon="HIDE_OFF")
     column = labelled(layout)
     column.prop(camera, "projection")
-    column.prop(camera, "fov", text="Horizontal view (°)")
+    column.prop(camera, "fov", text="View angle (°)")
     column.prop(camera, "pixels")
     given = imaging(json.loads(camera.data)) if camera.data else {}
     if given:

@@ -47,15 +47,15 @@ class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
 
 
 def _markers(layout: bpy.types.UILayout, values: dict[str, Any] | None) -> None:
-    row = layout.row(align=True)
     if values is None:
         text = "No markers"
     elif values.get("grid"):
         text = f"Markers: {values['grid'][0]} x {values['grid'][1]}, {values['pitch']:g} mm apart"
     else:
         text = f"Markers: {len(values['places'])}"
-    row.label(text=text)
-    row.operator("optisense.set_markers", text="Change")
+    layout.label(text=text)
+    row = layout.row(align=True)
+    row.operator("optisense.set_markers", text="Change Markers" if values else "Print Markers")
     if values is not None:
         row.operator("optisense.remove_markers", text="", icon="X")
 

@@ -21,10 +21,13 @@ FORMATS = "*.obj;*.stl;*.ply;*.step;*.stp"
 
 USES = [
     *ROLES,
-    ("lights", "Place of lights", "A light on each of its faces that look to the gel"),
-    ("camera", "Place of the camera", "The camera's pupil is in its middle"),
+    ("lights", "Lights", "A light on each of its faces that look to the gel"),
+    ("camera", "Camera", "The camera's pupil is in its middle"),
     ("nothing", "Left out", "No part of the sensor"),
 ]
+
+NAMES = 0.6
+"""Share of a line of the table that name and size of a body take; the rest is its use."""
 
 UNITS = [
     (name, name, f"Lengths in the files are in {words}")
@@ -174,7 +177,7 @@ def draw(layout: bpy.types.UILayout) -> None:
     box.label(text="What is each body?", icon="IMPORT")
     column = box.column(align=True)
     for each in found.bodies:
-        row = column.row(align=True)
+        row = column.split(factor=NAMES, align=True)
         row.label(text=f"{each.name}  {each.size}")
         row.prop(each, "use", text="")
     if not found.has_units:

@@ -47,7 +47,7 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         if now.is_before:
             layout.label(text="Picture of the sensor that was open before", icon="INFO")
         kind = "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
-        layout.label(text=kind + now.summary)
+        paragraph(layout, kind + now.summary)
         for line in now.presses.splitlines():
             paragraph(layout, line, "FORCE_FORCE")
         layout.operator("optisense.show_picture", icon="IMAGE_DATA")
@@ -60,7 +60,7 @@ def _settings(column: bpy.types.UILayout, settings: bpy.types.PropertyGroup) -> 
     column.prop(settings, "noise", text="Noise (%)")
     column.prop(settings, "skin")
     row = column.row(align=True, heading="Exposure")
-    row.prop(settings, "auto_exposure", text="Automatic")
+    row.prop(settings, "auto_exposure", text="Auto")
     factor = row.row()
     factor.enabled = not settings.auto_exposure
     factor.prop(settings, "exposure", text="")

@@ -20,6 +20,9 @@ from .sidebar import Sidebar
 PATIENCE = 300.0
 """Time (s) after which a test fails because an expected event has not occurred."""
 
+FAR = "(state().busy, state().progress, state().per_cent)"
+"""What the engine works on, and how far it is."""
+
 TRIES = 5
 """To close Blender: a key may come before the question that it answers."""
 
@@ -39,8 +42,10 @@ class Bench(Sidebar):
         self._blender = blender
         self.start()
 
-    def start(self, file: Path | None = None) -> None:
-        """Start Blender, with a file of its own if one is given."""
+    def start(self, file: Path | None = None, design: str = "") -> None:
+        """Start Blender, with a file of its own if one is given, or as `optisense studio DESIGN`
+        does.
+        """
         address = self.home / "agent"
         address.unlink(missing_ok=True)
         environment = {
@@ -50,6 +55,7 @@ class Bench(Sidebar):
             "OPTISENSE_AGENT": str(address),
         }
         environment.pop("OPTISENSE_ENGINE", None)  # it knows that from when it was installed
+        environment.update({"OPTISENSE_OPEN": design} if design else {})
         self._last = 0
         self._log = (self.home / "blender.log").open("ab")
         self.process = subprocess.Popen(
@@ -82,12 +88,18 @@ class Bench(Sidebar):
         assert "error" not in answer, f"{expression}: {answer['error']}"
         return answer["value"]
 
-    def until(self, expression: str, patience: float = PATIENCE) -> Any:
-        """Wait until an expression is true."""
+    def until(self, expression: str, patience: float = PATIENCE, *, refused: bool = False) -> Any:
+        """Wait until an expression is true; nothing may be refused meanwhile, or has been before.
+
+        Args:
+            expression: a Python expression.
+            patience: seconds to wait.
+            refused: whether a message about a refusal may stand meanwhile.
+        """
         end = time.monotonic() + patience
         while not (value := self.see(expression)):
             assert time.monotonic() < end, f"never: {expression}; said: {self.said()}\n{self.log()}"
-            assert not self.see("state().problem"), self.said()
+            assert refused or not self.see("state().problem"), self.said()
             time.sleep(0.03)
         return value
 
@@ -107,9 +119,22 @@ class Bench(Sidebar):
                             " if t)"))  # fmt: skip
 
     def rest(self) -> None:
-        """Wait until a long job is over, and that it went well."""
-        self.until("not state().busy")
+        """Wait until a long job is over, and that it went well; as long as there is progress."""
+        far, end = None, 0.0
+        while (now := self.see(FAR))[0]:
+            if now != far:
+                far, end = now, time.monotonic() + PATIENCE
+            assert time.monotonic() < end, f"no progress since {now}; said: {self.said()}"
+            time.sleep(0.03)
         assert not self.see("state().problem"), self.said()
+
+    def refused(self) -> str:
+        """Wait until something is refused; what is said about it."""
+        end = time.monotonic() + PATIENCE
+        while not (told := self.see("state().problem")):
+            assert time.monotonic() < end, f"nothing is refused; said: {self.said()}\n{self.log()}"
+            time.sleep(0.03)
+        return str(told)
 
     def drawn(self) -> None:
         """Wait until all that changed is drawn."""
@@ -144,6 +169,14 @@ class Bench(Sidebar):
         self.desktop.write(text)
         self.desktop.keys("Return")
 
+    def tick(self, objective: str) -> None:
+        """Tick an objective, or clear it, in the two columns of the panel Evaluate."""
+        names = self.see(
+            "[each['name'] for each in part('engine.catalogue').entries('objectives')]"
+        )
+        across = (0.25, 0.75)[names.index(objective) % 2]
+        self.press(f'optisense.choose_objective(objective="{objective}")', across=across)
+
     def new_sensor(self, name: str) -> None:
         """Start from a built-in sensor."""
         self.until("bool(part('engine.catalogue').entries('sensors'))")
@@ -159,6 +192,15 @@ class Bench(Sidebar):
         if folder:
             self.drawn()
             self.desktop.picture(Path(folder) / f"{name}.jpg")
+
+    def press_above_picture(self, what: str) -> None:
+        """Find a control above the picture in the workspace and click on it."""
+        left, top, width, height = self.see("place('IMAGE_EDITOR', 'TOOL_HEADER')")
+        y = top + height // 2
+        where = f"IMAGE_EDITOR TOOL_HEADER {y} {left + 6} {left + width} 8"
+        x, seen = self.see(f"along {where} {what}")
+        assert x is not None, f"no control '{what}' above the picture; there are: {seen}"
+        self.desktop.click(x + 4, y)
 
     def view(self) -> NDArray[np.int64]:
         """(h, w, 3) what the 3D view shows, 0 to 255."""
