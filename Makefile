@@ -142,7 +142,7 @@ studio-tests-%: setup .venv-blender-%/.set-up
 # PICTURES=docs/images/studio keeps a picture of each step.
 studio-window-test: setup $(if $(BLENDER),,$(WINDOW_STAMP))
 	OPTISENSE_WINDOW_BLENDER="$(or $(BLENDER),.blender-window/blender)" \
-	    OPTISENSE_WINDOW_PICTURES="$(PICTURES)" timeout 2400 $(BIN)/python -m pytest tests/window
+	    OPTISENSE_WINDOW_PICTURES="$(PICTURES)" timeout 5400 $(BIN)/python -m pytest tests/window
 
 $(WINDOW_STAMP): scripts/setup_blender_window.sh
 	@sh scripts/setup_blender_window.sh

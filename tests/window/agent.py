@@ -3,8 +3,9 @@ move the mouse where it looks for a button.
 
 Each line on a local socket is a Python expression, or `scan X TOP END STEP` and a name: the mouse
 goes down the sidebar until it is over a button of that name (see `is_named`), and the answer is how
-far down that is, or null, and the names of all buttons that it came over. Answers are lines of
-JSON.
+far down that is, or null, and the names of all buttons that it came over. `along KIND PART Y LEFT
+END STEP` and a name is the same for the mouse that goes to the right in a part of an editor.
+Answers are lines of JSON.
 """
 
 from __future__ import annotations
@@ -87,12 +88,12 @@ def on_screen(point: Any) -> list[float]:
     return [view.x + spot.x, window().height - view.y - spot.y]
 
 
-def under() -> str:
-    """The button under the pointer in the sidebar: `optisense.open()`, with all its arguments,
-    a property as `optisense_search.budget`, or nothing.
+def under(kind: str = "VIEW_3D", part: str = "UI") -> str:
+    """The button under the pointer in a part of an editor: `optisense.open()`, with all its
+    arguments, a property as `optisense_search.budget`, or nothing.
     """
-    sidebar = region("VIEW_3D", "UI")
-    with bpy.context.temp_override(window=window(), area=area("VIEW_3D"), region=sidebar):
+    found = region(kind, part)
+    with bpy.context.temp_override(window=window(), area=area(kind), region=found):
         found = getattr(bpy.context, "property", None)
         if found is not None:
             return found[1]
@@ -160,7 +161,12 @@ def _poll() -> float:
         text = line.decode()
         if text.startswith("scan "):
             _, x, top, end, step, what = text.split(" ", 5)
-            _listener.scan = _scan(int(x), range(int(top), int(end), int(step)), what)
+            points = [(int(x), y) for y in range(int(top), int(end), int(step))]
+            _listener.scan = _scan(points, what, 1)
+        elif text.startswith("along "):
+            _, kind, part_, y, left, end, step, what = text.split(" ", 7)
+            points = [(x, int(y)) for x in range(int(left), int(end), int(step))]
+            _listener.scan = _scan(points, what, 0, kind, part_)
         else:
             _say(_answer(text))
     if _listener.scan is not None:
@@ -175,21 +181,29 @@ def _poll() -> float:
     return SOON
 
 
-def _scan(x: int, rows: range, what: str) -> Generator[None, None, tuple[int | None, list[str]]]:
-    """The first row where a button is, and those seen; goes on at each turn of the timer."""
+def _scan(
+    points: list[tuple[int, int]],
+    what: str,
+    axis: int,
+    kind: str = "VIEW_3D",
+    part: str = "UI",
+) -> Generator[None, None, tuple[int | None, list[str]]]:
+    """The coordinate along an axis of the first point where a button is, and the buttons seen; goes
+    on at each turn of the timer.
+    """
     seen: list[str] = []
-    for y in rows:
+    for x, y in points:
         window().cursor_warp(x, window().height - y)
         for _ in range(MOST_TURNS):
             yield
             if _has_come(x, y):
                 break
         yield  # timers come before what the mouse touches is told
-        found = under()
+        found = under(kind, part)
         if found and found not in seen:
             seen.append(found)
         if is_named(found, what):
-            return y, seen
+            return (x, y)[axis], seen
     return None, seen
 
 
