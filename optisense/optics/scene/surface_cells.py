@@ -173,41 +173,40 @@ def _divided(
     """
     count = int(owner.max()) + 1
     mean = _means(owner, count, points, normals, areas)[2]
+    # Of two normals, one is at half their angle or more to any mean.
+    bent = np.einsum("ij,ij->i", mean[owner], normals) < np.sqrt((1 + CREASE_COSINE) / 2)
+    suspects, divided = np.unique(owner[bent]), owner.copy()
+    number = np.full(count, -1)
+    number[suspects] = np.arange(len(suspects))
+    inside = np.flatnonzero(number[owner] >= 0)
+    home, spots, ways = number[owner[inside]], points[:, inside], normals[inside]
 
     def farthest(seeds: FloatArray) -> FloatArray:
-        """The normal (count, 3) at each place that differs most from its seed."""
-        order = np.lexsort((np.einsum("ij,ij->i", seeds[owner], normals), owner))
-        return normals[order[np.searchsorted(owner[order], np.arange(count))]]
+        """Return the normal at each place that differs most from its seed."""
+        order = np.lexsort((np.einsum("ij,ij->i", seeds[home], ways), home))
+        return np.asarray(ways[order[np.searchsorted(home[order], np.arange(len(suspects)))]])
 
-    one = farthest(mean)
+    one = farthest(mean[suspects])
     two = farthest(one)
-    second = np.full(count, -1)
-    creased = np.flatnonzero(np.einsum("ij,ij->i", one, two) < CREASE_COSINE)
-    second[creased] = count + np.arange(len(creased))
-    inside = np.flatnonzero(second[owner] >= 0)
-    home, beyond = owner[inside], second[owner[inside]]
-    towards = np.einsum("ij,ij->i", (one - two)[home], normals[inside])
-    _, centre, normal = _means(
-        np.where(towards > 0, beyond, home),
-        count + len(creased),
-        points[:, inside],
-        normals[inside],
-        areas[inside],
-    )
+    beyond = home + len(suspects)
+    towards = np.einsum("ij,ij->i", (one - two)[home], ways)
+    halves = np.where(towards > 0, beyond, home)
+    _, centre, normal = _means(halves, 2 * len(suspects), spots, ways, areas[inside])
 
     def away(cell: NDArray[np.int64]) -> FloatArray:
-        offset = points[:, inside].T - centre[cell]
-        return np.asarray(np.abs(np.einsum("ij,ij->i", normal[cell], offset)))
+        return np.asarray(np.abs(np.einsum("ij,ij->i", normal[cell], spots.T - centre[cell])))
 
     # Where all samples lie in one plane, as on the two sides of a sheet, the place stays one cell.
     other_side = away(beyond) < away(home)
-    sides = np.bincount(home, other_side, count), np.bincount(home, ~other_side, count)
-    creased = np.flatnonzero((sides[0] > 0) & (sides[1] > 0))
+    sides = (np.bincount(home, each, len(suspects)) > 0 for each in (other_side, ~other_side))
+    creased = np.einsum("ij,ij->i", one, two) < CREASE_COSINE
+    for side in sides:
+        creased &= side
+    first = suspects[creased]
     second = np.arange(count)
-    second[creased] = count + np.arange(len(creased))
-    divided = owner.copy()
-    divided[inside] = np.where(other_side, second[home], home)
-    return divided, np.concatenate([second, creased])
+    second[first] = count + np.arange(len(first))
+    divided[inside] = np.where(other_side, second[owner[inside]], owner[inside])
+    return divided, np.concatenate([second, first])
 
 
 def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uint32]:
