@@ -191,6 +191,51 @@ def test_several_goals_are_weighed(mini: SensorDesign, goals: ModuleType) -> Non
     assert plain.best.score == max(trial.score for trial in plain.trials)
 
 
+def test_trade_offs_are_scored_again_from_end_to_end(mini: SensorDesign) -> None:
+    from optisense.search import Outcome
+    from optisense.search.methods import register
+    from optisense.search.methods.pareto import Pareto
+
+    class Noisy:
+        """Two opposite scores of the specularity, with luck that depends on seed and design."""
+
+        def __init__(self, usual: object) -> None:
+            self.usual = usual
+
+        def __call__(self, vector: np.ndarray, seed: int) -> object:
+            luck = np.random.default_rng([seed, int(1e6 * vector[0])]).normal(0.0, 0.01, 2)
+            both = float(vector[0]) + luck[0], 1.0 - float(vector[0]) + luck[1]
+            return Outcome(dict(zip(("shine", "dullness"), both, strict=True)))
+
+    class NoisyPareto(Pareto):
+        name = "noisy-pareto"
+
+        def evaluator(self, usual: object) -> Noisy:  # type: ignore[override]
+            return Noisy(usual)
+
+    def shine(design: SensorDesign) -> float:
+        raise AssertionError("the method brings an evaluator of its own")
+
+    def dullness(design: SensorDesign) -> float:
+        raise AssertionError("the method brings an evaluator of its own")
+
+    register(NoisyPareto)
+    space = {"coating.specularity": (0.0, 1.0)}
+    result = search(mini, space, [shine, dullness], method="noisy-pareto", budget=80, seed=5)
+    again = [trial for trial in result.front if trial.fresh]
+    assert 2 < len(again) < len(result.front)
+    assert {result.front[0].number, result.front[-1].number} <= {trial.number for trial in again}
+    assert result.start.fresh
+    for trial in again:
+        assert len(trial.fresh) == 3
+        assert result.study.settings.seed not in trial.fresh
+        for outcome in trial.fresh.values():
+            assert set(outcome.scores) == {"shine", "dullness"}
+            assert outcome.scores != trial.scores
+            # Both scores of an outcome are of the same design: together they are 1, but for luck.
+            assert sum(outcome.scores.values()) == pytest.approx(1.0, abs=0.08)
+
+
 class TestResume:
     def test_a_larger_budget_goes_on_where_it_ended(
         self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
