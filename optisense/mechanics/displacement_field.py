@@ -124,6 +124,19 @@ class DisplacementField:
             result[:, known] += self._beyond.at(x[known], y[known])
         return result[0], result[1], result[2]
 
+    def depth(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the displacement (n,), mm, of points of the tangent plane into the gel."""
+        result = np.zeros(len(x))
+        near = self._fine.holds(x, y)
+        reached = ~near & self._coarse.holds(x, y)
+        for where, spline in ((near, self._fine), (reached, self._coarse)):
+            if where.any():
+                result[where] = spline.value(x[where], y[where])
+        if self._beyond is not None:
+            known = self._beyond.holds(x, y)
+            result[known] += self._beyond.value(x[known], y[known])
+        return result
+
     def sideways(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the displacement (2, n), mm, of points of the tangent plane along x and y."""
         result = np.zeros((2, len(x)))
@@ -133,11 +146,11 @@ class DisplacementField:
         for where, splines in ((close, (near, near_y)), (reached, (far, far_y))):
             if where.any():
                 for k, spline in enumerate(splines):
-                    result[k, where] = spline.at(x[where], y[where])[0]
+                    result[k, where] = spline.value(x[where], y[where])
         if self._patch is not None:
             known = self._sideways_beyond[0].holds(x, y)
             for k, spline in enumerate(self._sideways_beyond):
-                result[k, known] += spline.at(x[known], y[known])[0]
+                result[k, known] += spline.value(x[known], y[known])
         return result
 
     @cached_property
@@ -253,21 +266,31 @@ class GridSpline:
         rows, columns = self._shape
         return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
 
+    def value(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the value (n,) at points."""
+        column, row = self._place(x, y)
+        return self._between(row, column)
+
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return (3, n): the value, and its slopes by x and y from differences over one pitch."""
         column, row = self._place(x, y)
         half = 0.5
         rows = np.concatenate([row, row, row, row - half, row + half])
         columns = np.concatenate([column, column - half, column + half, column, column])
-        values = map_coordinates(
-            self._coefficients, [rows, columns], order=3, mode="mirror", prefilter=False
-        ).reshape(5, -1)
+        values = self._between(rows, columns).reshape(5, -1)
         return np.stack(
             [
                 values[0],
                 (values[2] - values[1]) / self._pitch,
                 (values[4] - values[3]) / self._pitch,
             ]
+        )
+
+    def _between(self, rows: FloatArray, columns: FloatArray) -> FloatArray:
+        return np.asarray(
+            map_coordinates(
+                self._coefficients, [rows, columns], order=3, mode="mirror", prefilter=False
+            )
         )
 
     def _place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -174,7 +174,7 @@ class PressedSkin:
             x, y = local[:, 0].copy(), local[:, 1].copy()
             found[facing, 0] += field.pressure(x, y)
             found[facing, 1] = np.maximum(found[facing, 1], field.penetration(x, y))
-            moved = np.stack([*field.sideways(x, y), -field.at(x, y)[0]], axis=1)
+            moved = np.stack([*field.sideways(x, y), -field.depth(x, y)], axis=1)
             found[facing, 2:] += moved @ place.axes.T
         return SkinMaps(
             found[:, 0].reshape(shape), found[:, 1].reshape(shape), found[:, 2:].reshape(*shape, 3)
@@ -268,7 +268,7 @@ def _dragged(
             break
         loads = np.concatenate([shear, np.zeros((1, *place.overlap.shape))])
         splines = sideways_beyond(patch, loads, place, elasticity.shear_modulus)
-        found = np.stack([each.at(x, y)[0] for each in splines]).reshape(wanted.shape)
+        found = np.stack([each.value(x, y) for each in splines]).reshape(wanted.shape)
         change = float(np.abs(found - beyond).max())
         beyond = found
         shear = solve_shear(response, contact.pressure, elasticity.friction, wanted - beyond, shear)
@@ -327,7 +327,7 @@ def _pressed(
         coarse = binned(solved.pressure, place, start, columns.pitch, columns.solid.shape)
         force = coarse * columns.pitch**2 / elasticity.shear_modulus
         spline = GridSpline(patch.correction(force), *start, columns.pitch)
-        found = spline.at(x, y)[0].reshape(overlap.shape)
+        found = spline.value(x, y).reshape(overlap.shape)
         change = float(np.abs(found - beyond).max())
         beyond = found
         rough = max(TOLERANCE, min(FIRST_TOLERANCE, ROUGH_SHARE * change / deepest))
@@ -364,6 +364,6 @@ def _caused_by(others: list[Pressed], place: Footprint) -> FloatArray:
     for other in others:
         local = other.place.local(points)
         upright = float(other.place.axes[:, 2] @ place.axes[:, 2])
-        depth, _, _ = other.field.at(local[:, 0], local[:, 1])
+        depth = other.field.depth(local[:, 0], local[:, 1])
         result += (max(upright, 0.0) * depth).reshape(result.shape)
     return result

@@ -154,6 +154,6 @@ def _balls(raised: TriangleMesh | None, pressed: PressedSkin) -> NDArray[np.floa
         return np.zeros((0, 4))
     points = raised.vertices
     middles = np.stack([contact.place.origin for contact in pressed.contacts])
-    away = np.linalg.norm(points[:, None] - middles, axis=2)
-    nearest = away.argmin(axis=1)
+    # The squared distances, without the square of each point, which all middles share.
+    nearest = ((middles**2).sum(axis=1) - 2.0 * points @ middles.T).argmin(axis=1)
     return np.stack([bounding_ball(points[nearest == k]) for k in np.unique(nearest)])
