@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
+from optisense.optics.backend.arrays import indices
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surface_cells import build_cells, cells_near
 from optisense.optics.scene.surfaces import Region, SurfaceKind
@@ -255,7 +255,7 @@ def cells_in_view(model: OpticalModel) -> TargetCells:
     rays = model.chief_rays((96, 72))
     points = rays.points[rays.hit].astype(np.float64)
     near = cells_near(cells, points, IN_VIEW) if len(points) else np.zeros(cells.cells, dtype=bool)
-    return TargetCells(cells, mi.UInt32(near.astype(np.uint32)))
+    return TargetCells(cells, indices(near))
 
 
 @dataclass(frozen=True)

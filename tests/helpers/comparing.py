@@ -43,7 +43,15 @@ def same_light(
     off = np.abs(one.astype(float) - other).max(axis=-1) / other.mean(dtype=float)
     part, _ = TURNED_RAYS
     turned = off > ROUNDING
-    return bool(off.max() <= most and turned.sum() <= max(LEAST_TURNED, part * off.size))
+    same = bool(off.max() <= most and turned.sum() <= max(LEAST_TURNED, part * off.size))
+    if not same:
+        worst = np.unravel_index(int(off.argmax()), off.shape)
+        print(  # pytest shows it where a test fails
+            f"{int(turned.sum())} of {off.size} pixels differ by more than {ROUNDING:g} of the"
+            f" mean, by {off.max():.2g} at most, at {tuple(int(each) for each in worst)};"
+            f" median {np.median(off):.2g}, mean {off.mean():.2g}"
+        )
+    return same
 
 
 def same_pictures(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> bool:

@@ -44,14 +44,24 @@ def joined(first: Value, second: Value) -> Value:
 
 
 def floats(values: NDArray[np.floating]) -> mi.Float:
-    """Return all values of an array as device floats, flattened in row-major order."""
-    held = mi.Float(np.asarray(values, dtype=np.float32).ravel()) + dr.opaque(mi.Float, 0)
+    """Return all values of an array as device floats, flattened in row-major order.
+
+    They are copied bit by bit, as some of them may hold integers.
+    """
+    bits = np.ascontiguousarray(values, dtype=np.float32).ravel().view(np.uint32)
+    held = dr.reinterpret_array(mi.Float, _copied(bits))
     dr.eval(held)
     return held
 
 
 def indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
     """Return all values of an array as device integers, flattened in row-major order."""
-    held = mi.UInt32(np.asarray(values, dtype=np.uint32).ravel()) + dr.opaque(mi.UInt32, 0)
+    held = _copied(np.asarray(values, dtype=np.uint32).ravel())
     dr.eval(held)
     return held
+
+
+def _copied(values: NDArray[np.uint32]) -> mi.UInt32:
+    """Return an expression of device integers that gets memory of its own when it is evaluated."""
+    held = mi.UInt32(values)
+    return held + dr.opaque(mi.UInt32, 0) if len(values) else held

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.transport.camera_paths import VisiblePoints
 
@@ -62,8 +63,8 @@ class Film:
         area A has radiance 1 / (pi A).
         """
         radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
-        values = mi.Float(np.array([0.0, *radiance], dtype=np.float32))
-        groups = mi.UInt32(np.array([0, *(e.group for e in emitters)], dtype=np.uint32))
+        values = floats(np.array([0.0, *radiance]))
+        groups = indices(np.array([0, *(e.group for e in emitters)]))
         seen = points.light > 0
         value = dr.gather(mi.Float, values, points.light, seen)
         group = dr.gather(mi.UInt32, groups, points.light, seen)

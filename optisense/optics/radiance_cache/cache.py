@@ -28,8 +28,11 @@ from optisense.optics.radiance_cache.direction_bins import (
     bin_centres,
     direction_bin,
     dither,
+    landing_bits,
 )
 from optisense.optics.radiance_cache.irradiance import irradiance_table
+from optisense.optics.radiance_cache.noise import noise_of_worst_places, relative_noise
+from optisense.optics.radiance_cache.power_rounding import PowerRounding
 from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, smooth
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
@@ -40,14 +43,6 @@ FloatArray = NDArray[np.floating]
 MIN_COSINE = 0.02
 """Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
 grazing photon does not become a bright beam."""
-NOISIEST_SHARE = 0.05
-"""Share of the area in view that counts as the worst places when their noise is reported."""
-PATCH_AVERAGES = 4
-"""Number of times that the squared noise is averaged with the smoothing kernel. Without averaging
-it is the square of a single difference, and chance would decide which places are the worst."""
-DARKEST_JUDGED = 0.1
-"""Lower bound on the light to which a place's noise is relative, as a share of the mean light, so
-that very dark places do not decide the result."""
 EMPTY_BIN_SHARE = 1e-7
 """Share of all the light below which a direction bin counts as empty."""
 
@@ -180,8 +175,9 @@ class CacheTally:
         entries = cells.cells * directions.count * groups * 4
         self.landed = self._tables(entries)
         self.above_surface = None if flux_layer is None else self._tables(entries)
-        # Power of the photons of even and of odd number; their difference gives the noise.
-        self.halves = dr.zeros(mi.Float, 2 * cells.cells * groups)
+        # Power of the photons of even and of odd number; their difference gives the noise. A cell
+        # receives more photons than single precision adds exactly.
+        self.halves = dr.zeros(mi.Float64, 2 * cells.cells * groups)
 
     def _tables(self, entries: int) -> Tables:
         moments = dr.zeros(mi.Float, entries)
@@ -192,7 +188,9 @@ class CacheTally:
         """Add the photons of a pass. All passes must have the same number of photons."""
         cell, found, bits, scalar = self._tally(photons, self.landed, None)
         row = cell + ((bits >> HALF_SHIFT) & 1) * dr.opaque(mi.UInt32, self.cells.cells)
-        dr.scatter_add(self.halves, scalar, row * self.groups + (bits & GROUP_MASK), found)
+        dr.scatter_add(
+            self.halves, mi.Float64(scalar), row * self.groups + (bits & GROUP_MASK), found
+        )
         if self.above_surface is not None and photons.passing is not None:
             self._tally(photons.passing, self.above_surface, self.flux_layer)
         self.passes += 1
@@ -210,7 +208,7 @@ class CacheTally:
             flux_layer: the layer that the photons crossed; None if they landed.
 
         Returns:
-            The cell of each photon, whether it lies in one, its bits and its power.
+            The cell of each photon, whether it lies in one, its bits and its power in whole quanta.
         """
         index = dr.arange(mi.UInt32, photons.count)
         place = dr.gather(mi.Vector4f, photons.place, index)
@@ -225,22 +223,29 @@ class CacheTally:
             across = dr.rcp(dr.maximum(travel.w, 1e-6))
         direction = mi.Vector3f(travel.x, travel.y, travel.z)
         count = dr.opaque(mi.UInt32, self.directions.count)
-        beside = dither(place, direction, self.directions)
+        random = landing_bits(place, direction)
+        beside = dither(random, self.directions)
+        in_quanta = PowerRounding.of(photons.emitted_power, random)
         bin_ = direction_bin(self.cells, self.directions, -direction, *beside)
         entry = (cell * count + bin_) * self.groups + (bits & GROUP_MASK)
+        power = mi.Vector4f(0)
         if self.coloured:
             power = dr.gather(mi.Vector4f, photons.power, index)
-            for k in range(3):
-                dr.scatter_add(tables.colours, power[k] * across, entry * 4 + k, found)
             scalar = (power.x + power.y + power.z) * (1 / 3)
         else:
             scalar = dr.gather(mi.Float, photons.power, index)
+        kept = across * in_quanta.kept(scalar * across)
+        flux = scalar * kept
+        if self.coloured:
+            for k in range(3):
+                value = in_quanta(power[k] * kept)
+                dr.scatter_add(tables.colours, value, entry * 4 + k, found)
         for k in range(3):
-            dr.scatter_add(tables.moments, -direction[k] * (scalar * across), entry * 4 + k, found)
-        dr.scatter_add(tables.moments, scalar * across, entry * 4 + 3, found)
+            dr.scatter_add(tables.moments, in_quanta(-direction[k] * flux), entry * 4 + k, found)
+        dr.scatter_add(tables.moments, in_quanta(flux), entry * 4 + 3, found)
         height = dr.dot(direction, bin_axis(self.cells, 2))
-        dr.scatter_add(tables.heights, dr.square(height) * (scalar * across), entry, found)
-        return cell, found, bits, scalar
+        dr.scatter_add(tables.heights, in_quanta(dr.square(height) * flux), entry, found)
+        return cell, found, bits, in_quanta(scalar)
 
     def noise(self) -> float:
         """Return the relative RMS noise of the smoothed irradiance (1 = 100 %).
@@ -252,12 +257,7 @@ class CacheTally:
         if self.passes < 1:
             return float("inf")
         near = self.kernels.near
-        mean, spread = (values[near] for values in self._light_and_spread())
-        scale = mean.mean(axis=0)
-        lit = scale > 0
-        if not lit.any():
-            return 0.0
-        return float(np.sqrt((spread[:, lit] / scale[lit] ** 2).mean()))
+        return relative_noise(*(values[near] for values in self._light_and_spread()))
 
     def worst_noise(self) -> float:
         """Return the relative RMS noise (1 = 100 %) that the noisiest 5 % of the area have at
@@ -269,21 +269,9 @@ class CacheTally:
         """
         if self.passes < 1:
             return float("inf")
-        near, areas = self.kernels.near, self.cells.areas
-        mean, spread = self._light_and_spread()
-        scale = mean[near].mean(axis=0)
-        lit = scale > 0
-        if not lit.any():
-            return 0.0
-        square = (spread[:, lit] / scale[lit] ** 2).mean(axis=1)
-        light = (mean[:, lit] / scale[lit]).mean(axis=1)
         kernel = self._smoothing().kernel.matrix
-        for _ in range(PATCH_AVERAGES):
-            square = kernel @ (square * areas)
-        relative = np.sqrt(square[near]) / np.maximum(light[near], DARKEST_JUDGED)
-        order = np.argsort(relative)
-        share = np.cumsum(areas[near][order]) / areas[near].sum()
-        return float(relative[order][np.searchsorted(share, 1.0 - NOISIEST_SHARE)])
+        near, areas = self.kernels.near, self.cells.areas
+        return noise_of_worst_places(*self._light_and_spread(), near, areas, kernel)
 
     def _light_and_spread(self) -> tuple[FloatArray, FloatArray]:
         """Return the smoothed irradiance (cells, groups), mW/mm^2, and its squared standard

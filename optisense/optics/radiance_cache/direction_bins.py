@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.backend.arrays import floats
 from optisense.optics.backend.sequences import unit_float
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
 
@@ -109,20 +110,27 @@ def direction_bin(
     return band * mi.UInt32(across) + dr.minimum(mi.UInt32(turn * across), last)
 
 
-def dither(
-    place: mi.Vector4f, direction: mi.Vector3f, bins: DirectionBins
-) -> tuple[mi.Float, mi.Float]:
-    """Return random offsets in bands and sectors, with a triangular density over the overlap of
-    bins.
-
-    The random numbers are a hash of the landing, as landings are recorded in no fixed order.
+def landing_bits(place: mi.Vector4f, direction: mi.Vector3f) -> tuple[mi.UInt32, mi.UInt32]:
+    """Return random bits that depend on a landing alone, as landings are recorded in no fixed
+    order.
     """
-    reach = dr.opaque(mi.Float, bins.overlap)
     first, second, third = (
         dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
     )
-    both = mi.sample_tea_32(first ^ (third * 747796405), second)
-    one, other = (reach * (unit_float(each) + unit_float(each * 277803737) - 1) for each in both)
+    one, other = mi.sample_tea_32(first ^ (third * 747796405), second)
+    return one, other
+
+
+def dither(random: tuple[mi.UInt32, mi.UInt32], bins: DirectionBins) -> tuple[mi.Float, mi.Float]:
+    """Return random offsets in bands and sectors, with a triangular density over the overlap of
+    bins.
+
+    Args:
+        random: the random bits of each photon (see `landing_bits`).
+        bins: the direction bins.
+    """
+    reach = dr.opaque(mi.Float, bins.overlap)
+    one, other = (reach * (unit_float(each) + unit_float(each * 277803737) - 1) for each in random)
     return one, other
 
 
@@ -135,4 +143,4 @@ def bin_centres(cells: SurfaceCells, bins: DirectionBins, chosen: NDArray[np.int
     out = np.zeros((len(chosen), 4), dtype=np.float32)
     out[:, :3] = local @ cells.axes
     out[:, 3] = chosen.astype(np.uint32).view(np.float32)
-    return mi.Float(out.ravel())
+    return floats(out)

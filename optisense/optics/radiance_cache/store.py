@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.backend.stages import Stage, StageCallback
 from optisense.optics.radiance_cache.cache import CacheTally, RadianceCache
@@ -203,7 +203,7 @@ class CacheStore:
             arrived, landed = trace_pilot(
                 lit.scene if lit.pilot is None else lit.pilot,
                 Emission(lit.table, uniform_guide(lights), per_light, seed_of(0, 1)),
-                TargetCells(cells, mi.UInt32(near.astype(np.uint32))),
+                TargetCells(cells, indices(near)),
                 lit.coloured if lit.pilot is None else lit.pilot_coloured,
             )
             self._guide = learn_guide(arrived, lights, per_light)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMesh, SkinState
+from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.assembly import indenter_piece
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface
@@ -138,7 +139,7 @@ class SkinShapes:
             list(skin.values()),
             list(numbers.values()),
             RayScene([skin[s] for s in raised], [numbers[s] for s in raised]) if raised else None,
-            mi.Float(balls.ravel().astype(np.float32)),
+            floats(balls),
         )
 
 

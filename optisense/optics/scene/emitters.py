@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.emitters import Intensity
+from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, RGB
 
 FloatArray = NDArray[np.floating]
@@ -186,10 +187,10 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
     return EmitterTable(
         count=len(emitters),
         groups=groups,
-        rows=mi.Float(rows.ravel()),
-        polar=mi.Float(np.concatenate(polar).astype(np.float32)),
-        azimuth=mi.Float(np.concatenate(azimuth).astype(np.float32)),
-        absorption=mi.Float(np.array([e.absorption for e in emitters], np.float32).ravel()),
+        rows=floats(rows),
+        polar=floats(np.concatenate(polar)),
+        azimuth=floats(np.concatenate(azimuth)),
+        absorption=floats(np.array([e.absorption for e in emitters])),
         emitters=list(emitters),
     )
 

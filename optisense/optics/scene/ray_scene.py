@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from optisense.optics.backend.arrays import indices
+from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.bsdf import SMOOTH_ALPHA, surface_table
 from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
 
@@ -182,8 +182,8 @@ class RayScene:
         self.scene = mi.load_dict(
             {"type": "scene", "sensor": mesh, "embree_use_robust_intersections": robust}
         )
-        self.rows = mi.Float(rows.ravel())
-        self.corners = mi.Float(corners.ravel())
+        self.rows = floats(rows)
+        self.corners = floats(corners)
         self.table = surface_table(surfaces) if table is None else table
         self.smooth = any(piece.normals is not None for piece in pieces)
         self.rough = any(

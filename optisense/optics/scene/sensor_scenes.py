@@ -12,6 +12,7 @@ import numpy as np
 from optisense.design.materials import CoatingModel
 from optisense.geometry import Contact, TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMesh
+from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.assembly import Assembly, coating_surface, indenter_piece
 from optisense.optics.scene.bsdf import surface_table
 from optisense.optics.scene.contact_scenes import (
@@ -213,7 +214,7 @@ class SensorScenes:
             self._sensor_pieces.with_indenters(placed),
             self.fixed,
             indenters.with_table(self.table),
-            mi.Float(balls.ravel().astype(np.float32)),
+            floats(balls),
             all(getattr(contact.indenter, "convex", False) for contact in contacts),
             self._absorption(),
         )

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
+from optisense.optics.backend.arrays import floats, indices
+
 FloatArray = NDArray[np.floating]
 
 SAMPLES_ACROSS = 7
@@ -123,11 +125,11 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
         lower=lower3,
         inverse_size=dr.opaque(mi.Float, 1 / size),
         counts=counts3,
-        index=mi.UInt32(index),
-        others=mi.UInt32(other.astype(np.uint32)),
+        index=indices(index),
+        others=indices(other),
         creased=cells > len(used),
         cells=cells,
-        planes=mi.Float(four.ravel()),
+        planes=floats(four),
         centres=centre,
         normals=normal,
         areas=area,

@@ -15,6 +15,8 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.backend.arrays import floats
+
 GUIDE_CELLS = 16
 """Number of cells along each side of a light's table over the unit square of its emission
 angles."""
@@ -50,9 +52,7 @@ def guide_from_density(density: NDArray[np.floating]) -> EmissionGuide:
     rows[:, 1:] = np.cumsum(by_row, axis=1) / by_row.sum(axis=1, keepdims=True)
     columns = np.zeros((len(density), GUIDE_CELLS, GUIDE_CELLS + 1))
     columns[:, :, 1:] = np.cumsum(even, axis=2) / by_row[:, :, None]
-    return EmissionGuide(
-        mi.Float(rows.ravel().astype(np.float32)), mi.Float(columns.ravel().astype(np.float32))
-    )
+    return EmissionGuide(floats(rows), floats(columns))
 
 
 def _floored(density: NDArray[np.float64]) -> NDArray[np.float64]:

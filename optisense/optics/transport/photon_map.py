@@ -23,6 +23,7 @@ class PhotonMap:
     Attributes:
         count: number of landings.
         emitted: number of photons of all lights, including those that are not lit in this pass.
+        emitted_power: power of a photon as it is emitted, for a light of 1 mW, in the mean.
         place: four floats per landing: x, y, z (mm) and bits (light group, half, surface).
         travel: four floats per landing: the unit direction and the cosine of incidence.
         power: the photon's share of a light of 1 mW, per channel if ``coloured``.
@@ -33,6 +34,7 @@ class PhotonMap:
 
     count: int
     emitted: int
+    emitted_power: float
     place: mi.Float
     travel: mi.Float
     power: mi.Float
@@ -84,8 +86,10 @@ class Records:
         else:
             dr.scatter(self.power, t.x, slot, kept)
 
-    def photon_map(self, emitted: int, passing: PhotonMap | None = None) -> PhotonMap:
-        """Return the landings of a pass of ``emitted`` photons."""
+    def photon_map(
+        self, emitted: int, emitted_power: float, passing: PhotonMap | None = None
+    ) -> PhotonMap:
+        """Return the landings of a pass; the arguments are as in `PhotonMap`."""
         count = int(self.counter[0])
         place, travel, power = self.place, self.travel, self.power
         if count == 0:
@@ -93,7 +97,9 @@ class Records:
             # power.
             count = 1
             place, travel, power = (dr.zeros(mi.Float, 4) for _ in range(3))
-        return PhotonMap(count, emitted, place, travel, power, self.coloured, passing)
+        return PhotonMap(
+            count, emitted, emitted_power, place, travel, power, self.coloured, passing
+        )
 
 
 @dataclass

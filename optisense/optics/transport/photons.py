@@ -295,5 +295,6 @@ def _traced(
         if all(count <= each for count, each in zip(found, room, strict=True)):
             break
         room = [max(int(1.2 * count), 1024) for count in found]
-    passing = None if flux_layer is None else crossings.photon_map(emission.emitted)
-    return cells, landings.photon_map(emission.emitted, passing)
+    of = emission.emitted, 1 / emission.per_light
+    passing = None if flux_layer is None else crossings.photon_map(*of)
+    return cells, landings.photon_map(*of, passing)
