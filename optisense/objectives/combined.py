@@ -57,6 +57,7 @@ def combined(
         ObjectiveError: the expression names an unknown objective.
     """
     terms = {name: (known or {}).get(name) or find(name) for name in expression.objectives}
+    single = expression.single
 
     def function(evaluation: Evaluation, **settings: Any) -> tuple[float, dict[str, Any]]:
         values, parts = _measured(expression, terms, evaluation, settings)
@@ -71,6 +72,7 @@ def combined(
         beside=tuple(str(quantity) for quantity in expression.quantities),
         reads=None if any(each.reads is None for each in terms.values()) else _reads(terms),
         unit=_unit(expression, terms),
+        lower_is_better=single is not None and terms[single.objective].lower_is_better,
         rays_only=all(each.rays_only for each in terms.values()),
         terms=tuple(terms.values()),
     )
@@ -174,7 +176,8 @@ def objective_of(text: str) -> Objective:
 
 
 def goal_of(wanted: str | Objective) -> Objective:
-    """Return the objective that a search maximises: the negative value if lower is better.
+    """Return the objective that a search maximises: the negative value if lower is better, as of
+    `reading` and of its part `reading.mean_of_places`.
 
     Raises:
         ObjectiveError: the text is no objective.
@@ -182,4 +185,6 @@ def goal_of(wanted: str | Objective) -> Objective:
     found = objective_of(wanted) if isinstance(wanted, str) else wanted
     if not found.lower_is_better:
         return found
+    if isinstance(found, CombinedObjective):
+        return combined(Expression.parse(f"-{found.name}"))
     return combined(Expression.parse(f"-'{found.name}'"), {found.name: found})

@@ -194,6 +194,9 @@ def test_a_search_maximises_the_negative_of_what_should_be_low() -> None:
     assert not goal.lower_is_better
     assert evaluate(evaluation(), goal).value == -evaluate(evaluation(), "distortion").value
     assert goal_of("aoap") is find("aoap")
+    assert goal_of("reading.mean_of_places").name == "-reading.mean_of_places"
+    assert goal_of("-reading.mean_of_places").name == "-reading.mean_of_places"
+    assert goal_of("aoap.coverage").name == "aoap.coverage"
     own = Objective("own", lambda view: 2.0, "Own", lower_is_better=True)
     assert evaluate(evaluation(), goal_of(own)).value == -2.0
 
