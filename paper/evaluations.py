@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -116,6 +117,28 @@ def variants_of_score(inputs: Plain, folder: Path) -> Found:
     scored = any(score.failure is None for score in found.values())
     pixels = [int(press.mask.sum()) for press in evaluation.presses] if scored else []
     return Found({**_scores(found), "pixels": pixels})
+
+
+def scores_by_readings(inputs: Plain, folder: Path) -> Found:
+    """RGB2Normal and NormDiff in several ways: `design`, `settings` of the images, `variants`
+    (settings by objective and name), `exposures` (names of the automatic exposure and of that of
+    the untouched skin).
+
+    A score that fails is None; the reasons are not kept, as many readings fail alike.
+    """
+    model, settings = _model(inputs["design"]), Settings(**tuples(inputs["settings"]))
+    automatic = Evaluation(model, settings)
+    fixed = Evaluation(model, replace(settings, exposure=automatic.untouched_exposure))
+    found = {}
+    for exposure, evaluation in zip(inputs["exposures"], (automatic, fixed), strict=True):
+        found[exposure] = {
+            objective: {
+                name: _scores({"": evaluate(evaluation, objective, **own)})["scores"][""]
+                for name, own in variants.items()
+            }
+            for objective, variants in inputs["variants"].items()
+        }
+    return Found({"scores": found})
 
 
 def stretch(inputs: Plain, folder: Path) -> Found:

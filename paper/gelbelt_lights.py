@@ -105,27 +105,30 @@ def claims(numbers: Values) -> list[Claim]:
     ]
     for name, title in OBJECTIVES.items():
         column = {design: designs[design][name] for design in DESIGNS}
-        found.append(_third(column, title))
+        found.append(third_is_best(column, title))
     for name, title in OBJECTIVES.items():
-        column = numbers["coatings"][name]
-        top, alike = best(column)
-        agrees: bool | None = None
-        if top is not None:
-            agrees = float(top) < MOST_SPECULAR
-            if not agrees and any(float(value) < MOST_SPECULAR for value in alike):
-                agrees = None
-        found.append(
-            Claim(
-                f"A specularity below {MOST_SPECULAR:g} is best ({title}).",
-                told_best(column, top, alike),
-                agrees,
-                WHY_COATING,
-            )
-        )
+        found.append(coating_is_dull(numbers["coatings"][name], title))
     return found
 
 
-def _third(column: Values, title: str) -> Claim:
+def coating_is_dull(column: Values, title: str) -> Claim:
+    """The paper's statement on the best coating, of scores by specularity."""
+    top, alike = best(column)
+    agrees: bool | None = None
+    if top is not None:
+        agrees = float(top) < MOST_SPECULAR
+        if not agrees and any(float(value) < MOST_SPECULAR for value in alike):
+            agrees = None
+    return Claim(
+        f"A specularity below {MOST_SPECULAR:g} is best ({title}).",
+        told_best(column, top, alike),
+        agrees,
+        WHY_COATING,
+    )
+
+
+def third_is_best(column: Values, title: str) -> Claim:
+    """The paper's statement on the third light design, of scores by design."""
     larger = is_larger(column["3"], column["2"])
     texts = [f"design {name}: {shown(each)}" for name, each in column.items()]
     return Claim(

@@ -34,7 +34,15 @@ WIDER = 2.0
 
 def claims(numbers: Values) -> list[Claim]:
     """The paper's statements on colours, tips and resins."""
-    colourings = numbers["colourings"]
+    return [
+        *colour_claims(numbers["colourings"]),
+        *_tips(numbers["tips"], numbers["tips_with_leaps"]),
+        *(_resin(numbers["resins"][name], title) for name, title in OBJECTIVES.items()),
+    ]
+
+
+def colour_claims(colourings: Values) -> list[Claim]:
+    """The paper's statements on the five colourings."""
     found = [_order(colourings, name, title) for name, title in OBJECTIVES.items()]
     column = {letters: each["normdiff"] for letters, each in colourings.items()}
     top, alike = best(column)
@@ -69,8 +77,6 @@ def claims(numbers: Values) -> list[Claim]:
                 WHY_NORMDIFF,
             )
         )
-    found += _tips(numbers["tips"], numbers["tips_with_leaps"])
-    found += [_resin(numbers["resins"][name], title) for name, title in OBJECTIVES.items()]
     return found
 
 

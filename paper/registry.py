@@ -7,6 +7,7 @@ from paper import (
     gelbelt_lights,
     gelsight360,
     mini_shapes,
+    readings,
     robustness,
     speed,
     svelte_mirror,
@@ -25,6 +26,7 @@ EXPERIMENTS: dict[str, Experiment] = {
         tasks,
         speed,
         robustness,
+        readings,
     )
 }
 """The experiments, in the order of the page."""

@@ -44,6 +44,15 @@ def values(unit: Unit, score: Score) -> dict[str, Any]:
             for letters in asked["colourings"]
         }
         return {"colourings": found, "failures": {}}
+    if kind == "scores_by_readings":
+        found = {
+            exposure: {
+                name: {way: score(name, design, seed) for way in ways}
+                for name, ways in asked["variants"].items()
+            }
+            for exposure in asked["exposures"]
+        }
+        return {"scores": found}
     if kind == "variants_of_score":
         found = {name: score(asked["objective"], design, seed) for name in asked["variants"]}
         return {"scores": found, "failures": {}, "pixels": [60, 80]}

@@ -168,6 +168,24 @@ def test_robustness_counts_geometries(answered: Answered) -> None:
     assert claim.here == "holds in 8 of 9 geometries; not with guide_thickness 6"
 
 
+def test_readings_tell_what_decides(answered: Answered) -> None:
+    """Where only bare metal is best at 0.2, the law decides about the cylinder's coating, and
+    nothing else does."""
+
+    def by_law(objective: str, design: dict[str, Any], seed: int) -> float:
+        change = design["change"]
+        best = 0.2 if change.get("coating.scattering") == "conductor" else 0.6
+        return 1.0 - abs(change.get("coating.specularity", 0.0) - best)
+
+    experiment = EXPERIMENTS["readings"]
+    finding, _ = answered(experiment, experiment.settings(True), by_law)
+    claim = next(c for c in experiment.claims(finding.numbers) if "about 0.2" in c.says)
+    assert claim.verdict == "cannot be told"
+    assert claim.here.startswith("holds under 48 of 144 readings; as read here it does not hold")
+    row = next(r for r in experiment.tables(finding.numbers)[2].rows if "about 0.2" in r[0])
+    assert row[1:] == ["0 / 0 / 100", "33 / 33", "33 / 33", "33 / 33 / 33", "33 / 33 / 33 / 33"]
+
+
 def test_a_slow_image_on_a_busy_machine_tells_nothing(answered: Answered) -> None:
     experiment = EXPERIMENTS["speed"]
     finding, _ = answered(experiment, experiment.settings())

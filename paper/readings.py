@@ -1,0 +1,309 @@
+"""The paper's statements under other readings of what it leaves open.
+
+The OptiSense paper leaves several definitions open: what specularity changes, how the camera is
+exposed, how deep the balls are pressed, and details of both scores. Each choice is a *reading*. All
+combinations of them are scored, and each statement is held against each.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from paper import gelbelt_lights, gelsight360, mini_shapes
+from paper.claims import Claim, Table
+from paper.evaluations import relit_scores, scores_by_readings, sensor
+from paper.experiment import Experiment, Finding, Pictures, Steps, Values
+from paper.figures import COLOURS, finish
+from paper.gelsight360_claims import LITTLE_NOISE, PAPER, colour_claims
+from paper.mini_shapes import OBJECTIVES, SHAPES
+from paper.spread import Spread, spread
+from paper.unit import Record, Unit
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+LAWS = ("blend", "blend-fixed-roughness", "conductor")
+"""What specularity changes (see docs/design-file.md): shares of paint and metal and the metal's
+roughness; the shares alone; the roughness of bare metal."""
+
+EXPOSURES = ("lowered for bright contacts", "of the untouched skin")
+
+VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
+    "rgb2normal": {
+        "signed tilt": {},
+        "half lines": {"half_lines": True},
+        "linear colours": {"colours": "response"},
+    },
+    "normdiff": {
+        "noise to either side": {},
+        "noise from end to end": {"noise": 0.15},
+        "only the polar angle": {"phi_weight": 0.0},
+        "colours of the picture": {"colours": "picture"},
+    },
+}
+"""Readings of both scores: settings by name, the default first."""
+
+BELT = ("2", "3")
+"""GelBelt's light designs that are compared; hardly any light of design 1 reaches the belt."""
+
+Reading = tuple[str, ...]
+"""An option of each factor."""
+
+
+def factors(settings: Values) -> dict[str, tuple[str, ...]]:
+    """Options of each factor, the default first."""
+    return {
+        "specularity changes": tuple(settings["laws"]),
+        "exposure": EXPOSURES,
+        "depth of presses": tuple(f"{depth:g} mm" for depth in settings["depths"]),
+        **{OBJECTIVES[name]: tuple(own) for name, own in VARIANTS.items()},
+    }
+
+
+def _designs(settings: Values) -> Iterator[tuple[str, str, Values]]:
+    """Name, law and plain design of each sensor that is scored with `scores_by_readings`."""
+    for law in settings["laws"]:
+        for value in settings["specularities"]:
+            bare = law != "conductor" and value == 0.0  # without metal both blends are one
+            change = {"coating.specularity": value}
+            change |= {"coating.scattering": LAWS[0] if bare else law}
+            for shape, name in SHAPES.items():
+                yield f"{shape}, {value:g}", law, sensor(name, change)
+            yield f"belt, {value:g}", law, sensor(gelbelt_lights.SENSOR, change, light_design=3)
+        for design in BELT:
+            change = {"coating.scattering": law}
+            yield (
+                f"design {design}",
+                law,
+                sensor(gelbelt_lights.SENSOR, change, light_design=int(design)),
+            )
+
+
+def steps(settings: Values) -> Steps:
+    """Scores of all designs at all depths, in all ways of exposing and scoring."""
+    images = {key: settings[key] for key in ("resolution", "photons", "together")}
+    designs = list(_designs(settings))
+    units = [
+        Unit(
+            scores_by_readings,
+            {
+                "design": design,
+                "variants": VARIANTS,
+                "exposures": list(EXPOSURES),
+                "settings": {**images, "depth": depth, "seed": 0},
+            },
+            f"{name}, {law}, {depth:g} mm",
+        )
+        for depth in settings["depths"]
+        for name, law, design in designs
+    ]
+    ways = {**VARIANTS["normdiff"], LITTLE_NOISE: {"noise": 0.03}}
+    least = {"least_pixels": settings["least_pixels"]}
+    coloured = [
+        Unit(
+            relit_scores,
+            {
+                "design": sensor(gelsight360.SENSOR),
+                "groups": gelsight360.GROUPS,
+                "colourings": list(PAPER),
+                "objectives": list(OBJECTIVES),
+                "settings": {
+                    "resolution": settings["fingertip_resolution"],
+                    "photons": settings["photons"],
+                    "depth": depth,
+                    "seed": 0,
+                },
+                "own": least,
+                "normdiff_variants": {name: {**own, **least} for name, own in ways.items()},
+            },
+            f"GelSight360's colourings, {depth:g} mm",
+        )
+        for depth in settings["depths"]
+    ]
+    records = yield [*units, *coloured]
+    keys = [(name, law, depth) for depth in settings["depths"] for name, law, _ in designs]
+    answers = dict(zip(keys, records, strict=False))
+    tips = dict(zip(settings["depths"], records[len(units) :], strict=True))
+    held: dict[str, dict[str, bool | None]] = {}
+    options = factors(settings)
+    for reading in itertools.product(*options.values()):
+        for claim in _claims_under(reading, settings, answers, tips):
+            held.setdefault(claim.says, {})[" | ".join(reading)] = claim.holds
+    return Finding({"factors": {name: list(each) for name, each in options.items()}, "held": held})
+
+
+def _claims_under(
+    reading: Reading,
+    settings: Values,
+    answers: dict[tuple[str, str, float], Record],
+    tips: dict[float, Record],
+) -> list[Claim]:
+    """The paper's statements, held against the scores of one reading."""
+    law, exposure, depth_text, *own = reading
+    depth = next(each for each in settings["depths"] if f"{each:g} mm" == depth_text)
+    variant = dict(zip(VARIANTS, own, strict=True))
+
+    def column(labels: dict[str, str], objective: str) -> dict[str, Spread]:
+        found = {}
+        for name, label in labels.items():
+            rows = answers[label, law, depth].values.get("scores", {})
+            row = rows.get(exposure, {}).get(objective, {})
+            found[name] = spread([row.get(variant[objective])])
+        return found
+
+    values = [f"{value:g}" for value in settings["specularities"]]
+    mini = {
+        shape: {
+            name: column({value: f"{shape}, {value}" for value in values}, name)
+            for name in OBJECTIVES
+        }
+        for shape in SHAPES
+    }
+    found = [_named("GelSight Mini", each) for each in mini_shapes.claims({"scores": mini})]
+    for name, title in OBJECTIVES.items():
+        designs = column({each: f"design {each}" for each in BELT}, name)
+        coatings = column({value: f"belt, {value}" for value in values}, name)
+        found.append(_named("GelBelt", gelbelt_lights.third_is_best(designs, title)))
+        found.append(_named("GelBelt", gelbelt_lights.coating_is_dull(coatings, title)))
+    colours = {}
+    for letters in PAPER:
+        row = tips[depth].values.get("colourings", {}).get(letters, {})
+        ways = {way: spread([value]) for way, value in row.get("normdiff_variants", {}).items()}
+        nothing = spread([None])
+        colours[letters] = {
+            "rgb2normal": spread([row.get("scores", {}).get("rgb2normal")]),
+            "normdiff": ways.get(variant["normdiff"], nothing),
+            "ways": {LITTLE_NOISE: ways.get(LITTLE_NOISE, nothing)},
+        }
+    return [*found, *(_named("GelSight360", each) for each in colour_claims(colours))]
+
+
+def _named(what: str, claim: Claim) -> Claim:
+    return Claim(f"{what}: {claim.says}", claim.here, claim.holds, claim.why)
+
+
+def claims(numbers: Values) -> list[Claim]:
+    """Each statement: true under all readings, under none, or hanging on the reading."""
+    found = []
+    for says, row in numbers["held"].items():
+        told = [holds for holds in row.values() if holds is not None]
+        count = sum(told)
+        agrees = None if not told or 0 < count < len(row) else count == len(row)
+        default = row[" | ".join(_default(numbers))]
+        as_read = {True: "holds", False: "does not hold", None: "cannot be told"}[default]
+        found.append(
+            Claim(
+                says,
+                f"holds under {count} of {len(row)} readings; as read here it {as_read}",
+                agrees,
+                WHY_SOME if agrees is None else WHY_NONE,
+            )
+        )
+    return found
+
+
+WHY_SOME = "What is left open in the paper decides (see the table)."
+WHY_NONE = (
+    "No reading of the definitions makes it true: what differs is the sensor, that is its "
+    "geometry, lights or materials (see the experiment on robustness)."
+)
+
+
+def _default(numbers: Values) -> list[str]:
+    return [options[0] for options in numbers["factors"].values()]
+
+
+def tables(numbers: Values) -> list[Table]:
+    """How many statements hold with each option, and with which options each statement holds."""
+    held, default = numbers["held"], _default(numbers)
+    rows, shares = [], []
+    for place, (factor, options) in enumerate(numbers["factors"].items()):
+        for option in options:
+            changed = [*default[:place], option, *default[place + 1 :]]
+            alone = sum(row[" | ".join(changed)] is True for row in held.values())
+            among = [
+                holds is True
+                for row in held.values()
+                for reading, holds in row.items()
+                if reading.split(" | ")[place] == option
+            ]
+            share = f"{100 * sum(among) / max(1, len(among)):.0f} %"
+            rows.append([factor, option, f"{alone} of {len(held)}", share])
+    for says, row in held.items():
+        cells = []
+        for place, options in enumerate(numbers["factors"].values()):
+            cells.append(" / ".join(_share(row, place, option) for option in options))
+        shares.append([says, *cells])
+    best = max(_counts(held).items(), key=lambda each: each[1])
+    return [
+        Table(
+            "Statements that hold with one option changed from the default, and the share of "
+            "statements that hold over all readings with this option",
+            ["factor", "option", "changed alone", "over all readings"],
+            rows,
+        ),
+        Table(
+            "The reading with which most statements hold",
+            ["statements", *numbers["factors"]],
+            [[f"{best[1]} of {len(held)}", *best[0].split(" | ")]],
+        ),
+        Table(
+            "Share of readings under which each statement holds, %, by the options in the order "
+            "of the first table",
+            ["statement", *numbers["factors"]],
+            shares,
+        ),
+    ]
+
+
+def _share(row: dict[str, bool | None], place: int, option: str) -> str:
+    among = [
+        holds is True for reading, holds in row.items() if reading.split(" | ")[place] == option
+    ]
+    return f"{100 * sum(among) / max(1, len(among)):.0f}"
+
+
+def _counts(held: dict[str, dict[str, bool | None]]) -> dict[str, int]:
+    """Number of statements that hold, by reading."""
+    readings: Sequence[str] = list(next(iter(held.values())))
+    return {each: sum(row[each] is True for row in held.values()) for each in readings}
+
+
+def notes(numbers: Values) -> list[str]:
+    """Notes on what is varied, and for which sensors."""
+    return [
+        "Every combination of the options is one reading. Law, exposure and the readings of "
+        "RGB2Normal are varied for GelSight Mini and GelBelt; for GelSight360's colourings, which "
+        "are computed from layers, depth and NormDiff are. The mirror of GelSight Svelte is "
+        "searched between flat and most curved, as the paper says, in the experiment of its own. "
+        "Defaults follow the paper's words and not this table."
+    ]
+
+
+def draw(numbers: Values, pictures: Pictures) -> Figure:
+    """How many readings make how many statements true."""
+    from optisense.report.drawing import new_figure
+
+    figure = new_figure(7.0, 3.2)
+    axes = figure.add_subplot()
+    counts = list(_counts(numbers["held"]).values())
+    most = len(numbers["held"])
+    axes.bar(range(most + 1), [counts.count(k) for k in range(most + 1)], color=COLOURS[0])
+    default = _counts(numbers["held"])[" | ".join(_default(numbers))]
+    axes.axvline(default, color=COLOURS[1], linestyle="--", label="as read here")
+    finish(axes, "Readings by how many statements hold", f"statements of {most}", legend=True)
+    return figure
+
+
+EXPERIMENT = Experiment(
+    name="readings",
+    title="Other readings of the paper's definitions",
+    about="what holds if specularity, exposure, depth and both scores are read otherwise",
+    steps=steps,
+    claims=claims,
+    tables=tables,
+    draw=draw,
+    notes=notes,
+)
