@@ -75,7 +75,8 @@ def print_result(result: SearchResult, out: Path) -> None:
     said = "best so far" if result.interrupted else "best"
     output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}", markup=False)
     if best.unbiased_score != best.score:
-        output.print(f"  by the search's own seed, by which it was chosen: {best.score:.4g}")
+        by = "its coarse score" if study.settings.coarse_first else "the search's own seed"
+        output.print(f"  by {by}, by which it was chosen: {best.score:.4g}")
     for line in [*_beside(study, best, start), *(f"  {each}" for each in kept(best, start))]:
         output.print(line, markup=False)
     values = list(best.values.items())

@@ -9,6 +9,7 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from optisense.cli.progress import ProgressLine, about, progress_line
+from optisense.quality import TRIAL_PHOTONS
 from optisense.time_left import TimedStep
 from optisense.usual_times import UsualTimes
 
@@ -75,13 +76,19 @@ def expect_search(line: ProgressLine, design: SensorDesign, options: SearchOptio
     budget = 0 if options.method in RELIT else options.budget
     if budget is None or not options.objectives:
         return
-    trials = usual_trials(design, options.objectives, options.settings)
-    if trials is None:
+    full = usual_trials(design, options.objectives, options.settings)
+    if full is None:
         return
+    trials = full
+    if options.coarse_first:
+        from optisense.search.evaluation.coarse import coarse_settings
+
+        coarse = coarse_settings(design, {"photons": TRIAL_PHOTONS, **options.settings})
+        trials = usual_trials(design, options.objectives, coarse) or full
     expect("start", seconds=trials.first)
     expect("trials", count=budget, seconds=trials.trial)
     fresh = FRESH_SEEDS if options.method in RELIT else USUAL_FRESH
-    expect("fresh seeds", count=fresh, seconds=trials.fresh)
+    expect("fresh seeds", count=fresh, seconds=full.fresh)
 
 
 def usual_trials(

@@ -68,6 +68,11 @@ class SearchOptions(CommandOptions):
         description="A function of a design that returns False, or the reason as text, if the "
         "design is not allowed. May be given several times.",
     )
+    coarse_first: bool = Field(
+        False,
+        description="Score trials by fewer photons and pixels, and in full only those that may be "
+        "the best. It saves most of the time of a search by pictures.",
+    )
     may_cross: bool = Field(
         False,
         description="Allow parts that cut through one another, lose contact with the parts on "
@@ -104,6 +109,7 @@ class SearchOptions(CommandOptions):
             space=space,
             goals=self.objectives,
             apart=not self.may_cross,
+            coarse_first=self.coarse_first,
             errors=errors,
             requirements=self.require,
             **{name: value for name, value in given.items() if value not in (None, {})},
@@ -127,6 +133,7 @@ class SearchOptions(CommandOptions):
             "rules": [rule_reference(UserRule(text)) for text in self.rules],
             "errors": parse_errors(self.errors).to_plain() if self.errors else None,
             "apart": False if self.may_cross else None,
+            "coarse_first": True if self.coarse_first else None,
             "requirements": [str(each) for each in requirements_of(self.require)],
         }
         for name in ("method", "options", "seed", "settings", "samples"):

@@ -168,6 +168,7 @@ def usual_score(design: SensorDesign, names: Iterable[str], settings: Settings) 
     width, height = settings.resolution or size_for(design.camera.resolution)
     photons = photons_of(settings.photons or SCORE_PHOTONS)
     presses = USUAL_PLACES if settings.places is None else len(settings.places)
+    images = 2 if settings.together else 1 + presses
     image = IMAGE + IMAGE_PIXELS * width * height / LARGE_IMAGE
     starting = times.preparing() + times.pilot() + times.compiling()
     return UsualScore(
@@ -175,7 +176,7 @@ def usual_score(design: SensorDesign, names: Iterable[str], settings: Settings) 
         loading=loading,
         building=building,
         light=times.tracing(photons) + times.smoothing(),
-        images=(1 + presses) * image * times.shading * times.pace,
+        images=images * image * times.shading * times.pace,
         judging=judging,
         libraries=FIRST_JUDGING * times.pace,
     )

@@ -134,6 +134,7 @@ def render_study(
         sides=_sides(study, best, looks),
         overlay=_overlay(study, best),
         scores=tables.scores(study, start, best),
+        coarse=study.settings.coarse_first,
         conditions=tables.conditions(study, start, best or nearest(trials)),
         warnings=[
             note

@@ -45,6 +45,7 @@ def search(
     errors: ManufacturingErrors | Mapping[str, ToleranceDistribution | float] | None = None,
     samples: int = SAMPLES,
     require: str | Sequence[str] = (),
+    coarse_first: bool = False,
     apart: bool = True,
     variant: str = "auto",
     progress: SearchProgressCallback | None = None,
@@ -76,6 +77,8 @@ def search(
             of the plain score.
         samples: number of manufactured sensors per trial.
         require: conditions that the best design must meet, such as "coverage >= 0.55".
+        coarse_first: whether trials get coarse scores (fewer photons and pixels, all presses in one
+            image), and only the promising ones full scores.
         apart: whether designs are forbidden whose parts cut through one another or leave the parts
             on which they rest.
         variant: variant of the renderer: "auto", "llvm" or "cuda".
@@ -105,6 +108,7 @@ def search(
         errors=making,
         samples=samples,
         requirements=[require] if isinstance(require, str) else list(require),
+        coarse_first=coarse_first,
     )
     if resume:
         if out is None:

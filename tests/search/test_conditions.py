@@ -16,12 +16,13 @@ from optisense.errors import SearchError
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.registry import WATCHED, forgetting, objective
 from optisense.search import SearchSpace, Study, search
+from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import FAILED, Outcome, rank_of
 from optisense.search.evaluation.requirements import Requirement, requirements_of
 from optisense.search.methods.base import values_to_maximise
 from optisense.search.methods.dominance import dominates, ranks
 from optisense.search.study.best import best_of, nearest
-from optisense.search.study.conditions import condition_note, kept, worsened_note
+from optisense.search.study.conditions import condition_note, kept, lost, worsened_note
 from optisense.search.study.progress import SearchProgress
 from optisense.search.study.settings import LATER, StudySettings
 from optisense.search.study.trial import Trial
@@ -296,6 +297,17 @@ def test_a_score_won_by_seeing_less_is_told(mini: SensorDesign) -> None:
     assert set(result.start.parts[WATCHED]) == {"coverage", "distortion"}
     assert any("--require 'coverage>=" in note for note in result.notes), result.notes
     assert worsened_note(result.start, result.start) is None
+
+
+def test_a_score_won_by_reading_worse_is_told(mini: SensorDesign) -> None:
+    """A shiny coating has a good NormDiff, but a robot reads it badly."""
+    space = SearchSpace({"coating.specularity": (0.0, 0.8)}).bind(mini)
+    few = {"resolution": (160, 120), "photons": 60_000, "together": True}
+    evaluator = DesignEvaluator(space, ["normdiff"], few)
+    start, shiny = (evaluator(np.array([each]), 0) for each in (0.0, 0.8))
+    assert shiny.scores["normdiff"] > start.scores["normdiff"]
+    now, before = lost(shiny, start)["reading"]
+    assert now > 2.0 * before
 
 
 def test_lights_alone_are_not_watched(mini: SensorDesign) -> None:

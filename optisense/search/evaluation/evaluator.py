@@ -7,6 +7,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
+from copy import copy
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -19,10 +20,12 @@ from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.combined import goal_of
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.files import place_of
+from optisense.objectives.named import named_in
 from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
 from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_score
+from optisense.search.evaluation.coarse import coarse_settings
 from optisense.search.evaluation.models import ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
@@ -63,6 +66,15 @@ WATCHES = ("coverage", "distortion")
 report can say that a design gains its score by seeing less of the skin, or by seeing it distorted.
 They take a tenth of the time of AOAP.
 """
+
+READING = "reading"
+"""Objective that is scored with every trial whose goals or conditions need the same presses, so
+that a report can say that a design gains its score and is read worse. It takes about a tenth of the
+time of such a trial.
+"""
+
+SAME_PRESSES = {"rgb2normal", "normdiff", "depth"}
+"""Objectives that need the presses of `READING`."""
 
 
 class Evaluator(Protocol):
@@ -150,7 +162,7 @@ class DesignEvaluator(PickledWithoutCaches):
             self._keep(apart is None or apart)
         self._asks_view = keeps and self.renders and may_change_view(space.names)
         self._least_skin: float | None = None
-        self._watches = keeps and self.renders and may_change_view(space.names)
+        self._watched = self._names_to_watch() if keeps and self.renders else ()
         self.variant = variant
         self._check_settings()
 
@@ -162,6 +174,12 @@ class DesignEvaluator(PickledWithoutCaches):
         except OptiSenseError as error:
             return self.failed(str(error), began)
         return self.judge(design, seed, self.kept)
+
+    def coarse(self) -> DesignEvaluator:
+        """Return an evaluator of coarse scores (see `coarse_settings`); both share one model."""
+        other = copy(self)
+        other.settings = coarse_settings(self.space.design, self.settings)
+        return other
 
     def lost(self, design: SensorDesign) -> str | None:
         """The reason why a point's design departs too far from the starting design, or None."""
@@ -268,8 +286,9 @@ class DesignEvaluator(PickledWithoutCaches):
                 if name in scores:
                     scores[name], parts[name] = score.value, score.to_dict()["parts"]
             failures += _failures([found[name] for name in found if name in needed])
-            watched = {each: found[each].value for each in found if each in WATCHES}
-            if self._watches and all(map(math.isfinite, watched.values())):
+            watched = {each: found[each].value for each in self._watched}
+            watched = {each: value for each, value in watched.items() if math.isfinite(value)}
+            if watched:
                 parts[WATCHED] = watched
             if self.requirements:
                 parts[CONDITIONS] = {
@@ -297,13 +316,24 @@ class DesignEvaluator(PickledWithoutCaches):
         if self.renders and may_change_view(names) and design.parts_of(Role.MIRROR):
             self.kept.append(SameMirrors(design, self.keeper))
 
+    def _names_to_watch(self) -> tuple[str, ...]:
+        """Return the names of the objectives that are scored beside those of goals and conditions,
+        for the early warning.
+        """
+        watched = WATCHES if may_change_view(self.space.names) else ()
+        texts = [each for each in self._objectives if isinstance(each, str)]
+        quantities = [each.quantity for each in self.requirements]
+        wanted = {name.strip().lower() for name in named_in([*texts, *quantities])}
+        shared = wanted & SAME_PRESSES and READING not in wanted
+        return (*watched, READING) if shared else watched
+
     @cached_property
     def _ready(self) -> list[Objective]:
-        """Return the objectives of goals and conditions, and those of `WATCHES`, each once.
+        """Return the objectives of goals and conditions, and those that are watched, each once.
 
         A user's file is run once per process and not once per trial.
         """
-        watched = [find(name) for name in WATCHES] if self._watches else []
+        watched = [find(name) for name in self._watched]
         return list({each.name: each for each in [*self._wanted, *watched]}.values())
 
     @cached_property

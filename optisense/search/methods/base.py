@@ -57,12 +57,15 @@ class Method(ABC):
         summary: description in one line.
         several: whether the method looks for the best trade-offs between several goals.
         renders_once: whether all trials of a seed share their images.
+        may_be_coarse: whether it only compares the scores of trials, so that coarse scores can
+            guide it.
     """
 
     name: ClassVar[str]
     summary: ClassVar[str]
     several: ClassVar[bool] = False
     renders_once: ClassVar[bool] = False
+    may_be_coarse: ClassVar[bool] = False
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

@@ -39,14 +39,13 @@ class CmaEs(Method):
     choices is the better search.
 
     pycma does not support one dimension: it takes a scaling of one number for one that is not
-        initialized yet, and fails where a bound is met. A search over one parameter therefore runs
-        in two dimensions, the second of which has no effect.
     initialized yet, and fails where a bound is met. A search over one parameter therefore runs in
-    two dimensions, the second of which changes nothing.
+    two dimensions, the second of which has no effect.
     """
 
     name = "cma-es"
     summary = "evolution that learns the shape of the problem; for numbers, up to hundreds"
+    may_be_coarse = True
 
     def __init__(
         self,

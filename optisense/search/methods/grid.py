@@ -16,6 +16,7 @@ class Grid(Combinations):
 
     name = "grid"
     summary = "every combination of steps and options"
+    may_be_coarse = True
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, levels_of(problem.space))

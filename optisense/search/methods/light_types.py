@@ -40,6 +40,7 @@ class LightTypes(Combinations):
 
     name = "types"
     summary = "types of lights: one for all, one a group, then one a light"
+    may_be_coarse = True
 
     def __init__(self, problem: Problem) -> None:
         count = _options(problem.space)

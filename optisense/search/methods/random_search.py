@@ -23,6 +23,7 @@ class Random(Method):
 
     name = "random"
     summary = "points spread evenly over the space"
+    may_be_coarse = True
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)

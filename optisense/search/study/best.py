@@ -4,13 +4,10 @@ A trial that breaks a condition of the study is never the best. If trials were s
 fresh seeds, the means over these decide whether it breaks one.
 
 The best trial has the highest score by fresh seeds if some trials were scored so, else the highest
-    score by the study's seed. Of trials with equal scores the one nearest to the start is the best,
-    since it changes least, and of equally near ones the one that was proposed first. So the start
-    itself wins every tie, and the same trials always have the same best one, in whatever order
-    workers finished.
-by the study's seed. Of trials that share it the one nearest to the start is the best, since it
-changes least, and of equally near ones the one that was proposed first. So the start itself wins
-every tie, and the same trials always have the same best one, in whatever order workers finished.
+score by the study's seed. Of trials with equal scores the one nearest to the start is the best,
+since it changes least, and of equally near ones the one that was proposed first. So the start
+itself wins every tie, and the same trials always have the same best one, in whatever order workers
+finished.
 """
 
 from __future__ import annotations

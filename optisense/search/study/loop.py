@@ -5,24 +5,24 @@ from __future__ import annotations
 import math
 import queue
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from optisense.errors import SearchError
-from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
 from optisense.search.executors.base import outcome_of
 from optisense.search.methods import Method, Problem, make
-from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.best import tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
+from optisense.search.study.evaluators import evaluators, usual_times
 from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
+from optisense.search.study.promotion import promote
 from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
 from optisense.search.study.rescoring import rescore
 from optisense.search.study.settings import package_versions
@@ -90,6 +90,7 @@ class StudyRun:
         settings = study.settings
         self.limit = settings.budget if limit is None else limit
         usual = study.evaluator(variant)
+        self._coarse = settings.coarse_first
         problem = Problem(
             study.space,
             tuple(settings.names),
@@ -98,21 +99,8 @@ class StudyRun:
             tuple(settings.requirements),
         )
         self.method: Method = make(settings.method, problem, settings.options)
-        self._evaluator: Evaluator = self.method.evaluator(usual)
-        if settings.errors is not None:
-            if self._evaluator is not usual:
-                raise SearchError(
-                    f"{settings.method} can't search with manufacturing errors: it scores in a way "
-                    "of its own",
-                    hint="Use cma-es, grid or random; or search without errors and look at the "
-                    "winner with `optisense tolerance`",
-                )
-            from optisense.search.evaluation.robust import RobustEvaluator
-
-            errors = ManufacturingErrors.from_plain(settings.errors)
-            self._evaluator = RobustEvaluator(usual, errors, settings.seed, settings.samples)
-        tell = getattr(self._evaluator, "usual_trials", None)
-        self._usual: UsualTrials | None = None if tell is None else tell()
+        self._evaluator, self._full = evaluators(study, usual, self.method)
+        self._usual = usual_times(self._evaluator, self._full)
         self._make_runner = make_runner
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
@@ -121,7 +109,7 @@ class StudyRun:
         self._first_seconds = 0.0
         self._last_report = time.monotonic()
         self._stage = START_STAGE
-        self._plain = self._evaluator is usual or settings.errors is not None
+        self._plain = self._coarse or self._full is usual or settings.errors is not None
         steps = stages(self.limit, self._usual, plain_trials=self._plain)
         self._time_left = time_left or TimeLeft(steps)
         self._fresh_done = self._fresh_count = 0
@@ -145,18 +133,15 @@ class StudyRun:
         for row in study.store.rows():
             if row.outcome is not None:
                 self._tally.count(row, row.outcome)
-        with self._make_runner(self._evaluator) as runner:
-            self._time_left.workers = runner.workers
-            expect_stages(
-                self._time_left,
-                self.limit,
-                self._usual,
-                runner.workers,
-                plain_trials=self._plain,
-            )
-            if isinstance(runner, SerialRunner):
-                runner.report_progress_to(self._trial_progress)
-            try:
+        try:
+            with self._running(self._evaluator) as runner:
+                expect_stages(
+                    self._time_left,
+                    self.limit,
+                    self._usual,
+                    runner.workers,
+                    plain_trials=self._plain,
+                )
                 if self._usual is not None:
                     self._expect_fresh_scores(USUAL_FRESH)
                 self._begin(START_STAGE)
@@ -164,10 +149,15 @@ class StudyRun:
                 self._begin(TRIALS, self._tally.done)
                 ended = self._search(runner)
                 self._report(now=True)
-                self._begin(FRESH)
-                rescore(study, partial(self._work_fresh, runner))
-            except KeyboardInterrupt:
-                interrupted, ended = True, "interrupted"
+                if not self._coarse:
+                    self._begin(FRESH)
+                    rescore(study, partial(self._work_fresh, runner))
+            if self._coarse:
+                with self._running(self._full) as runner:
+                    self._begin(FRESH)
+                    promote(study, partial(self._work_fresh, runner))
+        except KeyboardInterrupt:
+            interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
         if not interrupted and self._tally.has_no_score:
             raise self._tally.all_failed()
@@ -181,6 +171,15 @@ class StudyRun:
             *(note for note in found_notes if note is not None),
         ]
         return SearchResult(study, interrupted, ended, tuple(notes))
+
+    @contextmanager
+    def _running(self, evaluator: Evaluator) -> Iterator[Runner]:
+        """Yield a runner of an evaluator, which ends with the block."""
+        with self._make_runner(evaluator) as runner:
+            self._time_left.workers = runner.workers
+            if isinstance(runner, SerialRunner):
+                runner.report_progress_to(self._trial_progress)
+            yield runner
 
     def _search(self, runner: Runner) -> str:
         """Run all generations, and return the reason why the search has ended."""

@@ -17,7 +17,8 @@ from optisense.objectives.settings import size_for
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
 from optisense.search.evaluation.requirements import requirements_of
-from optisense.search.methods import Problem, find, make
+from optisense.search.methods import Method, Problem, find, make
+from optisense.search.methods import names as method_names
 from optisense.search.space.constraints import Constraint, UserRule
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
 from optisense.search.space.search_space import SearchSpace
@@ -51,6 +52,7 @@ class Plan:
     errors: ManufacturingErrors | None = None
     samples: int = SAMPLES
     requirements: Sequence[str] = ()
+    coarse_first: bool = False
 
     def settings_for(self, design: SensorDesign) -> StudySettings:
         """Return the settings of the study for a design, with all defaults resolved.
@@ -72,6 +74,8 @@ class Plan:
         chosen = find(self.method)
         if not all(each.rays_only for each in measured) and not chosen.renders_once:
             settings.setdefault("photons", TRIAL_PHOTONS)
+        if self.coarse_first:
+            self._refuse_coarse(chosen, [each for each in measured if not each.rays_only])
         kept = [str(each) for each in requirements]
         evaluator = DesignEvaluator(
             bound, self.goals, settings, requirements=kept, apart=self.apart
@@ -107,7 +111,27 @@ class Plan:
             errors=None if self.errors is None else self.errors.to_plain(),
             samples=0 if self.errors is None else self.samples,
             requirements=kept,
+            coarse_first=self.coarse_first,
         )
+
+    def _refuse_coarse(self, method: type[Method], from_pictures: Sequence[Objective]) -> None:
+        """Refuse coarse scores where they save nothing or can't guide the method.
+
+        Raises:
+            SearchError: they do not fit the plan.
+        """
+        if not method.may_be_coarse:
+            able = [name for name in method_names() if find(name).may_be_coarse]
+            raise SearchError(
+                f"{self.method} can't search by coarse scores",
+                hint=f"Use {', '.join(able)}, or leave --coarse-first out",
+            )
+        if not from_pictures:
+            raise SearchError(
+                "no objective or condition of this search needs pictures, so coarse scores would "
+                "save no time",
+                hint="Leave --coarse-first out",
+            )
 
 
 def reference(goal: Goal) -> str:

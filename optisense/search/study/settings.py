@@ -30,7 +30,7 @@ MOST_NAMES = 100
 useful front.
 """
 
-LATER = ("requirements",)
+LATER = ("requirements", "coarse_first")
 """Settings that studies of earlier releases do not have. They count as their defaults, and are left
 out of comparisons if they have their defaults, so that such studies can be resumed.
 """
@@ -63,6 +63,7 @@ class StudySettings:
             else None.
         samples: number of manufactured sensors per trial.
         requirements: conditions that the best trial must meet.
+        coarse_first: whether trials have coarse scores, and only the promising ones full scores.
         begun: time of creation, UTC.
         versions: versions of the packages with which the study was begun.
 
@@ -88,6 +89,7 @@ class StudySettings:
     errors: dict[str, Any] | None = None
     samples: Whole = 0
     requirements: Names = field(default_factory=list)
+    coarse_first: bool = False
     begun: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     versions: dict[str, str] = field(default_factory=lambda: package_versions())
 

@@ -1,0 +1,62 @@
+"""Evaluators of a study: the one of its trials, and the one of full scores."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from optisense.errors import SearchError
+from optisense.objectives.usual_score import UsualTrials
+from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
+from optisense.search.methods import Method
+from optisense.search.space.manufacturing import ManufacturingErrors
+from optisense.search.study.study import Study
+
+
+def evaluators(study: Study, usual: DesignEvaluator, method: Method) -> tuple[Evaluator, Evaluator]:
+    """Return the evaluator of a study's trials, and that of full scores, which is the same unless
+    trials have coarse scores.
+
+    Args:
+        study: study that is run.
+        usual: evaluator of plain scores.
+        method: method of the study.
+
+    Raises:
+        SearchError: the study has manufacturing errors, which the method can't apply.
+    """
+    own = method.evaluator(usual)
+    if study.settings.errors is not None and own is not usual:
+        raise SearchError(
+            f"{study.settings.method} can't search with manufacturing errors: it scores in a way "
+            "of its own",
+            hint="Use cma-es, grid or random; or search without errors and look at the winner with "
+            "`optisense tolerance`",
+        )
+    full = _with_errors(study, usual) if own is usual else own
+    return (_with_errors(study, usual.coarse()) if study.settings.coarse_first else full), full
+
+
+def usual_times(trials: Evaluator, full: Evaluator) -> UsualTrials | None:
+    """Return the usual durations of the scores of a study, or None if they are unknown.
+
+    Args:
+        trials, full: the evaluators that `evaluators` returns.
+    """
+    found = [
+        None if (tell := getattr(each, "usual_trials", None)) is None else tell()
+        for each in (trials, full)
+    ]
+    if found[0] is None or found[1] is None:
+        return None
+    return replace(found[0], fresh=found[1].fresh, fresh_again=found[1].fresh_again)
+
+
+def _with_errors(study: Study, usual: DesignEvaluator) -> Evaluator:
+    """Return an evaluator that also applies the manufacturing errors of a study, if it has any."""
+    settings = study.settings
+    if settings.errors is None:
+        return usual
+    from optisense.search.evaluation.robust import RobustEvaluator
+
+    errors = ManufacturingErrors.from_plain(settings.errors)
+    return RobustEvaluator(usual, errors, settings.seed, settings.samples)

@@ -1,0 +1,124 @@
+"""Full scores of the promising trials of a search whose trials have coarse scores.
+
+This is successive halving (Jamieson and Talwalkar, "Non-stochastic best arm identification and
+hyperparameter optimization", 2016) in three rungs: coarse scores of all trials, a full score of
+those that may be the best, and further full scores, with other seeds, of those that lead. How many
+trials are promoted follows from the noise: the differences between full and coarse scores tell by
+how much a coarse score can be wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from optisense.search.space.parameters import Choice
+from optisense.search.study.best import ranked
+from optisense.search.study.rescoring import MOST_BROKEN, Work, fresh_seeds
+from optisense.search.study.study import Study
+from optisense.search.study.trial import Trial
+
+BATCH = 4
+"""Number of trials that get a full score together; from as many the difference between full and
+coarse scores is known to a factor of about 1.5, and they keep a few workers busy.
+"""
+
+LEAST_MOST, PROMOTED_SHARE = 8, 0.1
+"""Largest number of trials that get full scores: a tenth of all trials, or 8 if that is more. A
+full score takes as long as two to four coarse ones.
+"""
+
+SURE = 2.0
+"""Number of standard deviations by which the full score of a trial may exceed what its coarse score
+suggests. A trial that would not lead even then is not promoted (95 % of a normal distribution are
+within two).
+"""
+
+NEAR = 0.02
+"""Largest difference between two points, as a share of each range, at which they count as the same
+design, so that only the better one is promoted: the last trials of CMA-ES are nearly equal.
+"""
+
+
+def promote(study: Study, work: Work) -> None:
+    """Give the start and the promising trials of a study full scores with fresh seeds.
+
+    Scores that exist are kept, so that a study that was stopped meanwhile goes on.
+
+    Args:
+        study: study whose trials have coarse scores.
+        work: function that scores trials in full.
+    """
+    seeds = fresh_seeds(study.settings.seed)
+    trials = study.trials
+    start = [trial for trial in trials if trial.is_start and math.isfinite(trial.score)]
+    waiting = _different([trial for trial in ranked(trials) if not trial.is_start])
+    most = max(LEAST_MOST, math.ceil(PROMOTED_SHARE * len(trials)))
+    promoted: list[Trial] = []
+    while waiting and len(promoted) < (most if _leader(promoted) else MOST_BROKEN):
+        batch = _promising(promoted, waiting[:BATCH])
+        if not batch:
+            break
+        waiting = waiting[len(batch) :]
+        further = len(seeds[1:]) * (1 + len(start))
+        promoted += _scored(batch, seeds[:1], work, further)
+        if start:
+            start = _scored(start, seeds[:1], work, further)
+    while (leader := _leader(promoted)) is not None and len(leader.fresh) < len(seeds):
+        others = [trial for trial in promoted if trial.number != leader.number]
+        start = _scored(start, seeds, work)
+        promoted = [*_scored([leader], seeds, work), *others]
+
+
+def _promising(promoted: Sequence[Trial], batch: Sequence[Trial]) -> list[Trial]:
+    """Return the trials of a batch that may be better than the promoted ones; all as long as none
+    of these leads.
+    """
+    leader = _leader(promoted)
+    if leader is None:
+        return list(batch)
+    shifts = np.array([trial.fresh_score() - trial.score for trial in promoted])
+    known = shifts[np.isfinite(shifts)]
+    slack = SURE * float(known.std(ddof=1)) if len(known) > 1 else math.inf
+    least = leader.fresh_score() - float(known.mean()) - slack
+    return [trial for trial in batch if trial.score > least]
+
+
+def _leader(promoted: Sequence[Trial]) -> Trial | None:
+    """Return the trial with the best mean of full scores that meets all conditions, or None."""
+    fine = [each for each in promoted if math.isfinite(each.fresh_score()) and each.is_feasible]
+    return max(fine, key=lambda trial: (trial.fresh_score(), trial.score), default=None)
+
+
+def _scored(
+    trials: Sequence[Trial], seeds: Sequence[int], work: Work, more: int = 0
+) -> list[Trial]:
+    """Return the trials with their full scores by these seeds; `more` scores are expected after
+    them.
+    """
+    jobs = [(trial, seed) for trial in trials for seed in seeds if seed not in trial.fresh]
+    outcomes = work(jobs, more, 0.0) if jobs else []
+    fresh = {trial.number: dict(trial.fresh) for trial in trials}
+    for (trial, seed), outcome in zip(jobs, outcomes, strict=True):
+        fresh[trial.number][seed] = outcome
+    return [replace(trial, fresh=fresh[trial.number]) for trial in trials]
+
+
+def _different(trials: Sequence[Trial]) -> list[Trial]:
+    """Return the trials without those that are nearly equal (`NEAR`) to one before them."""
+    if not trials:
+        return []
+    space = trials[0].space
+    choices = np.array([isinstance(each.kind, Choice) for each in space.parameters])
+    span = np.where(choices, 1.0, space.upper - space.lower)
+    kept: list[Trial] = []
+    points = np.empty((0, space.size))
+    for trial in trials:
+        point = trial.vector / span
+        if not (np.abs(points - point) <= NEAR).all(axis=1).any():
+            kept.append(trial)
+            points = np.vstack([points, point])
+    return kept

@@ -1,0 +1,103 @@
+"""Searches whose trials have coarse scores, and whose promising trials get full ones."""
+
+from __future__ import annotations
+
+import pytest
+
+from optisense.design import SensorDesign
+from optisense.errors import SearchError
+from optisense.search import SearchResult, Study, run_study, search
+from optisense.search.evaluation.coarse import coarse_settings
+from optisense.search.space.search_space import SearchSpace
+from optisense.search.study.plan import Plan
+from optisense.search.study.progress import SearchProgress
+from optisense.search.study.promotion import LEAST_MOST
+from optisense.search.study.stages import FRESH
+
+FULL = {"resolution": [640, 480], "photons": 1_000_000}
+SPACE = {"coating.specularity": (0.0, 1.0, 41)}
+BEST = 0.3
+"""Specularity with the best full score; coarse scores suggest another one."""
+
+BIASED = """
+import numpy as np
+
+def biased(evaluation):
+    is_full = evaluation.settings.photons == 1_000_000
+    shine = evaluation.design.coating.specularity
+    words = [evaluation.settings.seed, round(1e6 * shine)]
+    luck = np.random.default_rng(words).normal(0.0, 0.002 if is_full else 0.01)
+    return float(1.0 - (shine - (0.3 if is_full else 0.4)) ** 2 + luck)
+"""
+"""File with an objective that is noisy, the more so in coarse scores, which are also biased."""
+
+
+@pytest.fixture(scope="module")
+def biased(tmp_path_factory: pytest.TempPathFactory) -> str:
+    file = tmp_path_factory.mktemp("goals") / "biased_by_quality.py"
+    file.write_text(BIASED, encoding="utf-8")
+    return f"{file}:biased"
+
+
+def found_by(design: SensorDesign, goal: str) -> SearchResult:
+    return search(design, SPACE, goal, method="grid", settings=FULL, coarse_first=True)
+
+
+def test_the_best_by_full_scores_is_found_although_coarse_ones_are_biased(
+    mini: SensorDesign, biased: str
+) -> None:
+    result = found_by(mini, biased)
+    promoted = [trial for trial in result.trials if trial.fresh and not trial.is_start]
+    assert len(promoted) <= LEAST_MOST < len(result.trials) / 3
+    assert result.best.values["coating.specularity"] == pytest.approx(BEST, abs=0.06)
+    assert len(result.best.fresh) == len(result.start.fresh) == 3
+    assert result.best.fresh_score() == max(trial.fresh_score() for trial in promoted)
+    least = min(trial.score for trial in promoted)
+    left = [trial.score for trial in result.trials if not trial.fresh]
+    assert sum(score > least for score in left) <= 2  # only those nearly equal to a promoted one
+
+
+def test_a_search_that_was_stopped_amid_full_scores_ends_alike(
+    mini: SensorDesign, biased: str
+) -> None:
+    plan = Plan(SearchSpace(SPACE), [biased], method="grid", settings=FULL, coarse_first=True)
+    study = Study.create(None, mini, plan)
+
+    def stop(progress: SearchProgress) -> None:
+        if progress.stage == FRESH and progress.done == 2:
+            raise KeyboardInterrupt
+
+    stopped = run_study(study, progress=stop)
+    assert stopped.interrupted
+    assert sum(len(trial.fresh) for trial in stopped.trials) == 2
+    ended, whole = run_study(study), found_by(mini, biased)
+    assert [dict(trial.fresh) for trial in ended.trials] == [
+        dict(trial.fresh) for trial in whole.trials
+    ]
+
+
+@pytest.mark.parametrize(
+    ("goal", "method", "says"),
+    [
+        ("aoap", "cma-es", "no objective or condition of this search needs pictures"),
+        ("reading", "gradient", "gradient can't search by coarse scores"),
+    ],
+)
+def test_coarse_scores_that_do_not_fit_are_refused(
+    mini: SensorDesign, goal: str, method: str, says: str
+) -> None:
+    space = {"lights.red.flux": (1.0, 5.0)}
+    with pytest.raises(SearchError, match=says):
+        search(mini, space, goal, method=method, coarse_first=True)
+
+
+def test_coarse_scores_take_half_the_pixels_across_and_one_image(mini: SensorDesign) -> None:
+    assert coarse_settings(mini, FULL) == {
+        "resolution": [320, 240],
+        "photons": 125_000,
+        "together": True,
+    }
+    small = {"resolution": [160, 120], "photons": 20_000, "depth": 0.2}
+    assert coarse_settings(mini, small) == {**small, "together": True}
+    usual = coarse_settings(mini, {"photons": "normal"})
+    assert (usual["resolution"], usual["photons"]) == ([320, 240], 125_000)
