@@ -76,4 +76,16 @@ def _command(name: str) -> Any:
         alone.add_typer(home, name=name)
     else:
         alone.command(name)(home)
-    return typer.main.get_group(alone).commands[name]
+    return _reflowed(typer.main.get_group(alone).commands[name])
+
+
+def _reflowed(command: Any) -> Any:
+    """Return a command whose help has a line for each paragraph, as have its subcommands.
+
+    Typer would keep the line breaks of docstrings, which are longer than lines of a terminal.
+    """
+    paragraphs = (command.help or "").split("\n\n")
+    command.help = "\n\n".join(" ".join(each.split()) for each in paragraphs) or None
+    for below in getattr(command, "commands", {}).values():
+        _reflowed(below)
+    return command

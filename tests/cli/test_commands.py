@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 import optisense
 from optisense.cli import app
+from optisense.cli.commands import Commands
 from optisense.sensors import SENSORS
 
 runner = CliRunner()
@@ -27,11 +29,17 @@ def test_version() -> None:
     assert run("--version") == (0, f"optisense {optisense.__version__}\n")
 
 
-@pytest.mark.parametrize("command", ["new", "check", "render", "doctor", "library"])
+@pytest.mark.parametrize("command", list(Commands().commands))
 def test_each_command_explains_itself(command: str) -> None:
-    code, text = run(command, "--help")
-    assert code == 0
-    assert "Usage" in text
+    """In lines as long as the terminal allows, whatever the lines of the docstring."""
+    result = runner.invoke(app, [command, "--help"], env={"COLUMNS": "80"}, terminal_width=80)
+    assert result.exit_code == 0
+    usage, text = result.output.split("[OPTIONS]" if "[OPTIONS]" in result.output else "Usage", 1)
+    lines = [line.strip() for line in text.split("╭")[0].splitlines()[1:]]
+    assert any(lines), usage
+    for line, following in pairwise(lines):
+        first, _, _ = following.partition(" ")
+        assert not first or not line or len(f" {line} {first}") > 78, line
 
 
 def test_help_does_not_load_the_renderer_or_numpy() -> None:
