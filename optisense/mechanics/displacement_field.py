@@ -341,8 +341,7 @@ def sideways_beyond(
         place: the grid of the loads.
         shear_modulus: shear modulus of the gel, MPa.
     """
-    columns = patch.columns
-    start = columns.x[0], columns.y[0]
-    coarse = np.stack([binned(a, place, start, columns.pitch, columns.solid.shape) for a in loads])
-    along_x, along_y = patch.sideways(coarse * columns.pitch**2 / shear_modulus)
-    return GridSpline(along_x, *start, columns.pitch), GridSpline(along_y, *start, columns.pitch)
+    pitch, start = patch.columns.pitch, (patch.x[0], patch.y[0])
+    coarse = np.stack([binned(a, place, start, pitch, patch.shape) for a in loads])
+    along_x, along_y = patch.sideways(coarse * pitch**2 / shear_modulus)
+    return GridSpline(along_x, *start, pitch), GridSpline(along_y, *start, pitch)

@@ -55,7 +55,8 @@ class Footprint:
         x, y: (columns,) and (rows,) grid coordinates in this frame, mm.
         overlap: (rows, columns) overlap along z (mm), negative where there is a gap; `NO_OVERLAP`
             where there is no skin or no indenter.
-        thickness: thickness of the gel under the contact, mm.
+        thickness: thickness (mm) of the gel under the contact, or of the flat layer to which the
+            gel is compared.
     """
 
     origin: FloatArray

@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
+
+from threadpoolctl import ThreadpoolController
 
 from optisense.design import SensorDesign
 from optisense.design.materials import Dielectric
@@ -13,6 +15,7 @@ from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import Contact, MeshIndenter, SensingSurface, TriangleMesh
 from optisense.geometry.contact import available_depth, locate, surface_axes
+from optisense.geometry.surface import SurfacePoint
 from optisense.mechanics.contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics.deformed_mesh import SkinMesh, skin_mesh
 from optisense.mechanics.elasticity import Elasticity
@@ -94,6 +97,14 @@ def elasticity_in_words(design: SensorDesign) -> str:
     return ", ".join(words)
 
 
+@cache
+def _linear_algebra() -> ThreadpoolController:
+    """Return the control of the threads of NumPy's and of SciPy's linear algebra."""
+    import scipy.linalg  # noqa: F401  # loads SciPy's, so that it is found
+
+    return ThreadpoolController().select(user_api="blas")
+
+
 def _drag(contact: Contact, surface: SensingSurface, place: Footprint) -> Drag | None:
     """Return the drag of a contact in the frame of its footprint; None if it has none."""
     if contact.shift == (0.0, 0.0) and contact.twist == 0.0:
@@ -155,6 +166,13 @@ class Gel:
                 indenters overlap on the skin, no depth gives a force, a pressure does not converge,
                 or nothing holds the gel.
         """
+        # Matrices are small: threads would only wait for each other.
+        with _linear_algebra().limit(limits=1):
+            return self._pressed(contacts, placed)
+
+    def _pressed(
+        self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None
+    ) -> PressedSkin:
         if self._check is not None:
             self._check()
             self._check = None
@@ -162,15 +180,16 @@ class Gel:
         if self._last is None or self._last[0] != asked:
             if placed is None:
                 placed = [self._place(contact) for contact in contacts]
+            spots = [locate(contact, self._surface) for contact in contacts]
             places = [
                 footprint(
                     mesh,
                     self._surface.mesh,
-                    locate(contact, self._surface),
-                    self._layer(contact),
+                    spot,
+                    self._layer(spot),
                     COARSE_POINTS_ACROSS if self._coarse else POINTS_ACROSS,
                 )
-                for contact, mesh in zip(contacts, placed, strict=True)
+                for spot, mesh in zip(spots, placed, strict=True)
             ]
             for number, (place, mesh) in enumerate(zip(places, placed, strict=True)):
                 if isinstance(contacts[number].indenter, MeshIndenter):
@@ -178,6 +197,10 @@ class Gel:
                 for other in places[:number]:
                     refuse_shared_skin(place, other)
             patches = [self._patches.around(place) for place in places]
+            places = [
+                place if patch is None else replace(place, thickness=patch.thickness)
+                for place, patch in zip(places, patches, strict=True)
+            ]
             drags = [
                 _drag(contact, self._surface, place)
                 for contact, place in zip(contacts, places, strict=True)
@@ -207,7 +230,7 @@ class Gel:
     def _depth_found(self, contact: Contact) -> Contact:
         wanted = contact.force
         assert wanted is not None
-        limit = DEEPEST_SHARE * self._thickness(contact)
+        limit = DEEPEST_SHARE * self._thickness(locate(contact, self._surface))
 
         def at(depth: float) -> Contact:
             return replace(contact, force=None, depth=depth)
@@ -240,16 +263,15 @@ class Gel:
             return at(LEAST_DEPTH)
         return at(math.exp(float(brentq(excess, low, high, xtol=FORCE_TOLERANCE))))
 
-    def _layer(self, contact: Contact) -> float:
-        """Return the thickness (mm) of the layer that a contact is pressed into."""
-        thickness = self._thickness(contact)
+    def _layer(self, spot: SurfacePoint) -> float:
+        """Return the thickness (mm) of the layer that a contact at a point is pressed into."""
+        thickness = self._thickness(spot)
         if not self._coarse:
             return thickness
         return COARSE_THICKNESS * max(1, round(thickness / COARSE_THICKNESS))
 
-    def _thickness(self, contact: Contact) -> float:
-        """Return the thickness (mm) of the gel under a contact."""
-        spot = locate(contact, self._surface)
+    def _thickness(self, spot: SurfacePoint) -> float:
+        """Return the thickness (mm) of the gel under a point of the skin."""
         for elastomer in self._elastomers:
             try:
                 return available_depth(spot.point, spot.inward, elastomer)

@@ -16,6 +16,23 @@ FACE_GAUSS = np.array([(x, y) for y in (-1, 1) for x in (-1, 1)]) / np.sqrt(3.0)
 """Points (4, 2) of the Gauss rule of order 2 on a face; all weights are 1."""
 
 
+def _slopes_in_the_cell() -> FloatArray:
+    """Return the derivatives (3, 8, 8) of the shape functions (last index) of the reference cell,
+    by each of its axes, at the Gauss points.
+    """
+    found = np.empty((3, 8, 8))
+    for axis in range(3):
+        factor = np.ones((8, 8))
+        for other in {0, 1, 2} - {axis}:
+            factor *= 1.0 + GAUSS[:, None, other] * CORNERS[None, :, other]
+        found[axis] = CORNERS[None, :, axis] * factor / 8.0
+    return found
+
+
+IN_THE_CELL = _slopes_in_the_cell()
+"""Derivatives (3, 8, 8) of the shape functions of the reference cell at its Gauss points."""
+
+
 def stiffnesses(corners: FloatArray, poisson_ratio: float) -> FloatArray:
     """Return stiffness matrices (m, 24, 24) for a shear modulus of 1; degrees of freedom are
     ordered node by node.
@@ -30,36 +47,39 @@ def stiffnesses(corners: FloatArray, poisson_ratio: float) -> FloatArray:
     count = len(corners)
     slopes, weights = _shape_slopes(corners)
     volume = weights.sum(axis=1)
-    mean = np.einsum("mg,mgai->mai", weights, slopes) / volume[:, None, None]
-    flat = (slopes * np.sqrt(weights)[:, :, None, None]).reshape(count, 8, 24)
-    outer = np.einsum("mgp,mgq->mpq", flat, flat, optimize=True).reshape(count, 8, 3, 8, 3)
-    straight = np.einsum("maibi->mab", outer)
-    result = np.swapaxes(outer, 2, 4) - (2.0 / 3.0) * outer
-    for axis in range(3):
-        result[:, :, axis, :, axis] += straight
+    mean = np.einsum("mg,mgp->mp", weights, slopes) / volume[:, None]
+    flat = slopes * np.sqrt(weights)[:, :, None]
+    shape = count, 3, 8, 3, 8  # axis and node of the row, and of the column
+    outer = (np.swapaxes(flat, 1, 2) @ flat).reshape(shape)
     bulk = 2.0 * (1.0 + poisson_ratio) / (3.0 * (1.0 - 2.0 * poisson_ratio))
-    spread = mean.reshape(count, 24)
-    return np.asarray(
-        result.reshape(count, 24, 24)
-        + (bulk * volume)[:, None, None] * spread[:, :, None] * spread[:, None, :]
-    )
+    spread = mean * (bulk * volume)[:, None]
+    result = (spread[:, :, None] @ mean[:, None, :]).reshape(shape)
+    result -= (2.0 / 3.0) * outer
+    result += np.swapaxes(outer, 1, 3)
+    straight = outer[:, 0, :, 0] + outer[:, 1, :, 1] + outer[:, 2, :, 2]
+    for axis in range(3):
+        result[:, axis, :, axis] += straight
+    return result.transpose(0, 2, 1, 4, 3).reshape(count, 24, 24)
 
 
 def _shape_slopes(corners: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the derivatives (m, 8, 8, 3) of the shape functions at the Gauss points, and the
-    weights of these.
+    """Return the derivatives (m, 8, 24) of the shape functions at the Gauss points, by x of all
+    nodes first, then by y and by z; and the weights (m, 8) of these points.
     """
-    local = np.empty((8, 8, 3))
+    count = len(corners)
+    each_node = np.swapaxes(corners, 0, 1).reshape(8, 3 * count)
+    jacobian = (IN_THE_CELL.reshape(24, 8) @ each_node).reshape(3, 8, count, 3)
+    x, y, z = np.moveaxis(jacobian, 3, 0)
+    cofactors = np.empty((3, 3, 8, count))
     for axis in range(3):
-        others = [k for k in range(3) if k != axis]
-        factor = np.ones((8, 8))
-        for other in others:
-            factor *= 1.0 + GAUSS[:, None, other] * CORNERS[None, :, other]
-        local[:, :, axis] = CORNERS[None, :, axis] * factor / 8.0
-    jacobian = np.einsum("gak,mai->mgik", local, corners)
-    inverse = np.linalg.inv(jacobian)
-    slopes = np.einsum("gak,mgki->mgai", local, inverse, optimize=True)
-    return slopes, np.linalg.det(jacobian)
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        cofactors[axis, 0] = y[j] * z[k] - z[j] * y[k]
+        cofactors[axis, 1] = z[j] * x[k] - x[j] * z[k]
+        cofactors[axis, 2] = x[j] * y[k] - y[j] * x[k]
+    weights = x[0] * cofactors[0, 0] + y[0] * cofactors[0, 1] + z[0] * cofactors[0, 2]
+    inverse = (cofactors / weights).transpose(3, 2, 1, 0)
+    slopes = inverse @ np.moveaxis(IN_THE_CELL, 0, 1)
+    return slopes.reshape(count, 8, 24), weights.T
 
 
 def face_points(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

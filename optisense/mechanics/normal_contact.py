@@ -83,12 +83,16 @@ def solve_normal_contact(
         yielded = response.normal(way)
         curvature = float((yielded * way).sum())
         step = float((residual * way).sum()) / curvature if curvature > 0.0 else 0.0
-        pressure = np.maximum(pressure - step * way, 0.0)
+        found = pressure - step * way
+        pressure = np.maximum(found, 0.0)
         entering = (pressure == 0.0) & (gap < 0.0)
         goes_on = not entering.any()
         if not goes_on:
             pressure = np.where(entering, -step * gap, pressure)
-        displacement = response.normal(pressure)
+        if goes_on and found.min() >= 0.0:
+            displacement = displacement - step * yielded
+        else:
+            displacement = response.normal(pressure)
     rest = max(float(np.abs(residual).max()), -float(gap.min()))
     raise ContactError(
         f"the pressure under an indenter is not found in {MAX_ITERATIONS} iterations; {rest:.2g} "

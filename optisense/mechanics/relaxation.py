@@ -1,0 +1,45 @@
+"""Relaxation of iterations that repeat one function until its result is its argument."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+LEAST, MOST = 0.2, 1.5
+"""Smallest and largest share of a change that is taken, so that no single iteration throws the next
+one far off."""
+
+
+class Relaxation:
+    """Aitken's relaxation of an iteration from 0.
+
+    Iterations over a pressure and the effect of a gel's shape alternate around their limit where a
+    gel is softer than the flat layer to which it is compared. The share of a change that is taken
+    follows from the last two changes (Irons and Tuck, "A version of the Aitken accelerator for
+    computer iteration", Int. J. Numer. Methods Eng. 1, 1969).
+    """
+
+    def __init__(self) -> None:
+        """Begin an iteration; its first result is taken whole."""
+        self._values: FloatArray = np.zeros(())
+        self._change: FloatArray | None = None
+        self._share = 1.0
+
+    def next(self, found: FloatArray) -> FloatArray:
+        """Return the next argument, from the result of the last one.
+
+        Args:
+            found: (...) result of the function for the last argument, or for 0.
+        """
+        change = found - self._values
+        if self._change is not None:
+            turn = change - self._change
+            square = float((turn**2).sum())
+            if square > 0.0:
+                share = -self._share * float((self._change * turn).sum()) / square
+                self._share = min(max(share, LEAST), MOST)
+        self._change = change
+        self._values = self._values + self._share * change
+        return self._values
