@@ -60,6 +60,7 @@ class Following:
         self._best = -math.inf
         self._left = threading.Event()
         self._done = self._failed = 0
+        self._said = ""
         self._time_left: TimeLeft | None = None
 
     def result(self) -> dict[str, Any]:
@@ -124,8 +125,10 @@ class Following:
             # The first trial that is waited for also compiles.
             self._time_left = TimeLeft([TimedStep("trials", self._total(study), warm_up=1)])
             self._time_left.begin("trials", done=self._done)
-        if not new:
+        said = self._in_words(study)
+        if not new and said == self._said:
             return
+        self._said = said
         best = max((_score(row, study.objective) for row in new), default=-math.inf)
         for row in new:
             is_best = _score(row, study.objective) == best > self._best
@@ -143,8 +146,20 @@ class Following:
             failed=self._failed,
             fraction=min(1.0, self._done / max(1, total)),
             seconds_left=round(left, 1) if math.isfinite(left) else None,
-            text=f"{self._done} of {total} trials",
+            text=said,
         )
+
+    def _in_words(self, study: Study) -> str:
+        """Return what the search does, and how far it is."""
+        from optisense.search.study.stages import FRESH, START_STAGE
+
+        stage = study.store.fact("stage")
+        if stage == START_STAGE:
+            return "scoring the present design"
+        if stage == FRESH:
+            fresh = sum(map(len, study.store.fresh_scores().values()))
+            return f"scoring the best again, {fresh} done"
+        return f"{self._done} of {self._total(study)} trials"
 
     def _tell(self, study: Study, row: Row, is_best: bool) -> None:
         from optisense.engine.designing import bent_shapes

@@ -89,3 +89,11 @@ def shown_number(value: float) -> str:
         return f"{value:,}"
     text = f"{value:.4g}"
     return f"{text}.0" if text.lstrip("-").isdigit() else text  # a share of 1.0 is no count
+
+
+def duration(seconds: float) -> str:
+    """Return an approximate duration in words."""
+    for unit, name in ((3600.0, "hours"), (60.0, "minutes")):
+        if seconds >= 1.5 * unit:
+            return f"{seconds / unit:.0f} {name}"
+    return f"{max(seconds, 1.0):.0f} seconds"

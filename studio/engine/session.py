@@ -12,6 +12,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core.engine import Answer, Engine, EngineError, Request
+from ..core.numbers import duration
 from .preferences import HOW_TO_GET, engine_command, when_changed
 
 TICK, BRISK = 0.05, 0.01
@@ -19,6 +20,9 @@ TICK, BRISK = 0.05, 0.01
 
 PATIENCE = 20.0
 """Longest time that Blender waits for requests that are normally answered at once, s."""
+
+LEAST_LEFT = 3.0
+"""Remaining time of a job from which it is shown, s; shorter ones would only flicker."""
 
 _engine: Engine | None = None
 _folder: str | None = None
@@ -196,7 +200,10 @@ def start_job(
             if fraction is None and message.get("total"):
                 fraction = message.get("done", 0) / message["total"]
             now.fraction = fraction or 0.0
-            now.progress = message.get("text") or ""
+            left = message.get("seconds_left") or 0.0
+            now.progress = (message.get("text") or "") + (
+                f", {duration(left)} left" if left >= LEAST_LEFT else ""
+            )
         elif on_event is not None:
             on_event(message)
 

@@ -9,6 +9,7 @@ import bpy
 
 from ..core import vary
 from ..core.engine import EngineError
+from ..core.numbers import duration
 from ..engine import session
 from ..scene.paths import objective
 
@@ -49,14 +50,6 @@ def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict
         message, _, hint = answer["advice"].partition(". ")
         raise EngineError({"kind": "SearchError", "message": message, "hint": hint})
     return f"{answer['trials']} trials usually take {duration(answer['seconds'] / search.workers)}"
-
-
-def duration(seconds: float) -> str:
-    """Return an approximate duration in words."""
-    for unit, name in ((3600.0, "hours"), (60.0, "minutes")):
-        if seconds >= 1.5 * unit:
-            return f"{seconds / unit:.0f} {name}"
-    return f"{max(seconds, 1.0):.0f} seconds"
 
 
 def is_flat(scores: list[float]) -> bool:

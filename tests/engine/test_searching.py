@@ -199,6 +199,27 @@ def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
     assert not engine.ask("study", study=study)["running"]
 
 
+def test_what_a_search_does_before_and_after_its_trials_is_said(
+    engine: Any, tmp_path: Path, goal: str, hold: Path
+) -> None:
+    number = engine.send(
+        "search",
+        design="gelsight-mini",
+        study=str(tmp_path / "study"),
+        vary=["coating.specularity=0:1:2"],
+        objectives=[goal],
+        method="grid",
+    )
+    for text in ("scoring the present design", "of 2 trials", "scoring the best again"):
+        engine.until(
+            lambda m, text=text: (
+                m["id"] == number and m.get("event") == "progress" and text in m["text"]
+            )
+        )
+    hold.unlink()
+    assert engine.result(number)["done"] == 2
+
+
 def test_more_trials_than_at_first_are_counted_to_the_new_number(
     engine: Any, tmp_path: Path, goal: str
 ) -> None:

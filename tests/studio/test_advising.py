@@ -9,6 +9,7 @@ import bpy
 import pytest
 from recording import draw
 
+from studio.core.numbers import duration
 from studio.engine import session
 from studio.optimise import advising, following
 from studio.optimise.ui import OPTISENSE_PT_optimise
@@ -42,8 +43,8 @@ def test_how_long_it_takes_is_told(mini: Any) -> None:
     bpy.ops.optisense.vary(label="View", text="camera.fov=40:70")
     few = advising.advice(handing.design(mini), search, {"budget": 30})
     assert few.startswith("30 trials usually take ")
-    assert advising.duration(7300.0) == "2 hours" and advising.duration(100.0) == "2 minutes"
-    assert advising.duration(20.0) == "20 seconds" and advising.duration(0.1) == "1 seconds"
+    assert duration(7300.0) == "2 hours" and duration(100.0) == "2 minutes"
+    assert duration(20.0) == "20 seconds" and duration(0.1) == "1 seconds"
 
 
 def test_a_flat_curve_is_told(mini: Any) -> None:

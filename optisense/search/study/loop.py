@@ -159,6 +159,7 @@ class StudyRun:
         except KeyboardInterrupt:
             interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
+        study.store.set_fact("stage", None)
         if not interrupted and self._tally.has_no_score:
             raise self._tally.all_failed()
         several = self.method.several  # the result is a front, not one best trial
@@ -313,6 +314,7 @@ class StudyRun:
     def _begin(self, stage: str, done: float = 0.0) -> None:
         """Begin a stage, of which earlier runs finished `done` pieces."""
         self._stage = stage
+        self.study.store.set_fact("stage", stage)  # for those who only read the study
         self._time_left.begin(stage, done=done)
         self._report(now=True)
 
