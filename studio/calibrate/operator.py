@@ -48,7 +48,7 @@ class OPTISENSE_PG_calibration(bpy.types.PropertyGroup):
         "is used",
     )  # fmt: skip
     as_labelled: BoolProperty(
-        name="Take Labels as They Are", options={"SKIP_SAVE"},
+        name="Trust Labels", options={"SKIP_SAVE"},
         description="Use the contact positions of presses.csv unchanged; otherwise each contact "
         "is searched for near its position",
     )  # fmt: skip
@@ -140,7 +140,7 @@ class OPTISENSE_OT_open_calibrated(polls.Checked, bpy.types.Operator):
     """Open the design that was fitted, in place of this one"""
 
     bl_idname = "optisense.open_calibrated"
-    bl_label = "Open Fitted Design"
+    bl_label = "Open Fitted"
 
     checks = (polls.is_idle, polls.requires(lambda c: _values(c).folder, "Calibrate first"))
 

@@ -15,6 +15,7 @@ from ..engine.operators import fail, start
 from ..scene.kinds import ROLES
 from ..scene.paths import absolute
 from .opening import new_stage, open_stage
+from .workspace import show_sidebar
 
 READING, MAKING = "Reading the files", "Making the sensor"
 FORMATS = "*.obj;*.stl;*.ply;*.step;*.stp"
@@ -62,20 +63,31 @@ def now() -> bpy.types.PropertyGroup:
 
 
 class ChoosingFiles:
-    """Base of operators that ask for one or several CAD files of a folder, or for the folder."""
+    """Base of operators that ask for one or several CAD files of a folder, or for the folder; files
+    that were dropped on the 3D view are not asked for.
+    """
 
-    filepath: StringProperty(name="File", description="CAD file to read", subtype="FILE_PATH")
+    filepath: StringProperty(
+        name="File", description="CAD file to read", subtype="FILE_PATH", options={"SKIP_SAVE"}
+    )
     directory: StringProperty(
-        name="Folder", description="Folder of the selected files", subtype="DIR_PATH"
+        name="Folder",
+        description="Folder of the selected files",
+        subtype="DIR_PATH",
+        options={"SKIP_SAVE"},
     )
     files: CollectionProperty(
         type=bpy.types.OperatorFileListElement,
         name="Files",
         description="Selected files of the folder",
+        options={"SKIP_SAVE"},
     )
     filter_glob: StringProperty(default=FORMATS, options={"HIDDEN"})
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        if self.directory and self.files:  # they were dropped
+            show_sidebar(context)
+            return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -91,7 +103,7 @@ class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator)
     """Make a sensor of CAD files (STEP, STL, OBJ, PLY): mark them all, or open their folder"""
 
     bl_idname = "optisense.cad_files"
-    bl_label = "From CAD Files ..."
+    bl_label = "Sensor from CAD Files"
     bl_options = {"REGISTER"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -110,6 +122,32 @@ class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator)
             session.redraw()
 
         return start(self, READING, "cad", read, files=paths, name="cad")
+
+
+class _Dropped:
+    """Base of what is done with CAD files that are dropped on the 3D view."""
+
+    bl_file_extensions = FORMATS.replace("*", "")
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return context.area is not None and context.area.type == "VIEW_3D"
+
+
+class OPTISENSE_FH_new(_Dropped, bpy.types.FileHandler):
+    bl_idname = "OPTISENSE_FH_new"
+    bl_label = "OptiSense: A Sensor of These Parts"
+    bl_import_operator = OPTISENSE_OT_cad_files.bl_idname
+
+
+class OPTISENSE_FH_reference(_Dropped, bpy.types.FileHandler):
+    bl_idname = "OPTISENSE_FH_reference"
+    bl_label = "OptiSense: References for This Sensor"
+    bl_import_operator = "optisense.add_mesh"
+
+    @classmethod
+    def poll_drop(cls, context: bpy.types.Context) -> bool:
+        return super().poll_drop(context) and context.scene.optisense.is_open
 
 
 class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):

@@ -74,7 +74,7 @@ class OPTISENSE_MT_new(bpy.types.Menu):
             row.operator(OPTISENSE_OT_new.bl_idname, text=description or title).sensor = name
         self.layout.separator()
         self.layout.operator(OPTISENSE_OT_new_empty.bl_idname, icon="FILE_NEW")
-        self.layout.operator("optisense.cad_files", icon="IMPORT")
+        self.layout.operator("optisense.cad_files", text="From CAD Files ...", icon="IMPORT")
 
 
 class OPTISENSE_OT_open(polls.Replacing, _Opens, ChoosingFile, bpy.types.Operator):

@@ -81,6 +81,13 @@ def _fill() -> None:
     bpy.app.timers.register(_open_tab, first_interval=editors.WAIT)
 
 
+def show_sidebar(context: bpy.types.Context) -> None:
+    """Open the extension's tab in the sidebar of the 3D view that the mouse is over."""
+    if context.area is not None and context.area.type == "VIEW_3D":
+        context.area.spaces.active.show_region_ui = True
+        bpy.app.timers.register(_open_tab, first_interval=editors.WAIT)
+
+
 def _open_tab() -> None:
     """Open the extension's tab in the sidebar, once the sidebar has been drawn."""
     for window in bpy.context.window_manager.windows:
