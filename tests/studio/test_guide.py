@@ -20,7 +20,7 @@ def test_every_panel_has_help_at_its_own_paragraph() -> None:
     for panel in panels():
         assert bpy.ops.optisense.help(topic=panel.bl_label) == {"FINISHED"}
         text, line = guide.text_of(panel.bl_label)
-        assert text.lines[line].body.startswith(f"**{panel.bl_order} ")
+        assert text.lines[line].body.startswith(f"{panel.bl_order} {panel.bl_label}.")
         assert text.current_line_index == line
 
 
@@ -33,6 +33,7 @@ def test_every_topic_has_a_page_without_pictures_and_addresses() -> None:
     for name in names:
         text = pages.page(name)
         assert "](" not in text and "![" not in text and len(text) > 1000
+        assert "**" not in text and "```" not in text
     assert len([each for each in bpy.data.texts if each.name.startswith(guide.NAME)]) <= len(names)
 
 
