@@ -19,6 +19,9 @@ of a coordinate axis, which the arrows need not follow.
 LENGTH, BRIGHT, FAINT = 1.5, 1.0, 0.6
 """Length of an arrow in units of gizmos, and its opacities with and without the pointer on it."""
 
+RING = 0.6
+"""Radius of the ring in units of gizmos: the heads of foreshortened arrows stay free of it."""
+
 LEAST = 2
 """Smallest number of lights in a row that has a gizmo."""
 
@@ -70,6 +73,7 @@ class OPTISENSE_GGT_row(bpy.types.GizmoGroup):
         values = ring.target_set_operator("transform.rotate")
         values.constraint_axis = (True, False, False)
         self._common(ring, values, COLOURS[0])
+        ring.scale_basis = RING
         self.ring = (ring, values)
 
     @staticmethod

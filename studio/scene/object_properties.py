@@ -172,8 +172,8 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
     )  # fmt: skip
     force: FloatProperty(
         name="Force",
-        description="N, along the inward normal; it is drawn as if it were at the "
-        "depth that was given last",
+        description="N, along the inward normal; the next picture says and draws how deep it "
+        "presses",
         min=0.001,
         max=1000.0,
         default=1.0,

@@ -15,6 +15,9 @@ from .exposing import exposure, keep_exposure, resolution, shown_size
 
 LATEST = "picture"
 
+SAME_DEPTH = 1e-3
+"""Difference in mm up to which a contact is not drawn anew."""
+
 
 def fields(scene: bpy.types.Scene) -> dict[str, Any]:
     """Return the fields of a request for a full picture of the scene's design and contacts.
@@ -53,10 +56,24 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     now.file = result["files"].get("picture", "")
     now.summary = summary(result)
     now.presses = presses(result, [each.name for each in pressing(scene)])
+    _sink(scene, result)
     if not all(group.shown for group in scene.optisense.light_groups):
         relight.wanted()
     _tell_unseen(result.get("unseen") or [])
     session.redraw()
+
+
+def _sink(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
+    """Draw contacts that are pressed by a force as deep as the picture has them."""
+    for contact, row in zip(pressing(scene), _pressed(result), strict=False):
+        values = contact.optisense
+        if values.press_by == "FORCE" and abs(values.depth - row["depth_mm"]) > SAME_DEPTH:
+            values.depth = row["depth_mm"]
+
+
+def _pressed(result: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return the results of the contacts of a full picture; a draft has none."""
+    return [] if result.get("draft") else (result.get("settings") or {}).get("presses") or []
 
 
 def _tell_unseen(numbers: list[int]) -> None:
@@ -79,9 +96,8 @@ def presses(result: dict[str, Any], names: list[str]) -> str:
         result: answer of the engine.
         names: names of the contacts in the order of the request.
     """
-    rows = [] if result.get("draft") else (result.get("settings") or {}).get("presses") or []
     lines = []
-    for name, row in zip(names, rows, strict=False):
+    for name, row in zip(names, _pressed(result), strict=False):
         text = (
             f"{name}: {row['force_n']:.3g} N at {row['depth_mm']:.3g} mm, up to "
             f"{1000 * row['greatest_pressure_mpa']:.3g} kPa on {row['area_mm2']:.3g} mm²"

@@ -36,6 +36,8 @@ def test_a_contact_is_pressed_by_force_dragged_and_turned(mini: Any) -> None:
     assert re.match(r"160 x 120, noise [\d.]+ % \([\d.]+ % in the worst places\), [\d.]+ s$", said)
     told = bpy.context.window_manager.optisense_picture.presses
     assert told.startswith("contact: 0.5 N at ") and "dragged with" in told
+    depth = float(told.removeprefix("contact: 0.5 N at ").partition(" mm")[0])
+    assert values.depth == pytest.approx(depth, rel=0.01), "it is drawn as deep as it presses"
     mini.optisense_simulation.skin = "conforming"
     values.press_by = "DEPTH"
     values.shift, values.twist = (0.0, 0.0), 0.0
