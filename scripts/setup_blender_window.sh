@@ -56,7 +56,9 @@ own_apt() {
 }
 say "Fetching Blender's packages (some 300 MB the first time) ..."
 own_apt update
-own_apt install --yes --download-only blender python3-numpy libgl1-mesa-dri >/dev/null
+# Blender loads OpenGL when it starts, and some of its packages do not name what draws with it.
+own_apt install --yes --download-only blender python3-numpy \
+    libgl1 libglx-mesa0 libegl1 libegl-mesa0 libgl1-mesa-dri >/dev/null
 
 say "Unpacking them into $place ..."
 rm -rf "$tree"
