@@ -8,6 +8,7 @@ from ..core.engine import EngineError, Request
 from ..engine import handing, session
 
 _open: Request | None = None
+_is_put_off = False
 
 
 def warm_up(scene: bpy.types.Scene) -> Request | None:
@@ -16,7 +17,8 @@ def warm_up(scene: bpy.types.Scene) -> Request | None:
     A picture requested meanwhile is made right after that, no later than without this. The request
     for an earlier sensor is cancelled.
     """
-    global _open
+    global _open, _is_put_off
+    _is_put_off = False
     try:
         engine = session.engine()
         if _open is not None:
@@ -25,3 +27,17 @@ def warm_up(scene: bpy.types.Scene) -> Request | None:
     except EngineError:  # Simulating will show the error.
         return None
     return _open
+
+
+def put_off() -> None:
+    """Cancel a preparation under way: a draft is wanted, which is sooner there without it."""
+    global _open, _is_put_off
+    if _open is not None and not _open.done and session.running() is not None:
+        session.engine().cancel(_open)
+        _is_put_off = True
+    _open = None
+
+
+def is_put_off() -> bool:
+    """Whether a preparation was cancelled that is still to be made up for."""
+    return _is_put_off

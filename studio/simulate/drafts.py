@@ -10,6 +10,7 @@ import bpy
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
 from ..scene.collections import is_edited
+from ..sensor import warming
 from . import requests
 from .exposing import exposure
 
@@ -23,12 +24,20 @@ yet answered.
 """
 RENEWED = 0.05
 """Time after which a waiting draft is replaced by a newer one, s."""
+LEAD = 0.05
+"""Time before the expected end of the draft in progress at which the next one is requested, s. An
+earlier request would be replaced by newer ones, each of which costs both processes time.
+"""
 REST = 0.3
 """Time without a change after which a draft that reused earlier results is made anew, s."""
 
 _open: list[Request] = []
 _wanted = False
 _sent = 0.0
+_began = 0.0
+"""Time at which the engine began the draft in progress."""
+_pace = 0.0
+"""Duration of the last draft, s."""
 _again: float | None = None
 """Time of one more draft if nothing changes before; None for none."""
 
@@ -52,7 +61,7 @@ def _ask() -> None:
     """Request a draft if one is wanted. The newest waits behind the one in progress, so that the
     engine never idles between them.
     """
-    global _wanted, _sent, _again
+    global _wanted, _sent, _began, _again
     scene = bpy.context.scene
     if scene is None or not scene.optisense_simulation.draft or session.is_busy():
         return
@@ -60,12 +69,17 @@ def _ask() -> None:
     _open[:] = [each for each in _open if not each.done]
     rested = _again is not None and now >= _again and not _open
     if not (_wanted or rested) or len(_open) == MOST_OPEN:
+        if not _open and _again is None and now - _began > REST and warming.is_put_off():
+            warming.warm_up(scene)
         return
-    if len(_open) > 1 and now - _sent < RENEWED:
+    if _open and now < max(_began + _pace - LEAD, _sent + RENEWED * (len(_open) > 1)):
         return
     _wanted, _sent, _again = False, now, None
+    if not _open:
+        _began = now
     if not scene.optisense.is_open:
         return
+    warming.put_off()
     try:
         design = handing.design(scene)
         contacts = handing.contacts(scene)
@@ -89,7 +103,9 @@ def _ask() -> None:
 
 def _take(result: dict[str, Any]) -> None:
     """Show a draft, and schedule a complete one if it reused earlier results."""
-    global _again
+    global _again, _began, _pace
+    now = time.monotonic()
+    _began, _pace = now, now - _began
     requests.take(result, draft=True)
     if session.state().note.startswith(NONE):
         session.state().note = ""

@@ -20,6 +20,7 @@ from studio.engine import session
 from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
 from studio.scene.objects_at import objects_at
+from studio.sensor import warming
 from studio.sensor.warming import warm_up
 from studio.simulate import drafts, picture, relight
 
@@ -76,6 +77,18 @@ def test_an_opened_sensor_warms_the_engine_up_and_the_last_one_counts(mini: Any)
     engine.wait(last)
     assert not session.state().busy and not session.state().problem
     assert bpy.ops.optisense.check() == {"FINISHED"}
+
+
+def test_a_draft_does_not_wait_for_the_preparation_which_is_made_up_for(mini: Any) -> None:
+    preparing = warm_up(mini)
+    assert preparing is not None
+    try:
+        mini.optisense_simulation.draft = True
+        until(lambda: bpy.context.window_manager.optisense_picture.is_draft)
+        assert preparing.done, "it was cancelled"
+        until(lambda: not warming.is_put_off() and not session.engine().waiting)
+    finally:
+        mini.optisense_simulation.draft = False
 
 
 def _relit() -> None:
