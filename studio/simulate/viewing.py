@@ -38,7 +38,9 @@ TEXT, LINE = 12.0, 18
 """Size of the text over a picture in points, and distance of its lines in pixels."""
 
 NARROW = 0.75
-"""Width of the channel buttons relative to the default: all controls fit above a narrow picture."""
+"""Width of the channel buttons and of the wipe's slider relative to the default: all controls fit
+above a narrow picture.
+"""
 
 _now: NDArray[np.float32] | None = None
 _pinned: NDArray[np.float32] | None = None
@@ -82,6 +84,10 @@ class OPTISENSE_PG_view(bpy.types.PropertyGroup):
         description="Factor by which the difference is multiplied", options={"SKIP_SAVE"},
     )  # fmt: skip
     pinned: StringProperty(description="Name of the pinned picture", options={"SKIP_SAVE"})
+    was_automatic: BoolProperty(
+        description="Whether the exposure was automatic before a picture was pinned",
+        options={"SKIP_SAVE"},
+    )
 
 
 def is_plain() -> bool:
@@ -135,7 +141,7 @@ def _take(pixels: NDArray[np.float32]) -> None:
 
 
 class OPTISENSE_OT_pin_picture(polls.Checked, bpy.types.Operator):
-    """Keep this picture, to compare those that follow with it"""
+    """Keep this picture, to compare those that follow with it; meanwhile the exposure is fixed"""
 
     bl_idname = "optisense.pin_picture"
     bl_label = "Pin"
@@ -149,7 +155,11 @@ class OPTISENSE_OT_pin_picture(polls.Checked, bpy.types.Operator):
             context.window_manager.optisense_picture,
             context.window_manager.optisense_view,
         )
-        values.pinned = ("Draft, " if now.is_draft else "") + (now.summary or "a picture")
+        size = now.summary.partition(",")[0]
+        values.pinned = ("draft, " if now.is_draft else "") + (size or "a picture")
+        settings = context.scene.optisense_simulation
+        values.was_automatic = values.was_automatic or settings.auto_exposure
+        settings.auto_exposure = False  # else all would differ where only one light changes
         if values.compare == "NONE":
             values.compare = "WIPE"
         refresh()
@@ -169,6 +179,9 @@ class OPTISENSE_OT_unpin_picture(polls.Checked, bpy.types.Operator):
         _pinned = None
         values = context.window_manager.optisense_view
         values.pinned, values.compare = "", "NONE"
+        if values.was_automatic:
+            context.scene.optisense_simulation.auto_exposure = True
+        values.was_automatic = False
         return {"FINISHED"}
 
 
@@ -187,14 +200,16 @@ def draw_header(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     channels.prop(values, "channel", expand=True)
     row.prop(values, "false_colour", text="", icon="COLOR")
     row = layout.row(align=True)
-    if values.pinned:
-        row.operator("optisense.unpin_picture", text="", icon="UNPINNED")
-        row.prop(values, "compare", expand=True, icon_only=True)
-        if values.compare == "WIPE":
-            row.prop(values, "wipe", text="", slider=True)
-        elif values.compare == "DIFFERENCE":
-            row.prop(values, "gain", text="")
     row.operator("optisense.pin_picture", text="" if values.pinned else "Pin", icon="PINNED")
+    if values.pinned:
+        row.operator("optisense.unpin_picture", text="", icon="X")
+        row.prop(values, "compare", expand=True, icon_only=True)
+        amount = row.row(align=True)
+        amount.scale_x = NARROW
+        if values.compare == "WIPE":
+            amount.prop(values, "wipe", text="", slider=True)
+        elif values.compare == "DIFFERENCE":
+            amount.prop(values, "gain", text="")
 
 
 def _draw_header(header: bpy.types.Header, context: bpy.types.Context) -> None:
@@ -217,9 +232,9 @@ def words(context: bpy.types.Context) -> list[str]:
     old = "Of the sensor that was open before: " if now.is_before else ""
     lines = [f"{old}{kind}{now.summary}"]
     if values.pinned and values.compare == "WIPE":
-        lines.append(f"Left: pinned, {values.pinned}")
+        lines.append(f"On the left: the pinned picture ({values.pinned})")
     elif values.pinned and values.compare == "DIFFERENCE":
-        lines.append(f"Minus the pinned one, {values.gain:.0f} times; {values.pinned}")
+        lines.append(f"Minus the pinned picture ({values.pinned}), {values.gain:.0f} times")
     return lines
 
 
@@ -243,7 +258,7 @@ def _forget(*_: object) -> None:
         _now = None
     _pinned = None
     values = bpy.context.window_manager.optisense_view
-    values.pinned, values.compare = "", "NONE"
+    values.pinned, values.compare, values.was_automatic = "", "NONE", False
 
 
 PROPERTIES = {"WindowManager": {"optisense_view": OPTISENSE_PG_view}}

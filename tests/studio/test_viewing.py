@@ -70,6 +70,7 @@ def test_the_picture_itself_stays_as_it_is(mini: Any) -> None:
     picture.show(first)
     assert bpy.ops.optisense.pin_picture() == {"FINISHED"}
     assert values.compare == "WIPE"
+    assert not mini.optisense_simulation.auto_exposure, "else all differs where one light changes"
     picture.show(second)
     values.compare = "DIFFERENCE"
     values.gain = 1.0
@@ -81,6 +82,7 @@ def test_the_picture_itself_stays_as_it_is(mini: Any) -> None:
     assert any("Minus the pinned" in line for line in _words())
     assert bpy.ops.optisense.unpin_picture() == {"FINISHED"}
     assert viewing.is_plain() and not values.pinned
+    assert mini.optisense_simulation.auto_exposure
     with pytest.raises(RuntimeError, match="No picture is pinned"):
         bpy.ops.optisense.unpin_picture()
 
