@@ -155,10 +155,9 @@ class Following:
 
         stage = study.store.fact("stage")
         if stage == START_STAGE:
-            return "scoring the present design"
+            return "scoring this sensor"
         if stage == FRESH:
-            fresh = sum(map(len, study.store.fresh_scores().values()))
-            return f"scoring the best again, {fresh} done"
+            return "scoring the best again"
         return f"{self._done} of {self._total(study)} trials"
 
     def _tell(self, study: Study, row: Row, is_best: bool) -> None:

@@ -58,6 +58,7 @@ class OPTISENSE_PG_session(bpy.types.PropertyGroup):
         options={"SKIP_SAVE"},
     )
     progress: StringProperty(options={"SKIP_SAVE"})
+    left: StringProperty(description="Time that is left of the job", options={"SKIP_SAVE"})
     cancelling: BoolProperty(options={"SKIP_SAVE"})
     problem: StringProperty(options={"SKIP_SAVE"})
     hint: StringProperty(options={"SKIP_SAVE"})
@@ -184,7 +185,7 @@ def start_job(
     global _job, _job_goes_on
     _job_goes_on = bool(fields.get("go_on"))
     now = state()
-    now.problem = now.hint = now.note = now.progress = ""
+    now.problem = now.hint = now.note = now.progress = now.left = ""
     now.fraction = 0.0
     now.cancelling = False
     now.about = title
@@ -200,10 +201,9 @@ def start_job(
             if fraction is None and message.get("total"):
                 fraction = message.get("done", 0) / message["total"]
             now.fraction = fraction or 0.0
+            now.progress = message.get("text") or ""
             left = message.get("seconds_left") or 0.0
-            now.progress = (message.get("text") or "") + (
-                f", {duration(left)} left" if left >= LEAST_LEFT else ""
-            )
+            now.left = f"{duration(left)} left" if left >= LEAST_LEFT else ""
         elif on_event is not None:
             on_event(message)
 
@@ -299,7 +299,7 @@ def _over() -> None:
     global _job
     _job = None
     now = state()
-    now.busy = now.progress = ""
+    now.busy = now.progress = now.left = ""
     now.cancelling = False
 
 

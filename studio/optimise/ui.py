@@ -55,7 +55,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
             row.operator("optisense.search", icon="VIEWZOOM")
             row.operator("optisense.resume", icon="PLAY")
         if found.expected and session.state().busy == "Searching":
-            layout.label(text=found.expected, icon="TIME")
+            layout.label(text=session.state().left or found.expected, icon="TIME")
         show_outcome(layout, "Searching", "Reading the study")
         if is_flat(known_scores()):
             text = "All trials score alike: the objective does not see what varies"

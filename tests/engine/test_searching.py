@@ -210,7 +210,7 @@ def test_what_a_search_does_before_and_after_its_trials_is_said(
         objectives=[goal],
         method="grid",
     )
-    for text in ("scoring the present design", "of 2 trials", "scoring the best again"):
+    for text in ("scoring this sensor", "of 2 trials", "scoring the best again"):
         engine.until(
             lambda m, text=text: (
                 m["id"] == number and m.get("event") == "progress" and text in m["text"]
