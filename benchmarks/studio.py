@@ -101,7 +101,7 @@ def main() -> None:
 
     drafts._take = taken
 
-    def dragged(what: str, move: Callable[[int], None]) -> None:
+    def dragged(what: str, move: Callable[[int], None], target: str) -> None:
         """The mouse goes on moving, and Blender calls its timer, until so many drafts came."""
         step = 0
 
@@ -118,7 +118,7 @@ def main() -> None:
 
         for first in range(3):
             another(first)
-        measured(f"draft, {what} dragged, 160 x 120", given.drafts, "5 /s", another, pid)
+        measured(f"draft, {what} dragged, 160 x 120", given.drafts, target, another, pid)
         scene.optisense_simulation.draft = False  # a draft that still waits
         while session.engine().waiting:
             time.sleep(session._tick() or 0.0)
@@ -136,9 +136,9 @@ def main() -> None:
     def contact_moved(_: int) -> None:
         contact.location.x += 0.005
 
-    dragged("a light", light_moved)
-    dragged("a cage point", point_moved)
-    dragged("a contact", contact_moved)
+    dragged("a light", light_moved, "8 /s")
+    dragged("a cage point", point_moved, "4 /s")
+    dragged("a contact", contact_moved, "5 /s")
     scene.optisense_simulation.draft = False
     cage = _caged_sheet(scene)
 
