@@ -104,6 +104,27 @@ def under(kind: str = "VIEW_3D", part: str = "UI") -> str:
         return bpy.context.window_manager.clipboard.removeprefix("bpy.ops.")
 
 
+tips: dict[str, str] = {}
+"""Descriptions, as tooltips show them, of the buttons that the mouse came over, by their names."""
+
+
+def description(button: str) -> str:
+    """The description that the tooltip of a button of ours shows; nothing for others.
+
+    Args:
+        button: as `under` tells it.
+    """
+    operator, is_operator, _ = button.partition("(")
+    if is_operator:
+        module, _, name = operator.partition(".")
+        return str(getattr(getattr(bpy.ops, module), name).get_rna_type().description)
+    name = button.rpartition(".")[2]
+    for group in bpy.types.PropertyGroup.__subclasses__():
+        if "optisense" in group.__name__.lower() and name in group.bl_rna.properties:
+            return str(group.bl_rna.properties[name].description)
+    return ""
+
+
 def is_named(button: str, what: str) -> bool:
     """Whether a button is meant by a name.
 
@@ -202,6 +223,7 @@ def _scan(
         found = under(kind, part)
         if found and found not in seen:
             seen.append(found)
+            tips[found] = description(found)
         if is_named(found, what):
             return (x, y)[axis], seen
     return None, seen

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import socket
@@ -22,6 +23,12 @@ PATIENCE = 300.0
 
 FAR = "(state().busy, state().progress, state().per_cent)"
 """What the engine works on, and how far it is."""
+
+CHOICE = 20
+"""Pixels from one choice to the next of a control with pictures in place of words."""
+
+ROOM_ABOVE = 20
+"""Pixels above the files in the window that asks for one: its path and search are there."""
 
 TRIES = 5
 """To close Blender: a key may come before the question that it answers."""
@@ -177,30 +184,52 @@ class Bench(Sidebar):
         across = (0.25, 0.75)[names.index(objective) % 2]
         self.press(f'optisense.choose_objective(objective="{objective}")', across=across)
 
-    def new_sensor(self, name: str) -> None:
-        """Start from a built-in sensor."""
+    def new_sensor(self, name: str, *, panels: bool = True) -> None:
+        """Start from a built-in sensor.
+
+        Args:
+            name: the sensor's.
+            panels: whether all panels are opened then.
+        """
         self.until("bool(part('engine.catalogue').entries('sensors'))")
         names = self.see("[each['name'] for each in part('engine.catalogue').entries('sensors')]")
         x, y = self.find("optisense.open", across=0.25)
         self.choose((x, y - 22), names.index(name))
-        self.until("scene().optisense.is_open and not state().busy")
-        self.open_all()
+        self.until(f"scene().optisense.title == {name!r} and not state().busy")
+        if panels:
+            self.open_all()
 
-    def photograph(self, name: str) -> None:
-        """Keep a picture of this step for the documentation, where that is wanted."""
+    def photograph(self, name: str, part: str = "", start: int = 0, height: int = 0) -> None:
+        """Keep a picture of this step for the documentation, where that is wanted.
+
+        Args:
+            name: of the picture's file.
+            part: `WINDOW` for the 3D view with its sidebar, `UI` for the sidebar; else all.
+            start, height: pixels from the top of that part to what is kept of it, and its height; 0
+                for all.
+        """
         folder = os.environ.get("OPTISENSE_WINDOW_PICTURES")
         if folder:
             self.drawn()
-            self.desktop.picture(Path(folder) / f"{name}.jpg")
+            box = None
+            if part:
+                left, top, width, whole = self.see(f"place('VIEW_3D', {part!r})")
+                box = (left, top + start, left + width, top + start + (height or whole))
+            self.desktop.picture(Path(folder) / f"{name}.jpg", box)
 
-    def press_above_picture(self, what: str) -> None:
-        """Find a control above the picture in the workspace and click on it."""
+    def press_above_picture(self, what: str, number: int = 0) -> None:
+        """Find a control above the picture in the workspace and click on it.
+
+        Args:
+            what: its name.
+            number: place among the choices of a control that has several, the first is 0.
+        """
         left, top, width, height = self.see("place('IMAGE_EDITOR', 'TOOL_HEADER')")
         y = top + height // 2
         where = f"IMAGE_EDITOR TOOL_HEADER {y} {left + 6} {left + width} 8"
         x, seen = self.see(f"along {where} {what}")
         assert x is not None, f"no control '{what}' above the picture; there are: {seen}"
-        self.desktop.click(x + 4, y)
+        self.desktop.click(x + 4 + number * CHOICE, y)
 
     def view(self) -> NDArray[np.int64]:
         """(h, w, 3) what the 3D view shows, 0 to 255."""
@@ -209,10 +238,17 @@ class Bench(Sidebar):
         shown = self.desktop.shown().crop((left, top, left + width, top + height))
         return np.asarray(shown, dtype=np.int64)
 
-    def choose_file(self, name: str = "") -> None:
-        """Click on a file where one is asked for, if a name is given, and then on the button."""
+    def files_shown(self) -> None:
+        """Wait for the window in which a file is asked for, and move it into the display."""
         self.until("any(a.type == 'FILE_BROWSER' for w in manager.windows for a in w.screen.areas)")
         self.until("region('FILE_BROWSER', 'EXECUTE').width > 1")
+        if self.see("place('FILE_BROWSER', 'WINDOW')")[1] < ROOM_ABOVE:
+            self.desktop.bring_down("Blender File View")
+            self.until(f"place('FILE_BROWSER', 'WINDOW')[1] >= {ROOM_ABOVE}")
+
+    def choose_file(self, name: str = "") -> None:
+        """Click on a file where one is asked for, if a name is given, and then on the button."""
+        self.files_shown()
         if name:
             left, top, _, height = self.see("place('FILE_BROWSER', 'WINDOW')")
             for y in range(top + 30, top + height, 10):
@@ -244,16 +280,19 @@ class Bench(Sidebar):
         chosen = self.see("[each.name for each in scene().objects if each.select_get()]")
         assert name in chosen, f"a click on '{name}' selected: {', '.join(chosen) or 'nothing'}"
 
-    def drag(self, start: tuple[float, float], end: tuple[float, float], *, steps: int = 8) -> None:
-        """Press the mouse's button somewhere, move it in steps as a hand does, and let it go."""
-        self.desktop.move(*start)
+    def drag(self, *places: tuple[float, float], steps: int = 8) -> None:
+        """Press the mouse's button at the first place, move it in steps as a hand does to the
+        others, and let it go.
+        """
+        self.desktop.move(*places[0])
         self.drawn()
         self.desktop.press(True)
-        for step in range(1, steps + 1):
-            x, y = (a + (b - a) * step / steps for a, b in zip(start, end, strict=True))
-            self.desktop.move(x, y)
-            self.see("1")
-        self.drawn()
+        for start, end in itertools.pairwise(places):
+            for step in range(1, steps + 1):
+                x, y = (a + (b - a) * step / steps for a, b in zip(start, end, strict=True))
+                self.desktop.move(x, y)
+                self.see("1")
+            self.drawn()
         self.desktop.press(False)
         self.drawn()
 

@@ -92,14 +92,27 @@ class Desktop:
         self._do("type", "--delay", 15, text)
         self.settle()
 
+    def bring_down(self, title: str) -> None:
+        """Move a window whose head is above the display down into it: there is nothing else that
+        places windows.
+        """
+        search = ("search", "--onlyvisible", "--name", title)
+        self._do(*search, "windowmove", "--sync", "x", 0)
+        self.settle()
+
     def shown(self) -> Image.Image:
         """What the display shows."""
         return ImageGrab.grab(xdisplay=self.name).convert("RGB")
 
-    def picture(self, path: Path) -> None:
-        """Keep what the display shows."""
+    def picture(self, path: Path, box: tuple[int, int, int, int] | None = None) -> None:
+        """Keep what the display shows.
+
+        Args:
+            path: file of the picture.
+            box: left, top, right and bottom of the part of it that is kept, pixels.
+        """
         path.parent.mkdir(parents=True, exist_ok=True)
-        picture = self.shown()
+        picture = self.shown().crop(box)
         picture.thumbnail(PAGE)
         picture.save(path, quality=82, optimize=True)
 

@@ -19,6 +19,9 @@ a body is has to be corrected."""
 SECONDS_OF_ACTION = 5.0
 """Seconds in which a person finds a control and uses it; for the handling that is told."""
 
+TABLE = 330
+"""Pixels from the top of the sidebar to below the table of five bodies."""
+
 NEW_SENSOR = 22
 """Pixels from the button *Open* up to the menu *New Sensor*."""
 
@@ -49,7 +52,7 @@ def test_a_picture_from_cad_files_takes_few_actions(bench: Bench) -> None:
         "leds": "lights",
         "lens": "camera",
     }
-    bench.photograph("cad-table")
+    bench.photograph("import", "UI", height=TABLE)
     bench.press("optisense.make_from_cad", across=0.4)
     bench.until("scene().optisense.is_open and not state().busy")
     bench.only(SIMULATE)
@@ -68,10 +71,62 @@ def test_a_picture_from_cad_files_takes_few_actions(bench: Bench) -> None:
     assert actions <= MOST_ACTIONS
 
 
+BODIES = "manager.optisense_cad.bodies"
+FILES_IN = "area('FILE_BROWSER').spaces.active"
+
+ICON = (17, 39)
+"""Pixels from the top left of an editor of files to the picture of the first one, by which marked
+files are dragged."""
+
+
+def test_files_that_are_dropped_on_the_view_are_read(bench: Bench) -> None:
+    """From Blender's own editor of files; what another program drops comes the same way."""
+    folder = bench.home / "dropped"
+    folder.mkdir()
+    for name in FILES[:3]:
+        shutil.copy(PARTS / name, folder)
+    bench.see("setattr(area('PROPERTIES'), 'ui_type', 'FILES')")
+    bench.until(f"{FILES_IN}.params is not None")
+    bench.see(f"setattr({FILES_IN}.params, 'directory', {str(folder)!r}.encode())")
+    bench.see(f"setattr({FILES_IN}, 'show_region_toolbar', False)")
+    bench.until("region('FILE_BROWSER', 'WINDOW').width > 100")
+    left, top, width, height = bench.see("place('FILE_BROWSER', 'WINDOW')")
+    bench.desktop.move(left + width / 2, top + height - 30)
+    bench.drawn()
+    bench.desktop.keys("a")
+    x, y = left + ICON[0], top + ICON[1]
+    bench.until("bool(chosen_file())")
+    view = bench.see("place('VIEW_3D', 'WINDOW')")
+    place = view[0] + 300, view[1] + 400
+    bench.drag((x, y), (x + 60, y + 20), place, steps=12)
+    bench.photograph("cad-dropped")
+    bench.desktop.click(*place)  # Sensor from CAD Files: its entry is under the pointer
+    bench.until(f"len({BODIES}) == 3")
+    bench.rest()
+    assert bench.see(f"{{each.name: each.use for each in {BODIES}}}") == {
+        "gel": "elastomer",
+        "window": "support",
+        "housing": "blocker",
+    }
+    bench.press("optisense.forget_cad", across=0.9)
+    bench.until(f"not {BODIES}")
+
+
+def test_the_folder_of_the_files_is_read(bench: Bench) -> None:
+    bench.see("setattr(area('FILE_BROWSER'), 'ui_type', 'PROPERTIES')")
+    bench.only(0)
+    x, y = bench.find("optisense.open", across=0.25)
+    bench.desktop.click(x, y - NEW_SENSOR)
+    bench.see("1")
+    bench.desktop.keys("End", "Return")
+    bench.choose_file()
+    bench.until(f"len({BODIES}) == {len(FILES)}")
+    bench.rest()
+
+
 def mark_all_files(bench: Bench) -> None:
     """Mark all files that are asked for, by the key A, and click on the button."""
-    bench.until("any(a.type == 'FILE_BROWSER' for w in manager.windows for a in w.screen.areas)")
-    bench.until("region('FILE_BROWSER', 'EXECUTE').width > 1")
+    bench.files_shown()
     left, top, width, height = bench.see("place('FILE_BROWSER', 'WINDOW')")
     bench.desktop.click(left + width / 2, top + height - 20)
     bench.see("1")

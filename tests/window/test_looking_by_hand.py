@@ -15,7 +15,7 @@ from .test_by_hand import LIGHTS, SIMULATE
 LOOKS = "scene().optisense_looks"
 VIEW = "manager.optisense_view"
 PICTURE = "manager.optisense_picture"
-TOLD = "part('looks.footprint').told(scene())"
+TOLD = "part('looks.footprint').in_words(scene())"
 SHOWN = "area('IMAGE_EDITOR').spaces.active.image"
 SIZE = "list(bpy.data.images['OptiSense picture'].size)"
 
@@ -25,6 +25,22 @@ RED = (
     f" for side in (True, False)])(list({SHOWN}.pixels), {SHOWN}.size[0])"
 )
 """Red light relative to green light in the left and in the right half of the picture shown."""
+
+DIFFERENT = 1.1
+"""Least ratio of red to green in a difference of pictures where only red light was added; grey is
+1."""
+
+HELP = {LIGHTS: ("studio", "4 Lights and Camera."), SIMULATE: ("studio", "5 Simulate.")}
+"""Pages of help, and the words at which they open, for some panels."""
+
+HELP_BUTTON = {LIGHTS: 0.85, SIMULATE: 0.77}
+"""Where the question mark is in the head of a panel, 0 is the sidebar's left edge."""
+
+TEXT = "area('TEXT_EDITOR').spaces.active"
+CLOSED = (
+    "[c.__exit__(None, None, None) for c in [bpy.context.temp_override(window=manager.windows[1])]"
+    " if (c.__enter__(), bpy.ops.wm.window_close())]"
+)
 
 CHANGED = 0.02
 """Share of the view's pixels that a section or a footprint changes at least."""
@@ -119,6 +135,14 @@ def test_a_picture_is_compared_with_a_pinned_one(bench: Bench) -> None:
     wiped = bench.see(RED)
     assert wiped[0] == pytest.approx(plain[0], rel=0.02), "the pinned picture is on the left"
     assert wiped[1] > 1.2 * plain[1], "more red light on the right, where the new picture is"
+    bench.press_above_picture("compare", 2)
+    bench.until(f"{VIEW}.compare == 'DIFFERENCE'")
+    bench.photograph("difference")
+    left, right = bench.see(RED)
+    assert min(left, right) > DIFFERENT, "more red light everywhere, and no more green light"
+    assert bench.see(f"min(list({SHOWN}.pixels)[1::4])") == pytest.approx(0.5, abs=0.02), (
+        "grey: as before"
+    )
     bench.press_above_picture("compare")
     bench.until(f"{VIEW}.compare == 'NONE'")
     bench.press_above_picture("false_colour")
@@ -128,3 +152,17 @@ def test_a_picture_is_compared_with_a_pinned_one(bench: Bench) -> None:
     bench.press_above_picture("optisense.unpin_picture")
     bench.until(f"not {VIEW}.pinned and not {VIEW}.false_colour")
     assert bench.see(f"{SHOWN}.name") == "OptiSense picture"
+
+
+def test_the_question_mark_opens_the_page_at_its_panel(bench: Bench) -> None:
+    for panel, (page, begins) in HELP.items():
+        bench.only(panel)
+        topic = begins.partition(" ")[2].rstrip(".")
+        bench.press(f'optisense.help(topic="{topic}")', across=HELP_BUTTON[panel])
+        bench.until("any(a.type == 'TEXT_EDITOR' for w in manager.windows for a in w.screen.areas)")
+        bench.until(f"{TEXT}.text.name == 'OptiSense help: {page}'")
+        shown = f"[line.body for line in {TEXT}.text.lines[{TEXT}.top:{TEXT}.top + 4]]"
+        bench.until(f"any(line.startswith({begins!r}) for line in {shown})")
+        bench.photograph(f"help-{page}-{panel}")
+        bench.see(CLOSED)
+        bench.until("len(manager.windows) == 1")

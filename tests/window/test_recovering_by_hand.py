@@ -7,12 +7,19 @@ The steps build on one another, as a user's do.
 from __future__ import annotations
 
 from .bench import Bench
+from .sidebar import PANELS, ROW
 from .test_by_hand import LIGHTS, SIMULATE, VARY
 from .test_rows_by_hand import EVALUATE
 from .test_searching_by_hand import OPTIMISE
 
 MATERIALS = 2
 """The panel's place in the sidebar; the first is 0."""
+
+COLUMNS = (0.25, 0.75)
+"""Where controls are looked for, 0 is the sidebar's left edge and 1 its right one."""
+
+CONTROLS = 60
+"""Number of controls that are found in all panels at least."""
 
 SEARCH = "scene().optisense_search"
 PROBLEM = "state().problem"
@@ -132,3 +139,19 @@ def test_markers_are_printed_on_the_skin(bench: Bench) -> None:
     bench.until("bool(part('looks.markers').of_design(scene()))")
     bench.drawn()
     bench.photograph("markers")
+
+
+def test_the_tooltip_of_every_control_is_a_sentence(bench: Bench) -> None:
+    left, top, width, height = bench.sidebar()
+    for panel in range(PANELS):
+        bench.only(panel)
+        for across in COLUMNS:
+            x = round(left + width * across)
+            bench.see(f"scan {x} {top + 6} {top + height - 6} {ROW} nothing")
+    found = bench.see("tips")
+    ours = {name: text for name, text in found.items() if name.startswith("optisense")}
+    assert len(ours) >= CONTROLS, ours
+    bad = {name: text for name, text in ours.items() if " " not in text or "_" in text}
+    assert not bad
+    index = next(name for name in found if name.endswith("light_group_index"))
+    assert "selects its lights" in found[index]

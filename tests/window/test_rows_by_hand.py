@@ -39,6 +39,13 @@ ARROW = (
 """Where the arrow along the light of a row begins, nearly ends, and a place beyond, in pixels; not
 seen at a slant, it is 75 pixels times its length long."""
 
+COUNT, PITCH = 3, 2.5
+"""Number of lights of the row that is arranged, and their distance in mm."""
+
+TO_FIELD, FIELD = (50, 9), 23
+"""Pixels from the button *Arrange Row*, to the left and down, to the first field of its dialog,
+which opens with that field under the pointer; and from one field to the next."""
+
 SKIN, GEL = (-6.0, -7.0, 0.0), (12.625, -5.0, -3.2)
 """mm: on the skin, and on the side of the gel below it, where nothing hides them."""
 
@@ -80,7 +87,7 @@ def test_a_row_is_selected_and_moved_by_its_gizmo(bench: Bench) -> None:
     before = bench.see(POSES.format(group))
     lights = LIGHTS_OF.format(group)
     _, start, end = bench.see(ARROW.replace("{lights}", lights))
-    bench.photograph("row")
+    bench.photograph("row", "WINDOW")
     bench.drag(start, end)
     bench.until(f"{POSES.format(group)}[0] != {before[0]!r}")
     after = bench.see(POSES.format(group))
@@ -110,6 +117,32 @@ def test_a_row_is_snapped_to_an_edge_hidden_and_shown_alone(bench: Bench) -> Non
     bench.until(f"[g.name for g in scene().optisense.light_groups if g.shown] == [{group!r}]")
     bench.desktop.click(left + STAR * width, y + ROW * LINE)
     bench.until("all(g.shown for g in scene().optisense.light_groups)")
+
+
+def test_a_row_is_given_another_count_and_pitch(bench: Bench) -> None:
+    group = bench.see(f"scene().optisense.light_groups[{ROW}].name")
+    before = np.array([each["position"] for each in bench.see(POSES.format(group))])
+    x, y = bench.find("optisense.arrange_row", across=0.25)
+    bench.desktop.click(x, y)
+    bench.drawn()
+    bench.enter_at((x - TO_FIELD[0], y + TO_FIELD[1]), str(COUNT), times=1)
+    bench.desktop.click(x - TO_FIELD[0], y + TO_FIELD[1] + FIELD)
+    bench.see("1")
+    bench.desktop.keys("ctrl+a")
+    bench.desktop.write(f"{PITCH:g}")
+    bench.desktop.keys("Return")
+    bench.drawn()
+    bench.photograph("row-asked")
+    bench.desktop.keys("Return")  # OK
+    bench.until(f"len({LIGHTS_OF.format(group)}) == {COUNT}")
+    after = np.array([each["position"] for each in bench.see(POSES.format(group))])
+    steps = np.linalg.norm(np.diff(after, axis=0), axis=1)
+    assert steps == pytest.approx(np.full(COUNT - 1, PITCH), abs=1e-4)
+    assert after.mean(axis=0) == pytest.approx(before.mean(axis=0), abs=1e-4)
+    assert bench.see(f"all(each.select_get() for each in {LIGHTS_OF.format(group)})")
+    bench.over_view()
+    bench.desktop.keys("ctrl+z")
+    bench.until(f"len({LIGHTS_OF.format(group)}) == {len(before)}")
 
 
 def test_a_skin_is_made_in_one_press(bench: Bench) -> None:

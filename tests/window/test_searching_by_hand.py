@@ -16,12 +16,13 @@ import yaml
 
 from .bench import Bench
 from .test_by_hand import FIRST_ROW, VARY
+from .test_rows_by_hand import EVALUATE
 
 STUDY = "gelsight-mini-search-2"
 """Where the second search of the design is kept, beside its folder."""
 
-FILE = "untitled.blend"
-"""Where Blender keeps the scene; the name that it proposes."""
+FILE = "[uU]ntitled.blend"
+"""Where Blender keeps the scene: the name that it proposes, since Blender 5 with a capital."""
 
 GHOSTS = "[e.name for e in kinds('SHOWN') if e.optisense.key.startswith('ghost ')]"
 TOLD = "manager.optisense_found"
@@ -34,6 +35,20 @@ one: there are 972 where the beams of a blue and a green lamp overlap."""
 
 MANY, TRIALS = 5000, 150
 """Trials of a search that is given up, and of one that is not over before Blender is closed."""
+
+SLOW = """
+import time
+
+def height(evaluation):
+    '''How high the gel is; takes two seconds, so that each stage lasts.'''
+    time.sleep(2.0)
+    return float(evaluation.design.deformed_meshes()["gel"].vertices[:, 2].mean())
+"""
+"""An objective of a user's own."""
+
+RAYS = "any(each.optisense.key == 'ray hit' for each in scene().objects)"
+SELECTED = "[each.name for each in scene().objects if each.select_get()]"
+VIEW = "[list(row) for row in area('VIEW_3D').spaces.active.region_3d.view_matrix]"
 
 RANGE = "cages.skin.points[14].z=2:12"
 """Range of the height of the middle of the skin."""
@@ -97,20 +112,21 @@ def test_blender_is_closed_during_a_search(bench: Bench) -> None:
     bench.desktop.keys("ctrl+s")
     bench.choose_file()
     bench.until("bpy.data.filepath and not bpy.data.is_dirty")
-    saved = (bench.home / FILE).stat().st_mtime_ns
+    (file,) = bench.home.glob(FILE)
+    saved = file.stat().st_mtime_ns
     bench.enter("budget", str(TRIALS))
     bench.press("optisense.search", across=0.25)
     bench.until("state().busy == 'Searching'")
     bench.until(GHOSTS)
     assert bench.see("bpy.data.is_dirty"), "else it would be closed without the study's name"
     bench.quit()
-    assert (bench.home / FILE).stat().st_mtime_ns > saved, "Blender asked, and saved it again"
+    assert file.stat().st_mtime_ns > saved, "Blender asked, and saved it again"
     assert 1 < len(finished(bench.home / STUDY)) < TRIALS
 
 
 def test_it_is_offered_and_goes_on_by_one_click(bench: Bench) -> None:
     before = finished(bench.home / STUDY)
-    bench.start(bench.home / FILE)
+    bench.start(*bench.home.glob(FILE))
     bench.until(f"{TOLD}.offer")
     assert f"{STUDY} is not over" in bench.see(f"{TOLD}.offer")
     assert not bench.see(GHOSTS)
@@ -140,12 +156,45 @@ def test_the_best_is_kept_as_a_variant(bench: Bench) -> None:
     assert bench.see(GHOSTS), "it is not in the scene yet"
 
 
-def test_the_ghost_becomes_the_sensor(bench: Bench) -> None:
+def test_the_ghost_becomes_the_sensor_and_all_else_stays(bench: Bench) -> None:
+    bench.only(EVALUATE)
+    bench.press("optisense.show_rays", across=0.25)
+    bench.until(RAYS)
+    bench.rest()
+    camera = bench.see("kinds('CAMERA')[0].name")
+    bench.desktop.click(*bench.see(f"on_screen(bpy.data.objects[{camera!r}].matrix_world"
+                                   ".translation)"))  # fmt: skip
+    bench.until(f"{SELECTED} == [{camera!r}]")
+    bench.over_view()
+    before = bench.see(VIEW)
+    bench.desktop.keys("KP_6")  # turns the view a little
+    bench.until(f"{VIEW} != {before!r}")
+    bench.drawn()
+    view = bench.see(VIEW)
+    while (now := bench.see(VIEW)) != view:  # it turns smoothly
+        view = now
+    bench.only(OPTIMISE)
     bench.press("optisense.apply_best", across=0.25)
     bench.until(f"not state().busy and float({POINTS}[14][2]) > 1.0")
     bench.rest()
     height = bench.see(f"float({POINTS}[14][2])")
     skin = bench.see("max(v.co.z for v in bpy.data.objects['skin'].data.vertices)")
     assert skin == pytest.approx(height / 4, abs=1e-4), "the weight of that point in its middle"
-    assert not bench.see(GHOSTS) and ghost_pixels(bench) < NO_GHOST
+    assert not bench.see(GHOSTS)
+    assert np.allclose(bench.see(VIEW), view, atol=1e-4), "the view stays where it was"
+    assert bench.see(SELECTED) == [camera]
+    bench.until(RAYS)
     bench.photograph("applied")
+
+
+def test_what_a_search_does_before_and_after_its_trials_is_said(bench: Bench) -> None:
+    goal = bench.home / "goal.py"
+    goal.write_text(SLOW)
+    bench.enter("objective", f"{goal}:height")
+    bench.enter("budget", "2")
+    bench.press("optisense.search", across=0.25)
+    for text in ("scoring this sensor", " of 2 trials", "scoring the best again"):
+        bench.until(f"{text!r} in state().progress")
+        bench.photograph(f"search-{text.split()[0]}-{text.split()[-1]}")
+    bench.rest()
+    assert bench.see(f"{TOLD}.ended").startswith("2 trials")
