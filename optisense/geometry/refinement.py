@@ -49,13 +49,13 @@ def refine(
         middles = (vertices[first] + vertices[second]) / 2.0
         length = np.linalg.norm(vertices[first] - vertices[second], axis=1)
         # Edges of the pass before that are still there were short enough.
-        fresh = ~np.isin(key, known, assume_unique=True)
+        fresh = ~_among(key, known)
         cut = np.zeros(len(key), dtype=bool)
         cut[fresh] = length[fresh] > wanted(middles[fresh])
         known = key
         # All triangles choose the same one of several edges of equal length.
         rank = np.empty(len(key), dtype=np.int64)
-        rank[np.lexsort((np.arange(len(key)), length))] = np.arange(len(key))
+        rank[np.argsort(length, kind="stable")] = np.arange(len(key))
         longest = np.argmax(rank[edge], axis=1)
         longest_edge = edge[np.arange(len(edge)), longest]
         while True:
@@ -69,6 +69,14 @@ def refine(
         vertices = np.concatenate([vertices, middles[cut]])
         faces, corner_normals = _cut(faces, corner_normals, edge, longest, cut, added)
     return vertices, faces, corner_normals
+
+
+def _among(keys: IntArray, known: IntArray) -> NDArray[np.bool_]:
+    """Return a mask of the keys (n,) that are in ``known`` (k,); both ascend."""
+    if not len(known):
+        return np.zeros(len(keys), dtype=bool)
+    place = np.searchsorted(known, keys).clip(max=len(known) - 1)
+    return known[place] == keys
 
 
 def _cut(

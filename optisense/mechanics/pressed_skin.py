@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +20,7 @@ from optisense.mechanics.displacement_field import (
 from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import Footprint
 from optisense.mechanics.gel_patch import GelPatch
+from optisense.mechanics.neighbours import Neighbours
 from optisense.mechanics.normal_contact import (
     TOLERANCE,
     NormalContact,
@@ -62,12 +63,15 @@ class Pressed:
         field: the displacement that it causes.
         shear: (2, rows, columns) shear (MPa) along x and y of the grid, if the indenter was
             dragged.
+        beyond: (rows, columns) normal displacement (mm) of the gel in addition to that of a flat
+            layer, on the grid of the gel's patch, if it has one.
     """
 
     place: Footprint
     pressure: FloatArray
     field: DisplacementField
     shear: FloatArray | None = None
+    beyond: FloatArray | None = None
 
     @property
     def force(self) -> float:
@@ -229,11 +233,11 @@ def press(
     """
     contacts: list[Pressed | None] = [None] * len(places)
     overlaps = [place.overlap for place in places]
+    neighbours = Neighbours(places)
     for _ in range(MAX_SWEEPS):
         change = 0.0
         for i, place in enumerate(places):
-            others = [each for j, each in enumerate(contacts) if j != i and each is not None]
-            overlap = place.overlap - _caused_by(others, place)
+            overlap = place.overlap - neighbours.at(i)
             before = contacts[i]
             if before is not None:
                 change = max(change, float(np.abs(overlap - overlaps[i]).max()))
@@ -243,7 +247,8 @@ def press(
                 change = max(change, SETTLED)
             overlaps[i] = overlap
             patch = None if patches is None else patches[i]
-            contacts[i] = _pressed(place, overlap, elasticity, patch, before)
+            solved = contacts[i] = _pressed(place, overlap, elasticity, patch, before)
+            neighbours.fields[i] = solved.field
         if change < SETTLED or len(places) == 1:
             break
     else:
@@ -268,7 +273,7 @@ def _dragged(
     shear = solve_shear(response, contact.pressure, elasticity.friction, wanted)
     x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
     beyond = np.zeros_like(wanted)
-    relaxation = Relaxation()
+    relaxation = Relaxation(beyond)
     for _ in range(MAX_TURNS):
         if patch is None or not shear.any():
             break
@@ -283,7 +288,7 @@ def _dragged(
     else:
         _refuse_unsettled("the shear under an indenter", MAX_TURNS, change)
     contact.field.shear = shear
-    return Pressed(place, contact.pressure, contact.field, shear)
+    return replace(contact, shear=shear)
 
 
 def _refuse_unsettled(what: str, turns: int, change: float) -> None:
@@ -324,9 +329,8 @@ def _pressed(
 ) -> Pressed:
     """Solve one contact; pressure and the correction for the gel's shape are iterated in turn."""
     pressure = None if before is None else before.pressure
-    rough = TOLERANCE if patch is None else FIRST_TOLERANCE
-    solved = _solve(place, overlap, elasticity, pressure, rough)
     if patch is None:
+        solved = _solve(place, overlap, elasticity, pressure, TOLERANCE)
         field = DisplacementField(place, overlap, solved.pressure, elasticity)
         return Pressed(place, solved.pressure, field)
     x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
@@ -335,8 +339,11 @@ def _pressed(
     near = np.ix_(
         *(np.abs(g) <= np.abs(h).max() for g, h in ((patch.y, place.y), (patch.x, place.x)))
     )
-    values = np.zeros(patch.shape)
-    relaxation = Relaxation()
+    known = None if before is None else before.beyond
+    values = np.zeros(patch.shape) if known is None else known
+    beyond = GridSpline(values, *start, pitch).value(x, y).reshape(overlap.shape)
+    solved = _solve(place, overlap - beyond, elasticity, pressure, FIRST_TOLERANCE)
+    relaxation = Relaxation(values)
     deepest = float(overlap.max())
     change = np.inf
     for _ in range(MAX_TURNS):
@@ -355,7 +362,7 @@ def _pressed(
     else:
         _refuse_unsettled("the pressure under an indenter", MAX_TURNS, change)
     field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline, patch)
-    return Pressed(place, solved.pressure, field)
+    return Pressed(place, solved.pressure, field, beyond=values)
 
 
 def _solve(
@@ -367,21 +374,3 @@ def _solve(
 ) -> NormalContact:
     response = grid_response(overlap.shape, place.pitch, place.thickness, elasticity)
     return solve_normal_contact(response, overlap, start, tolerance)
-
-
-def _caused_by(others: list[Pressed], place: Footprint) -> FloatArray:
-    """Return the inward displacement (rows, columns), mm, of the skin on a contact's grid due to
-    other contacts.
-    """
-    result = np.zeros(place.overlap.shape)
-    if not others:
-        return result
-    x, y = np.meshgrid(place.x, place.y)
-    flat = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    points = place.origin + flat @ place.axes.T
-    for other in others:
-        local = other.place.local(points)
-        upright = float(other.place.axes[:, 2] @ place.axes[:, 2])
-        depth = other.field.depth(local[:, 0], local[:, 1])
-        result += (max(upright, 0.0) * depth).reshape(result.shape)
-    return result

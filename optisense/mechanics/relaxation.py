@@ -13,7 +13,7 @@ one far off."""
 
 
 class Relaxation:
-    """Aitken's relaxation of an iteration from 0.
+    """Aitken's relaxation of an iteration.
 
     Iterations over a pressure and the effect of a gel's shape alternate around their limit where a
     gel is softer than the flat layer to which it is compared. The share of a change that is taken
@@ -21,9 +21,9 @@ class Relaxation:
     computer iteration", Int. J. Numer. Methods Eng. 1, 1969).
     """
 
-    def __init__(self) -> None:
-        """Begin an iteration; its first result is taken whole."""
-        self._values: FloatArray = np.zeros(())
+    def __init__(self, start: FloatArray) -> None:
+        """Begin an iteration at values (...); its first result is taken whole."""
+        self._values = start
         self._change: FloatArray | None = None
         self._share = 1.0
 
@@ -31,7 +31,7 @@ class Relaxation:
         """Return the next argument, from the result of the last one.
 
         Args:
-            found: (...) result of the function for the last argument, or for 0.
+            found: (...) result of the function for the last argument.
         """
         change = found - self._values
         if self._change is not None:

@@ -242,3 +242,14 @@ def test_patches_are_kept_for_other_depths_and_forgotten_at_last(monkeypatch):
     monkeypatch.setattr(gel_patches, "MOST_KEPT", 1)
     around((-10.0, 0.0), 0.5)
     assert around((10.0, 0.0), 0.5) is not side
+
+
+def test_skin_that_turns_away_at_once_is_pressed_as_a_flat_layer():
+    # Beside the rim of DIGIT's skin no column has neighbours on both sides.
+    design = load("digit")
+    meshes = design.deformed_meshes()
+    skin, body = meshes["skin"], meshes["gel"]
+    surface = SensingSurface(skin, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+    gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
+    contact = Contact(Sphere(0.5), point=(9.2, -5.79, -3.17), depth=0.3)
+    assert gel.pressed([contact]).contacts[0].force > 0.0
