@@ -159,7 +159,8 @@ def ablations() -> list[Ablation]:
     coherent = property(lambda path: False)
     return [
         shading_only("culled beams", Change(cached, "cull_beams", lambda b, *rest: b)),
-        shading_only("every second pixel", Change(cached, "SPARSE_SHADING_BEAMS", np.inf)),
+        shading_only("every second pixel", Change(cached, "SPARSE_SHADING_BEAMS", np.inf),
+                     Change(cached, "SPARSE_METALLIC_BEAMS", np.inf)),
         shading_only("more samples where grainy", Change(cached, "GRAIN_THRESHOLD", np.inf)),
         shading_only("more samples in small contacts", Change(cached, "MIN_CONTACT_SAMPLES", 0)),
         shading_only("several cells a sample", Change(shading, "CELLS_PER_SAMPLE", 1)),

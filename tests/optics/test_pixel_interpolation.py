@@ -63,11 +63,16 @@ def test_a_sensor_of_many_lights_looks_the_same(monkeypatch: pytest.MonkeyPatch)
     model = OpticalModel(build("gelsight360"), "llvm")
     ball = [Contact(Sphere(radius=2.0), at=(0.0, 0.0), depth=1.0)]
     size = {"resolution": (160, 120), "photons": 300_000, "skin": "conforming"}
-    monkeypatch.setattr(cached, "SPARSE_SHADING_BEAMS", np.inf)
+
+    def skip_pixels_above(beams: float) -> None:
+        for name in ("SPARSE_SHADING_BEAMS", "SPARSE_METALLIC_BEAMS"):
+            monkeypatch.setattr(cached, name, beams)
+
+    skip_pixels_above(np.inf)
     every = model.render(ball, **size)
-    monkeypatch.setattr(cached, "SPARSE_SHADING_BEAMS", 0)
+    skip_pixels_above(0)
     second = model.render(ball, **size)
-    monkeypatch.setattr(cached, "SPARSE_SHADING_BEAMS", np.inf)
+    skip_pixels_above(np.inf)
     noise = model.render(ball, seed=1, **size)
     mask = every.contact_mask
     assert same_light(second.radiance[mask], every.radiance[mask])

@@ -17,7 +17,11 @@ from scipy import ndimage
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.contact_light import beside_layers, mirrored_contact_layers
+from optisense.optics.imaging.contact_light import (
+    MIRRORED_ROUGHNESS,
+    beside_layers,
+    mirrored_contact_layers,
+)
 from optisense.optics.imaging.film import REFERENCE_WIDTH, Film, repeated
 from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.radiance_cache.beams import cull_beams
@@ -55,6 +59,9 @@ RIM_WIDTH = 8.0 / 320.0
 SPARSE_SHADING_BEAMS = 1.5e7
 """Number of beams to sum for an image above which only every second pixel is shaded where the image
 is smooth. Summing so many beams takes about 0.2 s on two cores."""
+SPARSE_METALLIC_BEAMS = 4e6
+"""Value of `SPARSE_SHADING_BEAMS` for metallic coatings, which sum all beams instead of those near
+indenters."""
 GRAIN_SAMPLES = 4
 """Largest number of further camera samples per pixel in grainy places outside contacts; they are
 limited to half of the image's samples. A sample reads one cell of the cache, so that neighbouring
@@ -259,7 +266,7 @@ def render_cached(
             skin = region_image == Region.SENSING
             ring = skin & ~near & (distance <= BESIDE_RANGE * width)
             beside = beside_layers(field, scenes, camera, ring, seed)
-        if field.metallic and not draft:
+        if field.roughness is not None and field.roughness < MIRRORED_ROUGHNESS and not draft:
             lit = mask if only_contacts else rays.hit & (distance <= MIRRORED_RANGE * width)
             mirrored_contacts = mirrored_contact_layers(
                 field, scenes, camera, lit, lit & ~mask, seed
@@ -270,7 +277,8 @@ def render_cached(
         # The number of beams to sum. If it is large, only every second pixel is shaded where its
         # neighbours are similar.
         beams = dr.width(field.beams.ways) / 4 / field.cells.cells
-        sparse = int(far.sum()) * beams > SPARSE_SHADING_BEAMS
+        most = SPARSE_METALLIC_BEAMS if field.metallic else SPARSE_SHADING_BEAMS
+        sparse = int(far.sum()) * beams > most
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
         first = far & ~filled
         pixel = dr.compress(mi.Bool(first.ravel()))

@@ -155,16 +155,26 @@ def _average(
     ``samples`` is the number of samples of each pixel.
     """
 
+    if not where.any():
+        return
+    # Only the rectangle around the region is averaged, with a margin that the kernel reaches.
+    part = tuple(
+        slice(max(0, int(used[0]) - reach // 2), int(used[-1]) + reach // 2 + 1)
+        for used in (np.flatnonzero(where.any(axis=axis)) for axis in (1, 0))
+    )
+    where = where[part]
+
     def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
         for _ in range(2):
             image = ndimage.uniform_filter(image, reach, mode="constant")
         return image
 
-    counts = samples * where
+    counts = samples[part] * where
     near = around(counts)
     share = np.divide(1, near, out=np.zeros_like(near), where=where & (near > 0))
     for layer in layers:
         for k in range(3):
-            if layer[..., k].any():
-                mean = around(layer[..., k] * counts) * share
-                layer[..., k] = np.where(where, mean, layer[..., k])
+            values = layer[*part, k]
+            if values.any():
+                mean = around(values * counts) * share
+                layer[*part, k] = np.where(where, mean, values)

@@ -46,11 +46,6 @@ grazing photon does not become a bright beam."""
 EMPTY_BIN_SHARE = 1e-7
 """Share of all the light below which a direction bin counts as empty."""
 
-BLOCK_BINS = 16
-"""Number of direction bins whose blur is undone at once. The allocator reuses temporary
-arrays of a few megabytes; with new pages for all bins together, it takes two to three times as
-long."""
-
 
 class Tables(NamedTuple):
     """Moments, heights and colours, as in `RadianceCache`."""
@@ -74,7 +69,7 @@ class RadianceCache:
         colours: four floats per entry: the flux density in R, G, B where surfaces are coloured,
             else the same array as ``moments``.
         coloured: whether surfaces are coloured.
-        metallic: whether a coating has a metallic lobe.
+        roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
         narrow_lobes: whether a coating's lobe is narrower than most lamps.
         centres: the middle direction of each bin, and its number as bits; four floats each.
         irradiance: the table of `irradiance.irradiance_table`.
@@ -93,7 +88,7 @@ class RadianceCache:
     heights: mi.Float
     colours: mi.Float
     coloured: bool
-    metallic: bool
+    roughness: float | None
     narrow_lobes: bool
     centres: mi.Float
     irradiance: mi.Float
@@ -102,6 +97,11 @@ class RadianceCache:
     noise: float
     worst_noise: float
     above_surface: Tables | None = None
+
+    @property
+    def metallic(self) -> bool:
+        """Whether a coating has a metallic lobe."""
+        return self.roughness is not None
 
     def binned(self) -> BinnedLight:
         """Return the light by direction bins."""
@@ -148,7 +148,7 @@ class CacheTally:
         kernels: Kernels,
         groups: int,
         coloured: bool,
-        metallic: bool = True,
+        roughness: float | None,
         flux_layer: FluxLayer | None = None,
         directions: DirectionBins = DIFFUSE_BINS,
     ) -> None:
@@ -158,14 +158,14 @@ class CacheTally:
             kernels: the cells and their smoothing.
             groups: number of light groups.
             coloured: whether powers are kept per colour channel.
-            metallic: whether a coating has a metallic lobe.
+            roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
             flux_layer: the layer in which the light above the surface is tallied; None for no
             layer.
             directions: the direction bins.
         """
         self.directions = directions
         self.flux_layer = flux_layer
-        self.metallic = metallic
+        self.roughness = roughness
         self.kernels = kernels
         self.cells = cells = kernels.cells
         self.groups = groups
@@ -373,7 +373,7 @@ class CacheTally:
             heights=heights,
             colours=colours,
             coloured=self.coloured,
-            metallic=self.metallic,
+            roughness=self.roughness,
             narrow_lobes=self.directions.across >= FINEST_BINS.across,
             centres=bin_centres(self.cells, self.directions, used),
             irradiance=table,

@@ -76,7 +76,9 @@ FINE_BINS = DirectionBins(24, 0.6, True)
 FINEST_BINS = DirectionBins(32, 0.6, True)
 """The bins for lobes that are narrower than most lamps."""
 BROAD_LOBE = 0.5
-"""GGX alpha from which on a lobe is so broad that coarse bins suffice."""
+"""GGX alpha from which on a lobe is so broad that coarse bins suffice. At 0.4, coarse bins leave an
+error of 1.6 instead of 1.2 % in a contact in the middle of GelSight Mini. Near its lamps, means
+over patches of a contact would differ by 6 % from those with `FINE_BINS`."""
 NARROW_LOBE = 0.25
 """GGX alpha below which the finest bins are needed: the error in a contact of GelSight Mini of
 alpha 0.05 is 5 % with them and 9 % with the next coarser ones; at 0.4 it is 1.4 and 1.6 %."""

@@ -35,6 +35,11 @@ GelSight Mini of specularity 0.6, the noise at a million photons is then 2.24 % 
 MAX_BOUNCES = 4
 """Largest number of reflections inside a contact; after so many, less than a thousandth of the
 light in the contact of a metal ball is left."""
+NEGLIGIBLE_SHARE = 0.005
+"""Share of the first rays that are left, below which paths end; each further reflection of so few
+costs as much as that of many. In the contact of a ball on GelSight Mini, two reflections are then
+followed at a specularity of 0.6, and one at 1; further ones would add 0.01 % to its light at most,
+and 0.07 % at its rim."""
 PLACE_SHADOW_RAYS = 4.0
 """Number of shadow rays per light group of a place that a ray meets; fewer than for visible points,
 as its light is a small part of a pixel's."""
@@ -89,9 +94,10 @@ def glossy_interreflection(
     looking.seen.pixel = owner
     looking.seen.number = looking.seen.number * directions + lane % directions
     looking.seen.weight = mi.Color3f(1 / directions)
+    least = NEGLIGIBLE_SHARE * lanes * directions
     for _ in range(MAX_BOUNCES):
         seen = _secondary_hits(scenes, looking)
-        if seen is None:
+        if seen is None or dr.width(seen.near) < least:
             break
         looking = shading_points(field, scenes, seen)
         light = light_of(field, scenes, looking)

@@ -325,7 +325,7 @@ class CacheStore:
                     self.kernels,
                     self._lit.table.groups,
                     self._lit.coloured,
-                    self._lit.roughness is not None,
+                    self._lit.roughness,
                     self._flux_layer,
                     self._directions,
                 ),
