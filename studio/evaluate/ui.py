@@ -10,9 +10,9 @@ from ..engine.layout import SidebarPanel, lines_of, paragraph, show_job, show_ou
 from ..simulate.picture import file_icon
 from . import figures, ledger
 
-TITLE, VALUE = 0.28, 0.78
-"""Share of a score's line that the title takes, and share of the rest that value and change take;
-the bar takes what is left.
+TITLE, VALUE, VALUE_AND_CHANGE = 0.3, 0.5, 0.78
+"""Share of a score's line that the title takes, and shares of the rest that a value takes alone and
+with its change; the bar takes what is left.
 """
 
 COLUMNS = 2
@@ -100,7 +100,7 @@ def _line(column: bpy.types.UILayout, score: bpy.types.PropertyGroup) -> None:
     said = scores.with_unit(score.number, score.unit, 3 if sense else 4)
     said = f"{said} {amount}" if sense else said
     if score.has_share:
-        parts = parts.split(factor=VALUE, align=True)
+        parts = parts.split(factor=VALUE_AND_CHANGE if sense else VALUE, align=True)
     parts.label(text=said, icon=ARROWS.get(sense, "NONE"))
     if not score.has_share:
         return
