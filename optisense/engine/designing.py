@@ -81,6 +81,7 @@ class Export(DesignFields):
 
     to: str
     formats: list[str] = Field(default=["stl"])
+    moulds: bool = False
 
 
 @handles("sensors", Fields, Lane.QUICK)
@@ -183,7 +184,8 @@ def export(session: Session, fields: Export, job: Job) -> dict[str, Any]:
     """Write files for the workshop."""
     from optisense.workshop import export as write
 
-    written = write(design_of(session, fields, job), fields.to, fields.formats)
+    design = design_of(session, fields, job)
+    written = write(design, fields.to, fields.formats, with_moulds=fields.moulds)
     return {"files": [str(path) for path in written]}
 
 

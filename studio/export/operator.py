@@ -72,6 +72,10 @@ class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
         description="Write solids for CAD programs; needs the extra 'step' of the package",
     )
 
+    moulds: BoolProperty(
+        name="Moulds", description="Write the moulds in which the gels are cast, too"
+    )
+
     def suggested(self, context: bpy.types.Context) -> str:
         return suggested(context.scene, "-workshop")
 
@@ -97,4 +101,5 @@ class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
             written,
             to=folder,
             formats=formats,
+            moulds=self.moulds,
         )

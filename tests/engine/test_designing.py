@@ -198,6 +198,8 @@ def test_the_library_is_listed_drawn_and_added_to(engine: Any) -> None:
 
 
 def test_files_for_the_workshop(engine: Any, tmp_path: Path) -> None:
-    files = engine.ask("export", design="gelsight-mini", to=str(tmp_path), formats=["stl"])["files"]
+    given = {"design": "gelsight-mini", "to": str(tmp_path), "formats": ["stl"]}
+    files = engine.ask("export", moulds=True, **given)["files"]
+    assert any("mould" in file for file in files)
     assert {Path(file).name for file in files} >= {"gel.stl", "bill-of-materials.csv"}
     assert all(Path(file).is_file() for file in files)
