@@ -108,6 +108,8 @@ class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         paths = self.paths()
+        # The panel with the table may be closed, and the pointer elsewhere: files were dropped.
+        self.report({"INFO"}, "Check in the panel Sensor what each body is")
 
         def read(result: dict[str, Any]) -> None:
             found = now()
