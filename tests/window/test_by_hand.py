@@ -262,4 +262,4 @@ def test_the_workspace_shows_the_picture_whole(bench: Bench) -> None:
     bench.drag((left - 1, top + height / 2), (left - WIDER, top + height / 2))
     bench.until(f"place('IMAGE_EDITOR', 'WINDOW')[0] < {left - WIDER / 2}")
     bench.until(PICTURE_FITS)
-    bench.photograph("workspace")
+    bench.photograph("workspace-wide")

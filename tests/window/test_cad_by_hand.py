@@ -74,6 +74,10 @@ def test_a_picture_from_cad_files_takes_few_actions(bench: Bench) -> None:
 BODIES = "manager.optisense_cad.bodies"
 FILES_IN = "area('FILE_BROWSER').spaces.active"
 
+DRAGS_ALL = 5
+"""Version of Blender whose editor of files drags all marked files; that of 4.3 drags the one under
+the pointer."""
+
 ICON = (17, 39)
 """Pixels from the top left of an editor of files to the picture of the first one, by which marked
 files are dragged."""
@@ -101,13 +105,13 @@ def test_files_that_are_dropped_on_the_view_are_read(bench: Bench) -> None:
     bench.drag((x, y), (x + 60, y + 20), place, steps=12)
     bench.photograph("cad-dropped")
     bench.desktop.click(*place)  # Sensor from CAD Files: its entry is under the pointer
-    bench.until(f"len({BODIES}) == 3")
+    uses = {"gel": "elastomer", "housing": "blocker", "window": "support"}
+    if bench.see("bpy.app.version[0]") < DRAGS_ALL:
+        del uses["housing"], uses["window"]
+    bench.until(f"len({BODIES}) == {len(uses)}")
     bench.rest()
-    assert bench.see(f"{{each.name: each.use for each in {BODIES}}}") == {
-        "gel": "elastomer",
-        "window": "support",
-        "housing": "blocker",
-    }
+    assert bench.see(f"{{each.name: each.use for each in {BODIES}}}") == uses
+    bench.only(0)
     bench.press("optisense.forget_cad", across=0.9)
     bench.until(f"not {BODIES}")
 

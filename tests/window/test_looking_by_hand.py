@@ -122,6 +122,7 @@ def test_a_draft_has_the_size_of_the_picture(bench: Bench) -> None:
     bench.press("optisense.simulate")
     bench.until(f"not {PICTURE}.is_draft")
     bench.rest()
+    bench.photograph("workspace")
 
 
 def test_a_picture_is_compared_with_a_pinned_one(bench: Bench) -> None:
