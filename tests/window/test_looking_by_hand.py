@@ -122,7 +122,6 @@ def test_a_draft_has_the_size_of_the_picture(bench: Bench) -> None:
     bench.press("optisense.simulate")
     bench.until(f"not {PICTURE}.is_draft")
     bench.rest()
-    bench.photograph("workspace")
 
 
 def test_a_picture_is_compared_with_a_pinned_one(bench: Bench) -> None:
@@ -132,7 +131,7 @@ def test_a_picture_is_compared_with_a_pinned_one(bench: Bench) -> None:
     bench.only(LIGHTS)
     bench.enter_at(bench.find("flux", across=0.6), "6")
     bench.until(f"{PICTURE}.is_relit")
-    bench.photograph("wipe")
+    bench.photograph("workspace")
     wiped = bench.see(RED)
     assert wiped[0] == pytest.approx(plain[0], rel=0.02), "the pinned picture is on the left"
     assert wiped[1] > 1.2 * plain[1], "more red light on the right, where the new picture is"
