@@ -19,7 +19,10 @@ LONGEST_WAIT = 3.0
 """Longest time that a render waits for short work at each of its safe points, s."""
 
 GLANCE = 0.002
-"""Time that a render leaves to other threads at each safe point, s, enough to read a request."""
+"""Time that a render leaves to other threads at a safe point, s, enough to read a request."""
+
+GLANCE_EVERY = 0.05
+"""Time between two such pauses at least, s; a draft has six safe points in a tenth of a second."""
 
 Send = Callable[[Mapping[str, Any]], None]
 
@@ -35,6 +38,7 @@ class PriorityGate:
     def __init__(self) -> None:
         """Open the gate: no short work is in progress."""
         self._count = 0
+        self._glanced = 0.0
         self._changed = threading.Condition()
 
     def __enter__(self) -> None:
@@ -50,7 +54,9 @@ class PriorityGate:
 
     def wait_for_short_jobs(self) -> None:
         """Wait until no short work is in progress, or for `LONGEST_WAIT`."""
-        time.sleep(GLANCE)  # the thread that reads requests may have one
+        if time.monotonic() - self._glanced >= GLANCE_EVERY:
+            time.sleep(GLANCE)  # the thread that reads requests may have one
+            self._glanced = time.monotonic()
         with self._changed:
             self._changed.wait_for(lambda: self._count == 0, LONGEST_WAIT)
 
