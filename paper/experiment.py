@@ -63,6 +63,8 @@ class Experiment:
         tables: the numbers for people.
         draw: the picture, of the numbers and the pictures.
         notes: what the reader must know, given the numbers; Markdown paragraphs.
+        again: whether its statements are those of other experiments, so that the page does not
+            count them a second time.
     """
 
     name: str
@@ -73,6 +75,7 @@ class Experiment:
     tables: Callable[[Values], list[Table]]
     draw: Callable[[Values, Pictures], Figure]
     notes: Callable[[Values], list[str]] = lambda numbers: []
+    again: bool = False
 
     def settings(self, quick: bool = False, seeds: int | None = None) -> Values:
         """Those of its YAML file; a quick run changes some, and the user the number of seeds.

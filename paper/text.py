@@ -73,8 +73,10 @@ def _how(name: str, result: Mapping[str, Any]) -> str:
     seconds = result["seconds"]
     seeds = result["settings"].get("seeds")
     over = f", {seeds} seed{'s' if seeds > 1 else ''}" if seeds else ""
+    release = result["versions"].get("optisense", "unknown")
+    by = "an unrecorded release" if release == "unknown" else f"OptiSense {release}"
     return (
-        f"Made by `python -m paper {name}{' --quick' if result['quick'] else ''}`: "
+        f"Made by `python -m paper {name}{' --quick' if result['quick'] else ''}` with {by}: "
         f"{result['units']} evaluations{over}, {seconds['processor'] / 60:.1f} processor minutes. "
         "± is the standard deviation over seeds."
     )
@@ -120,7 +122,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         chapters.append(chapter(experiment, result, f"{beside.name}/{name}.png"))
         spent |= result["spent"]
         verdicts = [claim["verdict"] for claim in result["claims"]]
-        for verdict in verdicts:
+        for verdict in () if experiment.again else verdicts:
             counts[verdict] += 1
         counts_text = ", ".join(_counted(verdicts.count(v), v) for v in counts if v in verdicts)
         rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {counts_text} |")
@@ -178,7 +180,7 @@ $ python -m paper
 $ python -m paper svelte-mirror --quick --seeds 1 --out quick-results
 ```
 
-All experiments in full take about an hour on two processors:
+All experiments in full take about an hour and a half on two processors:
 
 ```console long
 $ python -m paper all --out results
@@ -186,4 +188,8 @@ $ python -m paper all --out results
 
 The same command continues a run that was stopped: what is finished in the folder is not done again.
 Running all experiments together is faster than one after the other, because they share sensors and
-light."""
+light.
+
+Each chapter names the release that made it. Those with an unrecorded release were made on 22
+November 2026: before the light of metal coatings was smoothed as it is now, and with LEDs of
+GelSight360 that are 0.8 mm high instead of 1 mm."""
