@@ -308,6 +308,7 @@ def _areas(model: OpticalModel, sensor: CalibratedSensor) -> FloatArray:
 
 
 def _view(model: OpticalModel, areas: FloatArray, sensor: CalibratedSensor) -> SensorView:
+    from optisense.objectives import Evaluation
     from optisense.optics.transport.chief_rays import pixel_stretching
 
     stretching = pixel_stretching(model.chief_rays(sensor.resolution))
@@ -316,7 +317,7 @@ def _view(model: OpticalModel, areas: FloatArray, sensor: CalibratedSensor) -> S
     smaller = sensor.resolution[0] / model.design.camera.resolution[0]
     longer = smaller * np.sqrt(areas[known] * stretching[known])
     return SensorView(
-        coverage=float(areas.sum() / model.sensing.area),
+        coverage=Evaluation(model).view.skin,
         detail=float(np.median(longer)),
         stretching=float(np.median(stretching[known])),
     )
