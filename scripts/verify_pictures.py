@@ -1,7 +1,8 @@
 """Make the pictures of docs/verify.md and docs/case-studies.md anew.
 
-python scripts/verify_pictures.py             the objects that are pressed
-python scripts/verify_pictures.py DESIGN      GelSight Svelte beside this one
+python scripts/verify_pictures.py                    the objects that are pressed
+python scripts/verify_pictures.py svelte DESIGN      GelSight Svelte beside this one
+python scripts/verify_pictures.py pad START DESIGN   the pad sensor beside this one
 """
 
 from __future__ import annotations
@@ -54,24 +55,30 @@ def _copper() -> object:
     return colormaps["copper"]
 
 
-def mirrors(better: str) -> None:
-    """GelSight Svelte and a design with another mirror, with nine balls pressed into each."""
+SHOWN = {"svelte": ("aoap", "coverage"), "pad": ("reading.mean_of_places", "coverage")}
+"""Scores above the pictures, by the name of the case study."""
+
+
+def side_by_side(case: str, start: str, better: str) -> None:
+    """Two designs with nine balls pressed into each."""
     figure = Figure(figsize=(12, 4.9), layout="constrained")
     for axes, title, name in zip(
-        figure.subplots(1, 2), ("start", "best"), ("gelsight-svelte", better), strict=True
+        figure.subplots(1, 2), ("start", "best"), (start, better), strict=True
     ):
-        design = ots.load(name)
-        aoap, coverage = (ots.evaluate(design, each).value for each in ("aoap", "coverage"))
-        model = ots.OpticalModel(design)
+        model = ots.OpticalModel(ots.load(name))
+        scores = {each: ots.evaluate(model, each).value for each in SHOWN[case]}
         image = model.render(model.nine_contacts(), (480, 360), photons=PHOTONS)
         axes.imshow(image.picture())
-        axes.set_title(f"{title}: AOAP {aoap:.2f}, coverage {coverage:.2f}")
+        told = ", ".join(f"{each} {value:.2f}" for each, value in scores.items())
+        axes.set_title(f"{title}: {told}")
         axes.set_axis_off()
-    figure.savefig(OUT / "case-svelte.png", dpi=75)
+    figure.savefig(OUT / f"case-{case}.png", dpi=75)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        mirrors(sys.argv[1])
+    if len(sys.argv) > 3:
+        side_by_side(sys.argv[1], sys.argv[2], sys.argv[3])
+    elif len(sys.argv) > 2:
+        side_by_side(sys.argv[1], "gelsight-svelte", sys.argv[2])
     else:
         objects()
