@@ -131,6 +131,14 @@ class TriangleMesh:
         return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
     @cached_property
+    def face_spheres(self) -> tuple[FloatArray, FloatArray]:
+        """Centres (m, 3), mm, and squares of the radii (m,), mm^2, of spheres around the faces."""
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        middle = (a + b + c) / 3.0
+        square = [np.einsum("mi,mi->m", each - middle, each - middle) for each in (a, b, c)]
+        return middle, np.maximum(np.maximum(square[0], square[1]), square[2])
+
+    @cached_property
     def face_vectors(self) -> FloatArray:
         """Face normals times twice the face areas, (m, 3) float64, mm^2."""
         a, b, c = self.triangles[:, 0], self.triangles[:, 1], self.triangles[:, 2]

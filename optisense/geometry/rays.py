@@ -46,8 +46,7 @@ def ray_hits(mesh: TriangleMesh, origins: ArrayLike, directions: ArrayLike) -> R
     start = np.asarray(origins, dtype=np.float64).reshape(-1, 3)
     way = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
     corners = mesh.triangles
-    middle = corners.mean(axis=1)
-    reach = ((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1, initial=0.0)
+    middle, reach = mesh.face_spheres
     step = max(1, _PAIRS_AT_ONCE // max(1, len(corners)))
     found = [
         _hits(corners, start[i : i + step], way[i : i + step], middle, reach, i)
@@ -81,7 +80,7 @@ def _hits(
     along = _products(unit, middle) - np.einsum("ri,ri->r", unit, start)[:, None]
     square = np.einsum("ri,ri->r", start, start)[:, None] - 2.0 * _products(start, middle)
     square += np.einsum("ti,ti->t", middle, middle) - reach
-    scale = max(np.abs(start).max(initial=0.0), np.abs(corners).max(initial=0.0))
+    scale = max(np.abs(start).max(initial=0.0), np.abs(middle).max(initial=0.0))
     ray, face = np.nonzero(square - along**2 <= _NEAR * scale**2)
     o, d, a = start[ray], way[ray], corners[face, 0]
     edge_1, edge_2 = corners[face, 1] - a, corners[face, 2] - a

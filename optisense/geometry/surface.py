@@ -94,10 +94,13 @@ class SensingSurface:
         where = np.asarray(point, dtype=np.float64).reshape(3)
         if not np.isfinite(where).all():
             raise ContactError("a contact point is not a finite number", hint="give x,y,z in mm")
-        on_faces = closest_points(self.mesh, where)
+        middle, square = self.mesh.face_spheres
+        away, radius = np.linalg.norm(middle - where, axis=1), np.sqrt(square)
+        near = np.flatnonzero(away - radius <= (away + radius).min())
+        on_faces = closest_points(TriangleMesh(self.mesh.vertices, self.mesh.faces[near]), where)
         distance = np.linalg.norm(on_faces - where, axis=1)
         face = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
-        return face, np.asarray(on_faces[face], dtype=np.float64)
+        return int(near[face]), np.asarray(on_faces[face], dtype=np.float64)
 
     def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
         """Return the place with the smooth normal, so that neighbouring presses have nearly the

@@ -43,7 +43,7 @@ LEAST_UPRIGHT = 0.5
 """Cosine of the steepest slope of the skin against the tangent plane that is modelled, 60 degrees;
 beyond it a dome's skin is too steep for columns over the tangent plane."""
 TILE = 2.0
-"""Side of the squares whose columns are traced together, over the longest column; it bounds the
+"""Side of the cubes whose columns are traced together, over the longest column; it bounds the
 number of faces that are tested."""
 LEAST_LEAVING = -0.5
 """Smallest cosine between the normal of a face and the mean direction of the lines of a tile at
@@ -129,8 +129,9 @@ def gel_columns(
     there &= np.isfinite(at)
     length = np.full(there.shape, np.inf)
     steep = there & (-inward[:, :, 2] < LEAST_UPRIGHT)
-    bodies = [mesh.transformed(pose) for mesh in elastomers]
-    length[there] = _lengths(top[there], inward[there], bodies, THICKEST * thickness)
+    starts = place.origin + top[there] @ place.axes.T
+    ways = inward[there] @ place.axes.T
+    length[there] = _lengths(starts, ways, elastomers, THICKEST * thickness)
     fits = there & (length > THINNEST * thickness) & np.isfinite(length)
     good = fits & ~steep
     cells = good[:-1, :-1] & good[:-1, 1:] & good[1:, :-1] & good[1:, 1:]
@@ -254,12 +255,12 @@ def _lengths(
     result = np.full(len(starts), np.inf)
     if not len(starts):
         return result
-    tiles = np.floor(starts[:, :2] / (TILE * longest)).astype(np.int64)
+    tiles = np.floor(starts / (TILE * longest)).astype(np.int64)
     _, tile = np.unique(tiles, axis=0, return_inverse=True)
     order = np.argsort(tile.ravel(), kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(tile.ravel()[order])) + 1)
     for body in bodies:
-        lowest, highest = body.triangles.min(axis=1), body.triangles.max(axis=1)
+        lowest, highest = body.face_bounds
         normals = body.face_normals
         for group in groups:
             way = ways[group]
