@@ -38,7 +38,7 @@ class OPTISENSE_PG_score(bpy.types.PropertyGroup):
         description="Position between the worst (0) and the best (100) built-in sensor, or "
         "between all "
         "values that the objective can have",
-        get=lambda self: 100.0 * self.share,
+        get=lambda self: round(100.0 * self.share),
     )  # fmt: skip
     has_share: BoolProperty(description="Whether the objective has a scale from worst to best")
     unit: StringProperty()

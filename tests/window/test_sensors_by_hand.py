@@ -26,7 +26,7 @@ OBJECTIVES = ("aoap", "2to3pw", "coverage", "distortion")
 SCORES = "manager.optisense_evaluation.scores"
 FOOTPRINT = "part('looks.footprint').in_words(scene())"
 
-ABOVE, BELOW = 228, 190
+ABOVE, BELOW = 262, 184
 """Pixels from the button *Evaluate* up to the head of its panel, and down to below four scores."""
 
 SIDE, SHARE_UP, TOOLS = 500, 0.08, 64
