@@ -47,6 +47,24 @@ SIMILARITY_CONSTANTS = (0.01 * LEVELS) ** 2, (0.03 * LEVELS) ** 2
 """Constants that keep the similarity finite in dark and uniform places (Wang et al. 2004)."""
 
 
+NOISE_SEED = 0
+"""Seed of the noise with which the similarity of a model without errors is computed."""
+
+
+@dataclass(frozen=True)
+class NoiseFigures:
+    """Figures that a model without any error would have, because photographs are noisy.
+
+    Attributes:
+        unexplained, contact, ring, similarity: see `PressRealism`.
+    """
+
+    unexplained: float
+    contact: float
+    ring: float
+    similarity: float
+
+
 @dataclass(frozen=True)
 class PressRealism:
     """Differences between the model and one photograph of a press, in levels of 255.
@@ -67,6 +85,7 @@ class PressRealism:
             contact, for R, G and B, degrees.
         gain: ratio of the model's brightening along the sensor's direction to the sensor's, for R,
             G and B.
+        noise: figures of a model without errors.
     """
 
     name: str
@@ -79,6 +98,7 @@ class PressRealism:
     similarity: float
     turn: tuple[float, float, float]
     gain: tuple[float, float, float]
+    noise: NoiseFigures
 
 
 @dataclass(frozen=True)
@@ -139,6 +159,10 @@ class Realism:
         """Return the median over the presses of one of their figures."""
         return float(np.median([getattr(press, name) for press in self.presses]))
 
+    def median_of_noise(self, name: str) -> float:
+        """Return the median over the presses of one of the figures of a model without errors."""
+        return float(np.median([getattr(press.noise, name) for press in self.presses]))
+
     def median_reading(self, name: str) -> float:
         """Return the median over the presses of one of the figures of readings; NaN without
         readings.
@@ -196,6 +220,32 @@ def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) ->
         similarity=float(similarity(real, model, SIMILARITY_WINDOW * seen.radius)[patch].mean()),
         turn=turns,
         gain=gains,
+        noise=_noise_figures(real, seen, math.sqrt(_square(real[far]))),
+    )
+
+
+def _noise_figures(real: FloatArray, seen: SeenContact, noise: float) -> NoiseFigures:
+    """Return the figures of a model without errors.
+
+    Args:
+        real: real response (h, w, 3).
+        seen: contact.
+        noise: standard deviation of the noise of the response, levels.
+    """
+    distance = distances(real.shape[:2], seen)
+
+    def share(where: NDArray[np.bool_]) -> float:
+        return noise**2 / max(_square(real[where]), 1e-12)
+
+    window = SIMILARITY_WINDOW * seen.radius
+    smooth = np.asarray(gaussian_filter(real, (0.5 * window, 0.5 * window, 0.0)))
+    noisy = smooth + noise * np.random.default_rng(NOISE_SEED).standard_normal(real.shape)
+    patch = distance <= PATCH
+    return NoiseFigures(
+        unexplained=share(patch),
+        contact=math.sqrt(share(distance <= 1.0)),
+        ring=math.sqrt(share((distance >= RING[0]) & (distance <= RING[1]))),
+        similarity=float(similarity(noisy, smooth, window)[patch].mean()),
     )
 
 

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 LOADING, FITTING = "loading", "fitting"
 """Steps of the progress line."""
 
+COLUMNS = "unexplained", "contact", "ring", "similarity"
+"""Figures of presses whose medians are printed."""
+
 JSON_FILE, PAGE_FILE = "calibration.json", "calibration.html"
 
 
@@ -123,10 +126,15 @@ def print_calibration(found: Calibration) -> None:
         )
     held = bool(found.held_out)
     what = "presses held out" if held else "fitted presses"
-    table = table_of(what, "unexplained", "contact", "ring", "similarity", "background (dB)")
+    table = table_of(what, *COLUMNS, "background (dB)")
     for name, side in (("before", found.before), ("after", found.after)):
         chosen = found.of_presses(side.realism, held_out=held)
         table.add_row(name, *_figures(chosen))
+    table.add_row(
+        "noise alone",
+        *(f"{chosen.median_of_noise(name):.3f}" for name in COLUMNS),
+        "",
+    )
     output.print(table)
     for line in reading_lines(found.of_presses(found.after.realism, held_out=held)):
         output.print(line)
@@ -134,8 +142,7 @@ def print_calibration(found: Calibration) -> None:
 
 
 def _figures(found: Realism) -> list[str]:
-    names = ("unexplained", "contact", "ring", "similarity")
-    return [*(f"{found.median(name):.3f}" for name in names), f"{found.background.ratio:.1f}"]
+    return [*(f"{found.median(name):.3f}" for name in COLUMNS), f"{found.background.ratio:.1f}"]
 
 
 def _asked(text: str) -> tuple[str, float, float]:

@@ -118,6 +118,13 @@ def print_comparison(found: Comparison) -> None:
             f"{press.far:.1f} of {press.far_real:.1f}",
             f"{press.similarity:.2f}",
         )
+    table.add_row(
+        "noise alone",
+        *(f"{found.realism.median_of_noise(name):.2f}" for name in ("unexplained", "contact")),
+        f"{found.realism.median_of_noise('ring'):.2f}",
+        f"{found.realism.median('far_real'):.1f}",
+        f"{found.realism.median_of_noise('similarity'):.2f}",
+    )
     output.print(table)
     ground = found.realism.background
     table = table_of("background", "R", "G", "B")

@@ -10,6 +10,7 @@ from optisense.report.comparison import (
     CONTRAST,
     background_pictures,
     channel_rows,
+    noise_row,
     press_row,
     press_section,
 )
@@ -73,7 +74,8 @@ def render_calibration(found: Calibration) -> str:
         rows=[
             (*press_row(press), "held out" if press.name in found.held_out else "fitted")
             for press in after.realism.presses
-        ],
+        ]
+        + [(*noise_row(after.realism), "")],
         presses=[
             {
                 "name": after.photographs.presses[index].name,
@@ -89,7 +91,9 @@ def render_calibration(found: Calibration) -> str:
 
 
 def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
-    """Return medians before and after, of the presses that were fitted and of those held out."""
+    """Return medians before and after, of the presses that were fitted and of those held out, and
+    those of a model without errors.
+    """
 
     def sides(held_out: bool) -> list[Realism | None]:
         each = [
@@ -99,13 +103,15 @@ def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
         return [side if side.presses else None for side in each]
 
     columns = [*sides(False), *sides(True)]
-    rows = [
-        (words, *("" if each is None else f"{each.median(name):.3f}" for each in columns))
-        for name, words in FIGURES.items()
-    ]
+    after = found.after.realism
+    rows: list[tuple[str, ...]] = []
+    for name, words in FIGURES.items():
+        noise = after.median("far_real") if name == "far" else after.median_of_noise(name)
+        medians = ("" if each is None else f"{each.median(name):.3f}" for each in columns)
+        rows.append((words, *medians, f"{noise:.3f}"))
     for name, words in READINGS.items():
         values = [math.nan if each is None else each.median_reading(name) for each in columns]
-        rows.append((words, *("" if math.isnan(value) else f"{value:.2f}" for value in values)))
+        rows.append((words, *("" if math.isnan(value) else f"{value:.2f}" for value in values), ""))
     ratios = [side.realism.background.ratio for side in (found.before, found.after)]
-    rows.append(("background, dB", *(f"{ratio:.1f}" for ratio in ratios), "", ""))
+    rows.append(("background, dB", *(f"{ratio:.1f}" for ratio in ratios), "", "", ""))
     return rows

@@ -69,7 +69,7 @@ def render_comparison(design: SensorDesign, found: Comparison) -> str:
         background=background_pictures(found),
         channels=channel_rows(found),
         presses=[press_section(found, index) for index in range(len(figures.presses))],
-        rows=[press_row(press) for press in figures.presses],
+        rows=[*(press_row(press) for press in figures.presses), noise_row(figures)],
         readings=reading_rows(figures),
         contrast=f"{CONTRAST:g}",
         patch=f"{PATCH:g}",
@@ -113,6 +113,20 @@ def press_row(press: PressRealism) -> tuple[str, ...]:
         f"{press.far:.1f} / {press.far_real:.1f}",
         " / ".join(f"{turn:.0f}" for turn in press.turn),
         " / ".join(f"{gain:.2f}" for gain in press.gain),
+    )
+
+
+def noise_row(found: Realism) -> tuple[str, ...]:
+    """Return the medians of a model without errors for the table of `press_row`."""
+    return (
+        "noise alone",
+        f"{found.median_of_noise('unexplained'):.3f}",
+        f"{found.median_of_noise('contact'):.2f}",
+        f"{found.median_of_noise('ring'):.2f}",
+        f"{found.median_of_noise('similarity'):.2f}",
+        f"{found.median('far_real'):.1f}",
+        "",
+        "",
     )
 
 

@@ -13,10 +13,11 @@ import pytest
 from typer.testing import CliRunner
 
 import optisense as ots
-from optisense.calibration import Photographs, compare, save_photographs
+from optisense.calibration import PhotographedPress, Photographs, compare, save_photographs
 from optisense.calibration.contact_finding import find_contact
+from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.reading_both_ways import read_both_ways
-from optisense.calibration.realism import similarity
+from optisense.calibration.realism import realism, similarity
 from optisense.calibration.seen_contacts import SeenContact, contact_of, doubts, seen_contacts
 from optisense.cli import app
 from optisense.design import set_value
@@ -66,6 +67,20 @@ def test_a_label_leads_past_a_response_that_is_strongest_inside_the_contact() ->
     assert free.radius < 17.0
     assert math.dist(led.centre, (80.0, 60.0)) < 0.5
     assert 18.0 < led.radius < 26.0
+
+
+def test_a_model_without_errors_has_the_figures_of_noise_alone() -> None:
+    rng = np.random.default_rng(6)
+    plain, response = np.full((120, 160, 3), 120.0), cone((70.0, 60.0), 18.0)
+    noisy = np.round(plain + response + 3.0 * rng.standard_normal(plain.shape))
+    press = PhotographedPress("a.png", noisy.astype(np.uint8), 6.0)
+    photographs = Photographs(plain.astype(np.uint8), (press,))
+    perfect = ModelPictures(1.0, plain, (plain + response,), ())
+    (found,) = realism(photographs, [SeenContact((70.0, 60.0), 18.0)], perfect).presses
+    for name in ("unexplained", "contact", "ring"):
+        assert getattr(found.noise, name) == pytest.approx(getattr(found, name), rel=0.1)
+    assert found.noise.similarity == pytest.approx(found.similarity, abs=0.01)
+    assert found.similarity < 0.99
 
 
 def test_no_contact_is_found_in_noise() -> None:
