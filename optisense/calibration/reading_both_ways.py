@@ -41,6 +41,9 @@ INSIDE = 0.9
 labels and detected positions are off by a tenth.
 """
 
+FLATTEST = 100.0
+"""Largest ratio of a read radius to the true one; a reader that sees no curvature reads it."""
+
 FEWEST = 3
 """Smallest number of presses from which a reader can be calibrated; fewer don't represent other
 places.
@@ -171,10 +174,10 @@ def _pixels(picture: FloatArray, untouched: FloatArray, ball: _Ball) -> Pixels:
 
 
 def _judged(normals: FloatArray, ball: _Ball) -> tuple[float, float]:
-    """Return the ratio of the radius that is read to the ball's, and the mean angle between
-    normals, degrees.
+    """Return the ratio of the radius that is read to the ball's, at most `FLATTEST`, and the mean
+    angle between normals, degrees.
     """
     off = angles_between(normals, tilts_to_normals(ball.tilts))
     along = float((ball.offsets * normals[:, :2]).sum())
-    read = float((ball.offsets**2).sum()) / max(along, 1e-9)
-    return read / ball.radius, float(np.mean(off))
+    curved = float((ball.offsets**2).sum()) / (FLATTEST * ball.radius)
+    return FLATTEST * curved / max(along, curved), float(np.mean(off))
