@@ -24,6 +24,11 @@ FLAT = 0.2
 much.
 """
 
+STRAIGHT = 1e-3
+"""Largest distance of a light from the line of its row, as a share of the row's length: far above
+rounding errors, and far below any bend that is meant.
+"""
+
 EDGE_ANGLE = 30.0
 """Largest angle between the faces of an edge and one of the four sides of the picture, degrees."""
 
@@ -62,6 +67,35 @@ def with_lights_tilted(design: SensorDesign, group: str, angle: float) -> Sensor
         return light.model_copy(update=update)
 
     return _with_lights(design, group, turned)
+
+
+def row_length(design: SensorDesign, group: str) -> float | None:
+    """Return the distance of the outer lights of a group in a straight row, mm; None for others."""
+    places = np.array([light.position for light in design.lights[group].lights])
+    if len(places) < 2:
+        return None
+    off = places - places.mean(axis=0)
+    direction = np.linalg.svd(off, full_matrices=False)[2][0]
+    along = off @ direction
+    length = float(np.ptp(along))
+    if length <= 0.0 or np.abs(off - along[:, None] * direction).max() > STRAIGHT * length:
+        return None
+    return length
+
+
+def with_row_length(design: SensorDesign, group: str, length: float) -> SensorDesign:
+    """Return a design whose lights of a straight row lie closer or farther apart, so that the outer
+    ones have a distance of `length` mm; the middle of the row stays in place.
+    """
+    middle = np.mean([light.position for light in design.lights[group].lights], axis=0)
+    before = row_length(design, group)
+    assert before is not None  # only rows have this number
+
+    def moved(light: Light) -> Light:
+        place = middle + length / before * (np.array(light.position) - middle)
+        return light.model_copy(update={"position": tuple(place.tolist())})
+
+    return _with_lights(design, group, moved)
 
 
 def _with_lights(design: SensorDesign, group: str, change) -> SensorDesign:  # type: ignore[no-untyped-def]

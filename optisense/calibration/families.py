@@ -63,6 +63,16 @@ package.
 LIGHT_TILT_RANGE = 8.0
 """Plausible range of the tilt of a light group, degrees; it may not be soldered flat."""
 
+ROW_RANGE = 0.5
+"""Plausible range of the logarithm of the length of a row of lights: makers rarely publish how many
+lights there are, and three in place of five make a row half as long.
+"""
+
+ROW_LIMITS = 0.2, 1.6
+"""Smallest and largest length of a row of lights, relative to its start: longer ones would reach
+past the parts that they shine into.
+"""
+
 WIDTH_RANGE = 0.3
 """Plausible range of the logarithm of the width of the emission: windows of one package differ by a
 third.
@@ -216,6 +226,21 @@ def _lights(design: SensorDesign) -> list[FitQuantity]:
     return found
 
 
+def _rows(design: SensorDesign) -> list[FitQuantity]:
+    found = []
+    for name in design.lights:
+        length = body_changes.row_length(design, name)
+        if length is not None:
+            found.append(
+                FitQuantity(
+                    f"lights.{name}.row", f"length of the row of {name} lights", "mm", length,
+                    ROW_LIMITS[0] * length, ROW_LIMITS[1] * length, ROW_RANGE, True, True, False,
+                    _of_group(body_changes.with_row_length, name), f"lights.{name}.lights",
+                )
+            )  # fmt: skip
+    return found
+
+
 def _of_group(
     change: Callable[[SensorDesign, str, float], SensorDesign], group: str
 ) -> Callable[[SensorDesign, float], SensorDesign]:
@@ -317,6 +342,7 @@ FAMILIES = {
     "shading": Family("dimming of the picture's corners", _shading),
     "view": Family("field of view and place of the camera across its axis", _view),
     "lights": Family("place and tilt of each light group, along the camera's axis", _lights, False),
+    "rows": Family("length of each straight row of lights", _rows, False),
     "emission": Family("width of the emission of lights", _emission, False),
     "edges": Family("roughness of the edges of rigid transparent parts", _edges, False),
     "coating": Family("specularity and reflectance of the coating", _coating, False),

@@ -47,6 +47,18 @@ def test_lights_move_along_the_axis_of_the_camera_and_tilt_towards_the_skin() ->
     assert tilted[0].direction == pytest.approx((cosine, 0.0, sine))
 
 
+def test_rows_of_lights_become_longer_about_their_middle() -> None:
+    design = gelsight_mini(leds_per_group=3)
+    made = changed(design, "rows", "row of green", 12.0).lights["green"].lights
+    assert [light.position[1] for light in made] == pytest.approx([-6.0, 0.0, 6.0])
+    for one, other in zip(design.lights["green"].lights, made, strict=True):
+        assert one.position[::2] == pytest.approx(other.position[::2])
+        assert one.direction == other.direction
+    assert quantities_of(gelsight_mini(leds_per_group=1), ["rows"]) == []
+    rings = quantities_of(ots.load("gelsight360"), ["rows"])
+    assert "length of the row of base lights" not in [each.words for each in rings]
+
+
 def test_edges_are_those_towards_the_sides_of_the_picture() -> None:
     made = changed(gelsight_mini(), "edges", "roughness", 0.4)
     for name in ("guide", "tray"):
