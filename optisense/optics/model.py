@@ -81,7 +81,6 @@ class OpticalModel(RayModel):
     @property
     def _store(self) -> CacheStore:
         if self._caches is None:
-            bound_memory()  # memory of earlier models
             self._caches = self._new_store()
         return self._caches
 
@@ -171,6 +170,7 @@ class OpticalModel(RayModel):
                 raise RenderError(f"{name} is {value}", hint="give a number above 0")
         number = None if photons is None else _photons_of(photons)
         began = time.perf_counter()
+        bound_memory()
 
         listener = progress or self.listener
 
