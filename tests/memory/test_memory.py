@@ -49,6 +49,8 @@ def test_what_one_model_has_freed_is_given_back_before_the_next(
     """Where a process takes up more than the bound, which here is anything at all."""
     flushed: list[float] = []
     monkeypatch.setattr(memory, "MOST_RESIDENT", 0)
+    monkeypatch.setattr(memory, "LEAST_FREED", -float("inf"))
+    monkeypatch.setattr(memory._Bound, "resident", 0)
     flush = dr.flush_malloc_cache
 
     def noted() -> None:
