@@ -27,7 +27,13 @@ ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCKS = {page: blocks(page) for page in PAGES}
 
-IN_THE_CLONE = ("README.md", "experiments.md", "install.md", "your-sensor.md")
+IN_THE_CLONE = (
+    "README.md",
+    "case-studies.md",
+    "experiments.md",
+    "install.md",
+    "your-sensor.md",
+)
 """Pages that say that their commands are typed in the folder of the clone."""
 ACTIVATING = ("README.md",)
 """Pages that activate the virtual environment themselves."""
