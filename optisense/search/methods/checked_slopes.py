@@ -119,6 +119,7 @@ class SlopeEvaluator(PickledWithoutCaches):
         parts: list[str],
         objective: str,
         resolution: int,
+        seed: int,
         layers: bool = False,
     ) -> None:
         """Store the settings; nothing is traced yet.
@@ -128,6 +129,8 @@ class SlopeEvaluator(PickledWithoutCaches):
             parts: names of the parts that points move.
             objective: name of the score that is climbed.
             resolution: number of rays across the image.
+            seed: seed of the search. Trials that are scored again with another seed need no
+                gradients, and get none.
             layers: True if `usual` relights layers, so that all gradients are differences of its
                 scores.
         """
@@ -135,6 +138,7 @@ class SlopeEvaluator(PickledWithoutCaches):
         self.parts = parts
         self.objective = objective
         self.resolution = resolution
+        self.seed = seed
         self.layers = layers
         limited = [each.objective().name for each in usual.requirements]
         self.wanted = [objective, *limited]
@@ -145,7 +149,7 @@ class SlopeEvaluator(PickledWithoutCaches):
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
         """See `Evaluator`."""
         outcome = self.usual(vector, seed)
-        if outcome.failed:
+        if outcome.failed or seed != self.seed:
             return outcome
         began = time.perf_counter()
         try:

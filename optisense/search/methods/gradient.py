@@ -148,7 +148,10 @@ class Gradient(Method):
             return usual
         relit = self.source is GradientSource.LAYERS
         scored = RelitEvaluator(usual) if relit else usual
-        return SlopeEvaluator(scored, self.parts, self.objective, self.resolution, layers=relit)
+        seed = self.problem.seed
+        return SlopeEvaluator(
+            scored, self.parts, self.objective, self.resolution, seed, layers=relit
+        )
 
     def ask(self) -> FloatArray:
         """Return the next points (k, n) that L-BFGS-B needs; none when all ascents have
