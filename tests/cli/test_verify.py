@@ -15,7 +15,7 @@ from optisense.geometry.objects import OBJECTS
 from optisense.search import search
 
 TINY = ("--quick", "--object", "nut", "--places", "1", "--presses", "2", "--photons", "30000")
-TINY += ("--resolution", "48x36")
+TINY += ("--resolution", "64x48")
 
 
 def run(*arguments: str) -> tuple[int, str, str]:
