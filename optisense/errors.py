@@ -65,6 +65,10 @@ class ObjectiveError(OptiSenseError):
     """An objective is unknown, can't be loaded, or can't score a sensor."""
 
 
+class UnknownPartError(ObjectiveError):
+    """An expression names a part that its objective does not have, so no sensor can be scored."""
+
+
 class SetupError(OptiSenseError):
     """A component, such as libLLVM, is missing or too old on this machine."""
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from optisense.errors import ObjectiveError
+from optisense.errors import ObjectiveError, UnknownPartError
 from optisense.near import suggestion
 from optisense.objectives import figures
 from optisense.objectives.expressions import Expression, ScoreTerm
@@ -87,7 +87,8 @@ def _measured(
     """Return the value of each quantity, and the parts of each objective.
 
     Raises:
-        ObjectiveError: an objective fails, or has no such number among its parts.
+        ObjectiveError: an objective fails.
+        UnknownPartError: an objective has no such number among its parts.
     """
     scores = {}
     for name, each in terms.items():
@@ -106,7 +107,7 @@ def _measured(
                 if isinstance(value, int | float) and not isinstance(value, bool)
             }
             if quantity.part not in numbers:
-                raise ObjectiveError(
+                raise UnknownPartError(
                     f"{quantity.objective} has no part '{quantity.part}'",
                     hint=suggestion(quantity.part, numbers, limit=30),
                 )

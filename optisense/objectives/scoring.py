@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from optisense.errors import ObjectiveError, OptiSenseError, SetupError
+from optisense.errors import ObjectiveError, OptiSenseError, SetupError, UnknownPartError
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.files import place_of
 from optisense.objectives.registry import Objective
@@ -25,6 +25,7 @@ def run_objective(
 
     Raises:
         SetupError: the renderer can't run on this machine.
+        UnknownPartError: the objective is an expression with a part that does not exist.
     """
     began = time.perf_counter()
 
@@ -47,7 +48,7 @@ def run_objective(
         value, parts, arrays, draw = _read(result)
         low, high = objective.bounds(settings)
         parts = json_ready(parts)
-    except SetupError:
+    except (SetupError, UnknownPartError):
         raise
     except OptiSenseError as error:
         return failed(str(error))

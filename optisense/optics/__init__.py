@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
+    from optisense.optics.coarse import CoarseModel
     from optisense.optics.imaging.tactile_image import TactileImage
     from optisense.optics.ledger import LightLedger, light_ledger
     from optisense.optics.light_at_camera import CameraLight, camera_light
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 _HOMES = {
     "CameraLight": ".light_at_camera",
     "ChiefRays": ".transport.chief_rays",
+    "CoarseModel": ".coarse",
     "LightLedger": ".ledger",
     "OpticalModel": ".model",
     "PlaceLight": ".place_light",
@@ -34,6 +36,7 @@ _HOMES = {
 __all__ = [
     "CameraLight",
     "ChiefRays",
+    "CoarseModel",
     "LightLedger",
     "OpticalModel",
     "PlaceLight",

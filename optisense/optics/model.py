@@ -72,6 +72,9 @@ class OpticalModel(RayModel):
     is_draft = False
     """Whether images are drafts, coarser and faster."""
 
+    store_type: type[CacheStore] = CacheStore
+    """Kind of the store of radiance caches."""
+
     listener: Callable[[RenderProgress], None] | None = None
     """A function that is called with the progress of images if `render` is given no other."""
 
@@ -86,7 +89,7 @@ class OpticalModel(RayModel):
 
     def _new_store(self) -> CacheStore:
         rays = self.chief_rays(VIEW_RESOLUTION)
-        return CacheStore(LitScene.of(self.scenes), rays.points[rays.hit])
+        return self.store_type(LitScene.of(self.scenes), rays.points[rays.hit])
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
         if self._caches is not None:

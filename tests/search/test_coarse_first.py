@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import pytest
+from comparing import SCORE_ROUNDING
 
+import optisense as ots
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
+from optisense.objectives import Evaluation, Settings
 from optisense.search import SearchResult, Study, run_study, search
-from optisense.search.evaluation.coarse import coarse_settings
+from optisense.search.evaluation.coarse import CONTACT_PIXELS, CoarseEvaluator, coarse_settings
+from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchProgress
@@ -81,6 +85,7 @@ def test_a_search_that_was_stopped_amid_full_scores_ends_alike(
     [
         ("aoap", "cma-es", "no objective or condition of this search needs pictures"),
         ("reading", "gradient", "gradient can't search by coarse scores"),
+        ("reading", "cma-es", "trials render no image"),
     ],
 )
 def test_coarse_scores_that_do_not_fit_are_refused(
@@ -91,13 +96,39 @@ def test_coarse_scores_that_do_not_fit_are_refused(
         search(mini, space, goal, method=method, coarse_first=True)
 
 
-def test_coarse_scores_take_half_the_pixels_across_and_one_image(mini: SensorDesign) -> None:
+def test_coarse_scores_take_fewer_pixels_and_photons_and_one_image(mini: SensorDesign) -> None:
     assert coarse_settings(mini, FULL) == {
-        "resolution": [320, 240],
+        "resolution": [160, 120],
         "photons": 125_000,
         "together": True,
     }
     small = {"resolution": [160, 120], "photons": 20_000, "depth": 0.2}
-    assert coarse_settings(mini, small) == {**small, "together": True}
-    usual = coarse_settings(mini, {"photons": "normal"})
+    assert coarse_settings(mini, small, 1.0) == {**small, "together": True}
+    usual = coarse_settings(mini, {"photons": "normal"}, 0.5)
     assert (usual["resolution"], usual["photons"]) == ([320, 240], 125_000)
+
+
+@pytest.mark.parametrize("name", ["gelsight-mini", "gelbelt"])
+def test_the_smallest_contact_keeps_enough_pixels(name: str) -> None:
+    design = ots.load(name)
+    space = SearchSpace({"coating.specularity": (0.0, 1.0)}).bind(design)
+    evaluator = CoarseEvaluator(DesignEvaluator(space, ["reading"], FULL))
+    evaluation = Evaluation(
+        ots.OpticalModel(design), Settings(resolution=evaluator.used_settings["resolution"])
+    )
+    image = evaluation.model.render(
+        evaluation.contacts, resolution=evaluation.resolution, photons=20_000, skin="conforming"
+    )
+    pixels = image.contact_mask.sum() / len(evaluation.contacts)
+    assert 0.8 * CONTACT_PIXELS < pixels < 2.5 * CONTACT_PIXELS
+
+
+def test_a_coarse_score_does_not_depend_on_the_designs_before(mini: SensorDesign) -> None:
+    space = SearchSpace({"lights.*.shift.z": (0.0, 1.0), "coating.specularity": (0.0, 1.0)})
+    usual = DesignEvaluator(space.bind(mini), ["rgb2normal"], {"photons": 100_000})
+    points = [usual.space.start, usual.space.upper]
+    one, other = CoarseEvaluator(usual), CoarseEvaluator(usual)
+    first, second = (one(point, 0).scores["rgb2normal"] for point in points)
+    again = [other(point, 0).scores["rgb2normal"] for point in reversed(points)]
+    assert again == pytest.approx([second, first], abs=SCORE_ROUNDING)
+    assert abs(first - second) > 100 * SCORE_ROUNDING

@@ -12,7 +12,7 @@ import pytest
 
 from optisense import set_value
 from optisense.design import SensorDesign
-from optisense.errors import SearchError
+from optisense.errors import SearchError, UnknownPartError
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.registry import WATCHED, forgetting, objective
 from optisense.search import SearchSpace, Study, search
@@ -322,3 +322,10 @@ def test_the_start_may_break_a_condition(mini: SensorDesign) -> None:
     assert not result.start.is_feasible
     assert result.best.is_feasible
     assert any("which is allowed" in note for note in result.notes)
+
+
+def test_a_part_that_does_not_exist_ends_a_search_before_its_trials(svelte: SensorDesign) -> None:
+    with pytest.raises(UnknownPartError, match="aoap has no part 'nothing'") as told:
+        search(svelte, {"cages.M1.blend": (0.0, 1.0)}, "aoap", require="aoap.nothing >= 0.1")
+    assert "coverage" in str(told.value.hint)
+    assert "No trial was finished" in str(told.value.hint)

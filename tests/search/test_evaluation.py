@@ -17,6 +17,7 @@ from optisense.design.difference import differences, fingerprint
 from optisense.errors import ObjectiveError, SearchError
 from optisense.search import Around, SearchSpace
 from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.evaluation.relit import RelitEvaluator, is_relit
 from optisense.search.space.constraints import NoCrossings, UserRule, why_forbidden
 
 LOW = {"photons": 200_000, "resolution": (160, 120), "together": True}
@@ -231,3 +232,27 @@ def test_a_camera_that_sees_nothing_worth_a_score_has_none(
         evaluator = DesignEvaluator(space, [objective], {"ray_resolution": [80, 60]})
         outcome = evaluator(np.array([value]), 0)
         assert outcome.failure is not None and reason in outcome.failure, objective
+
+
+def test_trials_over_powers_have_the_scores_of_their_own_renderings(mini: SensorDesign) -> None:
+    settings = {"photons": 100_000, "resolution": [160, 120]}
+    goals = ["rgb2normal", "reading", "coverage"]
+    space = SearchSpace({"lights.*.flux": (1.0, 6.0)}).bind(mini)
+    usual = DesignEvaluator(space, goals, settings)
+    assert is_relit(usual)
+    relit, point = RelitEvaluator(usual), [1.5, 4.0, 2.5]
+    rendered = usual(np.array(point), 3).scores
+    assert dict(relit(np.array(point), 3).scores) == pytest.approx(rendered, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("path", "goal"),
+    [
+        ("coating.specularity", "reading"),
+        ("lights.red.flux", "shadow"),
+        ("lights.red.flux", "aoap"),
+    ],
+)
+def test_other_searches_render_each_trial(mini: SensorDesign, path: str, goal: str) -> None:
+    space = SearchSpace({path: (0.5, 1.0)}).bind(mini)
+    assert not is_relit(DesignEvaluator(space, [goal]))

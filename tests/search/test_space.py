@@ -143,6 +143,17 @@ class TestPoses:
         )
         assert design.lights["green"] == mini.lights["green"]
 
+    def test_lights_of_a_group_are_aimed_each_where_it_is(self, mini: SensorDesign) -> None:
+        space = SearchSpace({"lights.red.aim.z": (-90.0, 90.0)}).bind(mini)
+        aimed = space.apply([30.0])
+        for before, after in zip(
+            mini.lights["red"].lights, aimed.lights["red"].lights, strict=True
+        ):
+            assert after.position == pytest.approx(before.position)
+            assert np.dot(after.direction, before.direction) == pytest.approx(np.cos(np.pi / 6))
+        with pytest.raises(DesignError, match="aim"):
+            SearchSpace({"parts.guide.aim.z": (-1.0, 1.0)}).bind(mini)
+
     def test_single_lights_and_the_camera(self, mini: SensorDesign) -> None:
         space = SearchSpace(
             {

@@ -124,6 +124,7 @@ class CacheStore:
     """Whether the pilot photons also estimate the distribution of the light: where it grazes,
     indenters are then lit by the flux layer above the surface, and where it varies, kernels are
     narrower."""
+    pilot_photons = PILOT_PHOTONS
     groups: frozenset[int] | None = None
     """The light groups whose light is traced; all groups if None."""
 
@@ -199,7 +200,7 @@ class CacheStore:
         if self._guide is None:
             lit, lights = self._lit, self._lit.table.count
             cells, near = self._target
-            per_light = max(1, PILOT_PHOTONS // lights)
+            per_light = max(1, self.pilot_photons // lights)
             arrived, landed = trace_pilot(
                 lit.scene if lit.pilot is None else lit.pilot,
                 Emission(lit.table, uniform_guide(lights), per_light, seed_of(0, 1)),

@@ -7,15 +7,14 @@ import os
 import re
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from copy import copy
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import Role, SensorDesign
-from optisense.errors import OptiSenseError, SearchError, SetupError
+from optisense.errors import OptiSenseError, SearchError, SetupError, UnknownPartError
 from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.combined import goal_of
 from optisense.objectives.evaluation import ProgressCallback
@@ -25,7 +24,6 @@ from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
 from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_score
-from optisense.search.evaluation.coarse import coarse_settings
 from optisense.search.evaluation.models import ModelKeeper
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
@@ -103,8 +101,12 @@ class DesignEvaluator(PickledWithoutCaches):
         kept: constraints on points of the space, taken from the starting design; manufacturing
             errors may break them.
         renders: whether any goal needs the renderer.
+        apart: the argument of this name.
         variant: variant of the renderer.
+        coarse: whether images are coarse.
     """
+
+    coarse: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -155,7 +157,8 @@ class DesignEvaluator(PickledWithoutCaches):
             self.constraints.append(NoCrossings(space.design))
         if any(name.startswith("cages.") for name in space.names):
             self.constraints.append(NoFolds(space.design))
-        self.keeper = ModelKeeper(variant)
+        self.apart = apart
+        self.keeper = ModelKeeper(variant, coarse=self.coarse)
         self.renders = bool(self._objectives or self.requirements)
         self.kept: list[Constraint] = []
         if keeps:
@@ -175,12 +178,6 @@ class DesignEvaluator(PickledWithoutCaches):
             return self.failed(str(error), began)
         return self.judge(design, seed, self.kept)
 
-    def coarse(self) -> DesignEvaluator:
-        """Return an evaluator of coarse scores (see `coarse_settings`); both share one model."""
-        other = copy(self)
-        other.settings = coarse_settings(self.space.design, self.settings)
-        return other
-
     def lost(self, design: SensorDesign) -> str | None:
         """The reason why a point's design departs too far from the starting design, or None."""
         return why_forbidden(design, self.kept)
@@ -194,7 +191,7 @@ class DesignEvaluator(PickledWithoutCaches):
             further: constraints beside those of `constraints`.
 
         Raises:
-            SetupError: the renderer can't run on this machine.
+            SetupError, UnknownPartError: no design can be scored.
         """
         began = time.perf_counter()
         try:
@@ -202,7 +199,7 @@ class DesignEvaluator(PickledWithoutCaches):
             if reason is not None:
                 return self.failed(reason, began)
             scores, parts, failures = self._score(design, seed)
-        except SetupError:
+        except (SetupError, UnknownPartError):
             raise
         except OptiSenseError as error:
             return self.failed(str(error), began)
@@ -216,6 +213,11 @@ class DesignEvaluator(PickledWithoutCaches):
         it.
         """
         self._progress = callback
+
+    @property
+    def used_settings(self) -> Mapping[str, Any]:
+        """The settings with which designs are scored."""
+        return self.settings
 
     def usual_score(self) -> UsualScore | None:
         """Return the usual duration of a score, or None if all goals are functions of the
@@ -254,7 +256,7 @@ class DesignEvaluator(PickledWithoutCaches):
             seed: seed of the objectives.
             only: names of the objectives to score; all if None.
         """
-        settings = dict(self.settings)
+        settings = dict(self.used_settings)
         if self._asks_view and "least_skin" not in settings:
             if self._least_skin is None:
                 self._least_skin = least_skin(self.space.design, self.keeper)

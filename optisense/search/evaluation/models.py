@@ -19,13 +19,15 @@ if TYPE_CHECKING:
 class ModelKeeper(PickledWithoutCaches):
     """Keeper of the optical model for designs that are variations of one design."""
 
-    def __init__(self, variant: str = "auto") -> None:
+    def __init__(self, variant: str = "auto", *, coarse: bool = False) -> None:
         """Store the variant; the model is built on first use.
 
         Args:
             variant: variant of the renderer.
+            coarse: whether images are coarse (see `optisense.optics.coarse`).
         """
         self.variant = variant
+        self.coarse = coarse
 
     def model(self, design: SensorDesign) -> OpticalModel:
         """Return the model of a design. It replaces the model returned before, which must no longer
@@ -35,9 +37,10 @@ class ModelKeeper(PickledWithoutCaches):
             OptiSenseError: the design can't be built.
         """
         if self._model is None:
-            from optisense.optics import OpticalModel
+            from optisense.optics import CoarseModel, OpticalModel
 
-            self._model = OpticalModel(design, variant=self.variant)
+            kind = CoarseModel if self.coarse else OpticalModel
+            self._model = kind(design, variant=self.variant)
         else:
             self._model.set_design(design)
         return self._model

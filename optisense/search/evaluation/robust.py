@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.errors import OptiSenseError
+from optisense.errors import OptiSenseError, UnknownPartError
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import CONDITIONS
 from optisense.objectives.usual_score import UsualTrials
@@ -82,6 +82,8 @@ class RobustEvaluator:
         for errors in self._errors(bound):
             try:
                 found.append(self.usual.judge(bound.apply(errors), seed))
+            except UnknownPartError:
+                raise
             except OptiSenseError as error:
                 found.append(self.usual.failed(str(error), began))
         scores, parts = {}, {}

@@ -38,6 +38,7 @@ import numpy as np
 from optisense.errors import SearchError
 from optisense.search.evaluation.evaluator import RELIT, DesignEvaluator, Evaluator
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.relit import RelitEvaluator
 from optisense.search.evaluation.requirements import Requirement
 from optisense.search.evaluation.views import SameMirrors, may_change_view
 from optisense.search.methods.augmented_lagrangian import KEPT, ROUNDS, AugmentedLagrangian
@@ -62,7 +63,6 @@ from optisense.search.methods.gradient_sources import (
     source_of,
 )
 from optisense.search.methods.jacobian import moving_parts
-from optisense.search.methods.light_colours import RelitEvaluator
 from optisense.search.methods.score_differences import STEP
 from optisense.search.space.search_space import BoundSpace
 

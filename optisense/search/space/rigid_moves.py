@@ -45,6 +45,15 @@ class GroupTurn(_Move):
         return _with_poses(design, self.name, turn, middle - turn @ middle)
 
 
+class GroupAim(_Move):
+    """Turn of each light of a group about an axis of the design through its own position."""
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        for index in range(len(design.lights[self.name].lights)):
+            design = LightTurn(self.path, self.name, self.axis, index).apply(design, value)
+        return design
+
+
 @dataclass(frozen=True)
 class LightShift(_Move):
     """Shift of one light along an axis of the design."""

@@ -7,6 +7,7 @@ These look like other paths but lead to no single number of a design:
 |---|---|
 | `lights.GROUP.shift.x` | moves all lights of a group along x, y or z, mm |
 | `lights.GROUP.turn.x` | turns a group about an axis through its middle, degrees |
+| `lights.GROUP.aim.x` | turns each light of a group about an axis through its own position |
 | `lights.GROUP.lights[0].shift.x`, `.turn.x` | the same for one light |
 | `camera.turn.x` | turns the camera about its own right (x), up (y) or viewing axis (z), degrees |
 | `parts.PART.shift.x` | moves a part, mm |
@@ -37,6 +38,7 @@ from optisense.search.space.design_variables import (
 )
 from optisense.search.space.rigid_moves import (
     CameraTurn,
+    GroupAim,
     GroupShift,
     GroupTurn,
     LightShift,
@@ -48,6 +50,7 @@ from optisense.search.space.rigid_moves import (
 MOVES: dict[tuple[str, str], Callable[[str, str, int], DesignVariable]] = {
     ("lights", "shift"): GroupShift,
     ("lights", "turn"): GroupTurn,
+    ("lights", "aim"): GroupAim,
     ("camera", "turn"): CameraTurn,
     ("parts", "shift"): PartShift,
     ("parts", "turn"): PartTurn,
@@ -62,10 +65,12 @@ def find_variables(design: SensorDesign, path: str) -> list[DesignVariable]:
             design.
     """
     move = re.fullmatch(
-        r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn)(?:\.([^.]+))?", path
+        r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn|aim)(?:\.([^.]+))?", path
     )
     if move is not None:
         section, name, camera, what, letter = move.groups()
+        if what == "aim" and section != "lights":
+            return []
         return _moves(design, path, section or camera, name or "", what, letter)
     single = re.fullmatch(
         r"lights\.([^.\[\]]+)\.lights\[(\d+)\]\.(shift|turn|model)(?:\.([xyz]))?", path

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 from optisense.errors import SearchError
 from optisense.objectives.usual_score import UsualTrials
+from optisense.search.evaluation.coarse import CoarseEvaluator
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
+from optisense.search.evaluation.relit import RelitEvaluator, is_relit
 from optisense.search.methods import Method
 from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.study import Study
@@ -25,6 +27,9 @@ def evaluators(study: Study, usual: DesignEvaluator, method: Method) -> tuple[Ev
         SearchError: the study has manufacturing errors, which the method can't apply.
     """
     own = method.evaluator(usual)
+    if own is usual and study.settings.errors is None and is_relit(usual):
+        relit = RelitEvaluator(usual)
+        return relit, relit
     if study.settings.errors is not None and own is not usual:
         raise SearchError(
             f"{study.settings.method} can't search with manufacturing errors: it scores in a way "
@@ -33,7 +38,9 @@ def evaluators(study: Study, usual: DesignEvaluator, method: Method) -> tuple[Ev
             "`optisense tolerance`",
         )
     full = _with_errors(study, usual) if own is usual else own
-    return (_with_errors(study, usual.coarse()) if study.settings.coarse_first else full), full
+    return (
+        _with_errors(study, CoarseEvaluator(usual)) if study.settings.coarse_first else full
+    ), full
 
 
 def usual_times(trials: Evaluator, full: Evaluator) -> UsualTrials | None:

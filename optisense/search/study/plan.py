@@ -16,6 +16,7 @@ from optisense.objectives.combined import goal_of
 from optisense.objectives.settings import size_for
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
+from optisense.search.evaluation.relit import is_relit
 from optisense.search.evaluation.requirements import requirements_of
 from optisense.search.methods import Method, Problem, find, make
 from optisense.search.methods import names as method_names
@@ -74,14 +75,16 @@ class Plan:
         chosen = find(self.method)
         if not all(each.rays_only for each in measured) and not chosen.renders_once:
             settings.setdefault("photons", TRIAL_PHOTONS)
-        if self.coarse_first:
-            self._refuse_coarse(chosen, [each for each in measured if not each.rays_only])
         kept = [str(each) for each in requirements]
         evaluator = DesignEvaluator(
             bound, self.goals, settings, requirements=kept, apart=self.apart
         )
         if self.errors is not None:
             self.errors.bind(design)
+        if self.coarse_first:
+            self._refuse_coarse(
+                chosen, evaluator, [each for each in measured if not each.rays_only]
+            )
         budget = self.budget
         if budget is None:
             budget = chosen.usual_budget(bound)
@@ -114,7 +117,12 @@ class Plan:
             coarse_first=self.coarse_first,
         )
 
-    def _refuse_coarse(self, method: type[Method], from_pictures: Sequence[Objective]) -> None:
+    def _refuse_coarse(
+        self,
+        method: type[Method],
+        evaluator: DesignEvaluator,
+        from_pictures: Sequence[Objective],
+    ) -> None:
         """Refuse coarse scores where they save nothing or can't guide the method.
 
         Raises:
@@ -130,6 +138,12 @@ class Plan:
             raise SearchError(
                 "no objective or condition of this search needs pictures, so coarse scores would "
                 "save no time",
+                hint="Leave --coarse-first out",
+            )
+        if self.errors is None and is_relit(evaluator):
+            raise SearchError(
+                "only colours and powers of lights vary, so trials render no image, and coarse "
+                "scores would save no time",
                 hint="Leave --coarse-first out",
             )
 

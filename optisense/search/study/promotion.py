@@ -21,14 +21,14 @@ from optisense.search.study.rescoring import MOST_BROKEN, Work, fresh_seeds
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 
-BATCH = 4
-"""Number of trials that get a full score together; from as many the difference between full and
-coarse scores is known to a factor of about 1.5, and they keep a few workers busy.
+BATCH = 3
+"""Number of trials that get a full score together: the fewest that show how much the difference
+between full and coarse scores varies. More would take most of the time of a search of 40 trials.
 """
 
-LEAST_MOST, PROMOTED_SHARE = 8, 0.1
-"""Largest number of trials that get full scores: a tenth of all trials, or 8 if that is more. A
-full score takes as long as two to four coarse ones.
+LEAST_MOST, PROMOTED_SHARE = 6, 0.1
+"""Largest number of trials that get full scores: a tenth of all trials, or 6 if that is more. A
+full score takes as long as six coarse ones.
 """
 
 SURE = 2.0

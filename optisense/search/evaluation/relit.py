@@ -1,0 +1,166 @@
+"""Scores of designs that differ only in the colours and powers of their lights.
+
+Light is additive: with a layer for each light group, the images under any colours and powers are
+weighted sums, with no new rendering.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from optisense.design import SensorDesign
+from optisense.objectives import Evaluation, Objective, Score, Settings
+from optisense.objectives.evaluation import ProgressCallback
+from optisense.objectives.named import named_in
+from optisense.objectives.registry import pixels_read
+from optisense.objectives.relighting import Relighting
+from optisense.objectives.run import split_settings
+from optisense.objectives.scoring import run_objective
+from optisense.objectives.usual_score import UsualTrials
+from optisense.search.evaluation.evaluator import RELIT, DesignEvaluator
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+KEPT_SEEDS = 3
+"""Number of seeds whose images are kept: the three fresh seeds of the final scoring, which starts
+when the study's own seed is no longer needed.
+"""
+
+RELIGHTING_SHARE = 0.02
+"""Time to relight and judge the images of a score, as a share of the time to render and judge them;
+measured on GelSight Mini, for nine presses of which only the contacts are read.
+"""
+
+
+class RelitEvaluator(DesignEvaluator):
+    """Evaluator of designs that differ only in the colours and powers of their lights."""
+
+    def __init__(self, usual: DesignEvaluator, *, brief: bool = False) -> None:
+        """Copy the settings of the usual evaluator; nothing is rendered yet.
+
+        Args:
+            usual: the evaluator whose scores are found.
+            brief: whether thousands of trials follow, so that nothing is watched and only the main
+                numbers of scores are stored.
+        """
+        self.brief = brief
+        super().__init__(
+            usual.space,
+            usual.goals,
+            usual.settings,
+            requirements=[str(each) for each in usual.requirements],
+            variant=usual.variant,
+        )
+
+    def _names_to_watch(self) -> tuple[str, ...]:
+        """Return no names if thousands of trials follow: a further score would take longer than
+        all others of a trial.
+        """
+        return () if self.brief else super()._names_to_watch()
+
+    def objective_scores(
+        self, design: SensorDesign, seed: int, only: Collection[str] | None = None
+    ) -> Mapping[str, Score]:
+        """See `DesignEvaluator.objective_scores`."""
+        if seed not in self._lit:
+            while len(self._lit) >= KEPT_SEEDS:
+                self._lit.popitem(last=False)
+            model = self.keeper.model(self.space.prepared)
+            self._lit[seed] = _Lit(model, self._ready, self.settings, seed, self._progress)
+        self._lit.move_to_end(seed)
+        found = self._lit[seed].scores(design, only)
+        if not self.brief:
+            return found
+        return {name: _without_details(score) for name, score in found.items()}
+
+    def usual_trials(self) -> UsualTrials | None:
+        """Return the usual duration of the trials (see `DesignEvaluator.usual_trials`); a trial
+        renders nothing, and all designs share the light of a fresh seed.
+        """
+        usual = self.usual_score()
+        if usual is None:
+            return None
+        trial = RELIGHTING_SHARE * (usual.images + usual.judging)
+        return UsualTrials.of(usual, trial, trial)
+
+    @cached_property
+    def _lit(self) -> OrderedDict[int, _Lit]:
+        """Images and objectives of the last seeds, by the seed."""
+        return OrderedDict()
+
+
+FROM_LAYERS = frozenset({"rgb2normal", "normdiff", "reading", "depth"})
+"""Objectives by pictures that need no image besides those of the presses, so that layers suffice.
+"""
+
+BESIDE = frozenset({"aoap", "2to3pw", "coverage", "distortion", "power"})
+"""Objectives that need no light."""
+
+
+def is_relit(usual: DesignEvaluator) -> bool:
+    """Return whether layers suffice for the scores of an evaluator: nothing varies but colours and
+    powers of lights, and the goals and conditions are of `FROM_LAYERS` and `BESIDE`.
+    """
+    texts = [goal for goal in usual.goals if isinstance(goal, str)]
+    if len(texts) < len(usual.goals) or not all(map(RELIT.search, usual.space.names)):
+        return False
+    wanted = set(named_in([*texts, *(each.quantity for each in usual.requirements)]))
+    return wanted <= FROM_LAYERS | BESIDE and not wanted <= BESIDE
+
+
+class _Lit:
+    """Images of one seed, and the objectives prepared for them."""
+
+    def __init__(
+        self,
+        model: OpticalModel,
+        objectives: Sequence[Objective],
+        settings: Mapping[str, Any],
+        seed: int,
+        progress: ProgressCallback | None,
+    ) -> None:
+        shared, self._own = split_settings(settings, objectives)
+        reads = pixels_read(objectives, self._own)
+        given = Settings(**shared, seed=seed)
+        self._relighting = Relighting(Evaluation(model, given, progress, reads))
+        model.forget_light()  # the layers hold all that is needed
+        self._objectives = objectives
+
+    def scores(self, design: SensorDesign, only: Collection[str] | None = None) -> dict[str, Score]:
+        """Return the scores by all objectives, or by those named in `only`."""
+        cut, whole = (self._relighting.lit(design, whole=each) for each in (False, True))
+        found = {}
+        for each in self._objectives:
+            if only is not None and each.name not in only:
+                continue
+            if _reads_contacts_only(each):
+                found[each.name] = run_objective(each, cut, self._own[each.name])
+            else:
+                found[each.name] = run_objective(each, whole, self._own[each.name])
+        return found
+
+
+def _reads_contacts_only(objective: Objective) -> bool:
+    """Return whether an objective reads no pixel outside of the contacts, which is known of
+    built-in objectives only.
+
+    A user's objective may read pixels around a contact.
+    """
+    own = objective.function.__module__.startswith("optisense.objectives.")
+    return own and objective.reads is not None
+
+
+def _without_details(score: Score) -> Score:
+    """Return a score with its main numbers only, because thousands of scores are stored."""
+    if score.failure is not None:
+        return score
+    parts: dict[str, Any] = {name: score.parts[name] for name in score.shown}
+    places = [place.get("score", place.get("error")) for place in score.parts.get("places", ())]
+    if places:
+        parts["places"] = places
+    return replace(score, parts=parts, arrays={})
