@@ -197,7 +197,9 @@ def _say_guesses(recipe: Recipe, guessed: bool) -> None:
     if not guessed:
         return
     for name, part in recipe.parts.items():
-        source = part.file or f"faces of {part.faces_of} that look to {part.towards}"
+        faces = f"faces of {part.faces_of} that look to {part.towards}"
+        faces += ", and those that continue them smoothly" if part.tangent else ""
+        source = part.file or faces
         source += f", body {part.solid}" if part.solid else ""
         messages.print(f"guessed: {name} is {part.role.value} ({source})", markup=False)
     groups = ", ".join(recipe.lights)

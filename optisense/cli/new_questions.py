@@ -34,7 +34,8 @@ from optisense.sensors.from_meshes.building import USUAL_MATERIAL
 from optisense.sensors.from_meshes.directions import SIDES
 from optisense.sensors.from_meshes.files import largest_dimension, likely_units
 from optisense.sensors.from_meshes.guessing import CadBody, Use
-from optisense.sensors.from_meshes.recipe import Recipe
+from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
+from optisense.sensors.from_meshes.recipe_lights import LightChoice
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
 from optisense.sensors.from_meshes.surfaces import chosen as chosen_faces
 
@@ -80,8 +81,9 @@ def ask_recipe(source: Path, units: Units | None) -> Recipe:
     if not any(part.role is Role.SENSING_SURFACE for part in parts.values()):
         parts, outward = _ask_skin(parts, meshes, gel, outward)
     coating = _ask_known("coating", "Coating", "diffuse-grey")
-    lights = _ask_lights(found, uses, parts, meshes, gel, outward)
-    camera = _ask_camera(found, uses, parts)
+    usual = guessing.usual_lights_and_camera(parts, meshes, gel, outward)
+    lights = _ask_lights(found, uses, parts, meshes, gel, outward, usual[0])
+    camera = _ask_camera(found, uses, parts, usual[1])
     recipe = Recipe.model_validate(
         {
             "name": name,
@@ -189,6 +191,7 @@ def _ask_lights(
     meshes: Meshes,
     gel: str,
     outward: str,
+    usual: dict[str, LightChoice],
 ) -> dict[str, dict[str, Any]]:
     say("\nLights (`optisense library list light` shows models):")
     groups: dict[str, dict[str, Any]] = {}
@@ -209,7 +212,14 @@ def _ask_lights(
             over |= {} if pitch is None else {"pitch": pitch}
         groups[each.name] = {**group, "over": over | _ask_way("square to the surface")}
     window = next((n for n, part in parts.items() if part.role is Role.SUPPORT), gel)
-    usual = guessing.lights_around(window, meshes[window], outward)
+    if any(group.ring is not None for group in usual.values()) and not groups:
+        say("The gel is a hollow dome.")
+        if ask_yes("Put a ring of red, green and blue lights into it", True):
+            return {
+                name: group.model_dump(exclude_none=True, by_alias=True)
+                for name, group in usual.items()
+            }
+        usual = guessing.lights_around(window, meshes[window], outward)
     if groups:
         usual = {}
     while True:
@@ -256,11 +266,15 @@ def _ask_group(name: str, colour: str) -> dict[str, Any]:
     }
 
 
-def _ask_camera(found: list[CadBody], uses: dict[str, Use], parts: Parts) -> dict[str, Any]:
+def _ask_camera(
+    found: list[CadBody], uses: dict[str, Use], parts: Parts, usual: CameraChoice
+) -> dict[str, Any]:
     say("\nCamera (`optisense library list camera` shows models):")
-    camera: dict[str, Any] = {"model": _ask_known("camera", "Model", guessing.CAMERA)}
     references = {each.name: each.shape for each in found if uses[each.name] == "camera"}
     words = ["behind", *references]
+    model = guessing.CAMERA if references else usual.model
+    camera: dict[str, Any] = {"model": _ask_known("camera", "Model", model)}
+    inside = ", ".join(f"{x:g}" for x in usual.at) if isinstance(usual.at, tuple) else "behind"
 
     def place(answer: str) -> ShapeReference | str | tuple[float, float, float]:
         if answer in references:
@@ -274,7 +288,7 @@ def _ask_camera(found: list[CadBody], uses: dict[str, Use], parts: Parts) -> dic
 
     say("Its pupil is in the middle of a body, at a place x, y, z, or behind the sensing surface, "
         "where that fills the picture.")  # fmt: skip
-    at = ask("Pupil", place, next(iter(references), "behind"))
+    at = ask("Pupil", place, next(iter(references), inside))
     if not isinstance(at, str):
         camera["at"] = at if isinstance(at, tuple) else at.model_dump(exclude_none=True)
 

@@ -26,6 +26,7 @@ from optisense.sensors.from_meshes.files import (
     largest_dimension,
     likely_units,
 )
+from optisense.sensors.from_meshes.fingertips import is_round, lights_and_camera
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
 from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow, LightsOver
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
@@ -220,21 +221,22 @@ def recipe_of(
     outward = guess_outward(meshes, carrier)
     if skin is None:
         name = _fresh("skin", set(parts))
-        parts = insert_skin(parts, name, carrier, outward)
+        tangent = is_round(meshes[carrier], outward)
+        parts = insert_skin(parts, name, carrier, outward, tangent)
     lights: dict[str, LightChoice] = {}
     references = [each for each in found if each.use == "lights"]
     for each in references:
         lights[each.name] = lights_over(each, meshes[each.name], meshes[carrier])
-    if not lights:
-        window = next((n for n, part in parts.items() if part.role is Role.SUPPORT), carrier)
-        lights = lights_around(window, meshes[window], outward)
     lens = next((each for each in found if each.use == "camera"), None)
+    usual_lights, camera = usual_lights_and_camera(parts, meshes, carrier, outward)
+    if lens is not None:
+        camera = CameraChoice(model=CAMERA, at=lens.shape)
     recipe = Recipe(
         name=usual_name(source),
         units=units,
         parts=parts,
-        lights=lights,
-        camera=CameraChoice(model=CAMERA, at=lens.shape if lens else None),
+        lights=lights or usual_lights,
+        camera=camera,
     )
     return recipe.relative_to(folder)
 
@@ -283,6 +285,35 @@ def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightC
         colour=colour,
         over=LightsOver(file=found.file, solid=found.body.name, towards=side, patches="all"),
     )
+
+
+def usual_lights_and_camera(
+    parts: Mapping[str, PartChoice],
+    meshes: Mapping[str, TriangleMesh],
+    carrier: str,
+    outward: str,
+) -> tuple[dict[str, LightChoice], CameraChoice]:
+    """Return lights and a camera for a sensor whose files contain none.
+
+    A hollow dome gets a ring of lights and a fisheye inside; other sensors get rows of lights along
+    three sides of the first support, or else of the gel, and a camera behind the sensing surface.
+
+    Args:
+        parts: parts of the sensor by name.
+        meshes: meshes of at least these parts, mm.
+        carrier: name of the part that carries the coating.
+        outward: side on which the sensor is touched.
+    """
+    supports = [name for name, part in parts.items() if part.role is Role.SUPPORT]
+    if is_round(meshes[carrier], outward):
+        solid = {name: meshes[name] for name, part in parts.items() if part.faces_of is None}
+        gels = [name for name, part in parts.items() if part.role is Role.ELASTOMER]
+        clear = [carrier, *(name for name in [*gels, *supports] if name != carrier)]
+        inside = lights_and_camera(solid, clear, outward, LIGHT)
+        if inside is not None:
+            return inside
+    window = supports[0] if supports else carrier
+    return lights_around(window, meshes[window], outward), CameraChoice(model=CAMERA)
 
 
 def lights_around(part: str, mesh: TriangleMesh, outward: str) -> dict[str, LightChoice]:

@@ -1,0 +1,125 @@
+"""Round fingertips in a user's CAD files: hollow domes of gel, with lights and a fisheye inside."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.geometry.patches import faces_towards, smoothly_joined
+from optisense.geometry.rays import ray_hits
+from optisense.sensors.from_meshes.directions import axis_of, vector
+from optisense.sensors.from_meshes.recipe import CameraChoice
+from optisense.sensors.from_meshes.recipe_lights import LightChoice, Ring
+from optisense.sensors.from_meshes.surfaces import WITHIN
+
+FloatArray = NDArray[np.float64]
+
+STEEP = 80.0
+"""Angle (degrees) from the outward direction above which faces of a gel are taken for the sides of
+a block, which have 90, and not for those of a dome."""
+
+FISHEYE = "imx219-fisheye-160"
+"""Camera of the library for the inside of a dome: a common module that sees 128 degrees across."""
+
+LIGHT_HEIGHT = 0.5
+"""Height (mm) of the lights above the camera's pupil, from which they are then outside of its
+field of view."""
+
+RING_CLEARANCE = 2.5
+"""Distance (mm) of the middle of a light from the wall of the cavity: half the diagonal of a 3528
+package, 2.2 mm, and some clearance."""
+
+LEAST_RING = 4.0
+"""Smallest radius (mm) of a ring of lights that leaves room for a camera within it."""
+
+LED_PITCH = 4.5
+"""Distance (mm) along the ring between lights; a 3528 package is 3.5 mm long."""
+
+GAP_BETWEEN_COLOURS = 0.25
+"""Share of a colour's third of the ring that stays empty between two colours."""
+
+SPOKES = 36
+"""Number of directions in which the distance to the wall of the cavity is measured."""
+
+STEP = 0.5
+"""Step (mm) in which the camera moves into the cavity until it is outside of all parts."""
+
+
+def is_round(gel: TriangleMesh, outward: str) -> bool:
+    """Return whether the outer face of a gel is a dome or the like, and not the top of a pad.
+
+    The faces that continue the outermost ones without a sharp edge are those of a dome if more of
+    them are inclined by `WITHIN` to `STEEP` degrees than by less. The rounded edges of a pad are
+    smaller than its top, and its sides are steeper.
+
+    Args:
+        gel: mesh of the part that carries the coating, mm.
+        outward: side on which the sensor is touched, such as +z.
+    """
+    mesh = gel.welded()
+    top = faces_towards(mesh, vector(outward), WITHIN)
+    if len(top) == 0:
+        return False
+    joined = smoothly_joined(mesh, top)
+    sloping = np.intersect1d(joined, faces_towards(mesh, vector(outward), STEEP))
+    area = float(mesh.face_areas[top].sum())
+    return float(mesh.face_areas[sloping].sum()) - area > area
+
+
+def lights_and_camera(
+    meshes: Mapping[str, TriangleMesh], clear: list[str], outward: str, light: str
+) -> tuple[dict[str, LightChoice], CameraChoice] | None:
+    """Return a ring of red, green and blue lights at the open side of a hollow dome, and a fisheye
+    within it that looks into the dome; None if there is no cavity with room for them.
+
+    Args:
+        meshes: meshes of all parts by name, mm.
+        clear: names of the transparent parts, the gel first.
+        outward: direction of the dome's tip, such as +z.
+        light: light of the library.
+    """
+    axis, sign = axis_of(outward)
+    way = vector(outward)
+    gel = meshes[clear[0]]
+    ends = sign * np.concatenate([meshes[name].bounds[:, axis] for name in clear])
+    bodies = [mesh for mesh in meshes.values() if mesh.is_closed]
+    pupil = gel.bounds.mean(axis=0)
+    for low in np.arange(ends.min(), (ends.min() + ends.max()) / 2.0, STEP):
+        pupil[axis] = sign * low
+        if not any(inside(pupil, body).any() for body in bodies):
+            break
+    else:
+        return None
+    centre = pupil + LIGHT_HEIGHT * way
+    angles = np.linspace(0.0, 2.0 * np.pi, SPOKES, endpoint=False)
+    spokes = np.zeros((SPOKES, 3))
+    spokes[:, (axis + 1) % 3], spokes[:, (axis + 2) % 3] = np.cos(angles), np.sin(angles)
+    nearest = np.full(SPOKES, np.inf)
+    for mesh in meshes.values():
+        hits = ray_hits(mesh, np.tile(centre, (SPOKES, 1)), spokes)
+        np.minimum.at(nearest, hits.ray, hits.distance)
+    radius = round(float(nearest.min()) - RING_CLEARANCE, 2)
+    if not np.isfinite(radius) or radius < LEAST_RING:
+        return None
+    arc = 120.0 * (1.0 - GAP_BETWEEN_COLOURS)
+    count = 1 + int(np.radians(arc) * radius / LED_PITCH)
+    lights = {}
+    for number, colour in enumerate(("red", "green", "blue")):
+        ring: dict[str, Any] = {
+            "part": clear[0],
+            "axis": outward,
+            "count": count,
+            "radius": radius,
+            "height": round(float(centre[axis]), 3),
+            "start": 120.0 * number,
+            "end": 120.0 * number + arc,
+            "direction": outward,
+        }
+        lights[colour] = LightChoice(model=light, colour=colour, ring=Ring.model_validate(ring))
+    x, y, z = np.round(pupil, 3).tolist()
+    return lights, CameraChoice(model=FISHEYE, at=(x, y, z), direction=outward)
