@@ -1,4 +1,4 @@
-"""``optisense export``: write the shapes to make, the places of the LEDs, and the parts to buy."""
+"""``optisense export``: write the files for a workshop, or those for a robot simulator."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import typer
 from optisense.cli.console import ends_well, messages, output
 from optisense.cli.options import DesignArgument
 from optisense.cli.output_folder import take_folder
+from optisense.robots.formats import ROBOT_FORMATS
 from optisense.workshop import FORMATS
 
 
@@ -31,12 +32,50 @@ def export(
     moulds: Annotated[
         bool, typer.Option("--moulds", help="Also write the moulds in which the gels are cast.")
     ] = False,
+    robots: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--for",
+            metavar="|".join(ROBOT_FORMATS.names()),
+            help="Write the files for a robot simulator instead. May be given several times.",
+            show_default=False,
+        ),
+    ] = None,
+    mass: Annotated[
+        float | None,
+        typer.Option(
+            metavar="GRAMS",
+            help="With --for: what the whole sensor weighs; that of its parts if left out.",
+            show_default=False,
+        ),
+    ] = None,
+    density: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="PART=G/CM3",
+            help="With --for: density of a part, in g/cm^3. May be given several times.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Export a design to the workshop: its parts in mm, its LEDs and a bill of materials.
 
     Writes each part as it is deformed by its cages, pick-and-place.csv with the place of each
-    LED, and bill-of-materials.csv and .md into the folder.
+    LED, and bill-of-materials.csv and .md into the folder. With --for, writes a model for a robot
+    simulator instead: meshes in metres, mass and inertia, and frames of the camera and the skin.
     """
+    if robots:
+        if formats or moulds:
+            raise typer.BadParameter(
+                "--format and --moulds are for the workshop", param_hint="--for"
+            )
+        _export_robot(design, out, robots, mass, density or [])
+        return
+    if mass is not None or density:
+        raise typer.BadParameter(
+            "it is for robot simulators: add --for",
+            param_hint="--mass" if mass is not None else "--density",
+        )
     wanted = [name.lower() for name in formats or ["stl"]]
     for name in wanted:
         if name not in FORMATS:
@@ -73,3 +112,37 @@ def export(
     if air:
         output.print(f"left out, since they are air: {', '.join(air)}", markup=False, style="dim")
     output.print("Lengths are in mm.", style="dim")
+
+
+def _export_robot(
+    design: str, out: Path, wanted: list[str], mass: float | None, density: list[str]
+) -> None:
+    names = [name.lower() for name in wanted]
+    for name in names:
+        if name not in ROBOT_FORMATS:
+            raise typer.BadParameter(
+                f"'{name}' is none of {', '.join(ROBOT_FORMATS.names())}", param_hint="--for"
+            )
+    densities = dict(_density(text) for text in density)
+
+    from optisense.robots import export_robot
+    from optisense.sensors import load
+
+    sensor = load(design)
+    take_folder(out)
+    notes: list[str] = []
+    for file in export_robot(sensor, out, names, notes, mass=mass, densities=densities):
+        output.print(str(file), markup=False)
+    for note in notes:
+        output.print(note, markup=False, style="dim")
+    output.print("Lengths are in m, masses in kg.", style="dim")
+
+
+def _density(text: str) -> tuple[str, float]:
+    part, _, number = text.rpartition("=")
+    try:
+        return part.strip(), float(number)
+    except ValueError:
+        raise typer.BadParameter(
+            f"'{text}' is no PART=G/CM3, such as housing=1.24", param_hint="--density"
+        ) from None

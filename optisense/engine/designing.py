@@ -84,6 +84,15 @@ class Export(DesignFields):
     moulds: bool = False
 
 
+class ExportRobot(DesignFields):
+    """Fields of the request "export_robot"; see docs/engine.md."""
+
+    to: str
+    formats: list[str] = Field(default=["mujoco"])
+    mass: float | None = Field(default=None, gt=0.0)
+    densities: dict[str, float] = Field(default_factory=dict)
+
+
 @handles("sensors", Fields, Lane.QUICK)
 def sensors(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """Return the names and descriptions of the built-in sensors."""
@@ -187,6 +196,24 @@ def export(session: Session, fields: Export, job: Job) -> dict[str, Any]:
     design = design_of(session, fields, job)
     written = write(design, fields.to, fields.formats, with_moulds=fields.moulds)
     return {"files": [str(path) for path in written]}
+
+
+@handles("export_robot", ExportRobot, Lane.QUICK)
+def export_robot(session: Session, fields: ExportRobot, job: Job) -> dict[str, Any]:
+    """Write files for robot simulators."""
+    from optisense.robots import export_robot as write
+
+    design = design_of(session, fields, job)
+    notes: list[str] = []
+    written = write(
+        design,
+        fields.to,
+        fields.formats,
+        notes,
+        mass=fields.mass,
+        densities=fields.densities,
+    )
+    return {"files": [str(path) for path in written], "notes": notes}
 
 
 def bent_shapes(

@@ -37,9 +37,13 @@ def stl_bytes(shape: Shape) -> bytes:
     """Return a binary STL file. Its coordinates are single precision: exact to about 1e-6 of their
     size.
     """
-    mesh = shape.mesh
+    return stl_bytes_of(f"{shape.name}, millimetres", shape.mesh)
+
+
+def stl_bytes_of(title: str, mesh: TriangleMesh) -> bytes:
+    """Return a binary STL file of a mesh, in the unit of its vertices."""
     # The header must not begin with "solid", the mark of a text file.
-    header = f"OptiSense part {shape.name}, millimetres".encode("ascii", "replace")[:80]
+    header = f"OptiSense part {title}".encode("ascii", "replace")[:80]
     records = np.zeros(
         len(mesh.faces),
         dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")],

@@ -1,11 +1,11 @@
-"""Write a report of the picture, and shapes for the workshop."""
+"""Write a report of the picture, shapes for the workshop, and models for robot simulators."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..engine import polls, session
 from ..engine.operators import ChoosingFile, refuse, start, start_with_design
@@ -102,4 +102,62 @@ class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
             to=folder,
             formats=formats,
             moulds=self.moulds,
+        )
+
+
+class OPTISENSE_OT_export_robot(polls.Asking, ChoosingFile, bpy.types.Operator):
+    """Write a model for robot simulators: meshes in metres, mass, frames of camera and skin"""
+
+    bl_idname = "optisense.export_robot"
+    bl_label = "Export for a Robot"
+
+    filepath: StringProperty(
+        name="Folder", description="Folder into which the files are written", subtype="DIR_PATH"
+    )
+    mujoco: BoolProperty(
+        name="MuJoCo",
+        description="Write a body with a camera and a touch sensor (MJCF)",
+        default=True,
+    )
+    urdf: BoolProperty(
+        name="URDF",
+        description="Write links for the sensor, its camera and its skin, as ROS and others read",
+        default=True,
+    )
+    mass: FloatProperty(
+        name="Mass (g)",
+        description="What the whole sensor weighs; 0 for that of its parts by their densities",
+        min=0.0,
+        soft_max=1000.0,
+        precision=1,
+    )
+
+    def suggested(self, context: bpy.types.Context) -> str:
+        return suggested(context.scene, "-robot")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        formats = [name for name in ("mujoco", "urdf") if getattr(self, name)]
+        if not formats:
+            return refuse(self, "Choose a format")
+        target = chosen(self, "a folder")
+        if target is None:
+            return {"CANCELLED"}
+        folder = str(target)
+
+        def written(result: dict[str, Any]) -> None:
+            session.state().note = "; ".join(
+                [f"{len(result['files'])} files in {folder}", *result["notes"]]
+            )
+            session.state().written = folder
+
+        mass = {"mass": self.mass} if self.mass > 0.0 else {}
+        return start_with_design(
+            self,
+            context,
+            "Writing",
+            "export_robot",
+            written,
+            to=folder,
+            formats=formats,
+            **mass,
         )

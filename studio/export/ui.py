@@ -22,6 +22,7 @@ class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
         column = self.layout.column(align=True)
         column.operator("optisense.report", icon="TEXT")
         column.operator("optisense.export", icon="EXPORT")
+        column.operator("optisense.export_robot", icon="ARMATURE_DATA")
         show_outcome(self.layout, "Writing")
         written = session.state().written
         if written and Path(written).exists():

@@ -41,6 +41,16 @@ def test_all_that_a_workshop_needs(tmp_path: Path) -> None:
     assert TriangleMesh.load(out / "guide.stl").volume == pytest.approx(25.25 * 20.75 * 4.0)
 
 
+def test_a_model_for_robot_simulators(tmp_path: Path) -> None:
+    code, text = run("gelsight-mini", "--for", "URDF", "--density", "gel=0.97", "-o", str(tmp_path))
+    assert code == 0, text
+    assert {path.name for path in tmp_path.iterdir()} == {"gelsight-mini.urdf", "meshes"}
+    assert {path.stem for path in (tmp_path / "meshes").iterdir()} == {
+        "skin", "gel", "tray", "guide", "gel-hull", "tray-hull", "guide-hull",
+    }  # fmt: skip
+    assert "gel 0.97" in text and "--mass" in text
+
+
 def test_the_command_offers_what_can_be_written() -> None:
     assert FORMATS == WRITABLE
 
@@ -50,6 +60,12 @@ def test_the_command_offers_what_can_be_written() -> None:
     [
         (("gelsight-mini", "--format", "dxf"), "none of stl, obj, 3mf, step"),
         (("gelsight-minni",), "gelsight-mini"),
+        (("gelsight-mini", "--for", "gazebo"), "none of mujoco, urdf"),
+        (("gelsight-mini", "--for", "urdf", "--moulds"), "for the workshop"),
+        (("gelsight-mini", "--mass", "20"), "add --for"),
+        (("gelsight-mini", "--for", "urdf", "--density", "gel"), "housing=1.24"),
+        (("gelsight-mini", "--for", "urdf", "--density", "gell=1"), "gel, tray, guide"),
+        (("gelsight-mini", "--for", "urdf", "--mass", "-1"), "above 0"),
     ],
 )
 def test_bad_input_writes_nothing(

@@ -55,6 +55,7 @@ USUAL: dict[str, dict[str, Any]] = {
     "report": {"image": "1", "file": f"{HERE}/out.html"},
     "save": {"design": DATA, "to": "saved"},
     "export": {"design": DATA, "to": "exported", "formats": ["stl"]},
+    "export_robot": {"design": DATA, "to": "exported", "formats": ["urdf"], "mass": 20.0},
     "mesh": {"file": "design/meshes/gel.obj", "role": "elastomer", "scale": 1.0},
     "cage": {"design": DATA, "action": "add", "cage": "c", "parts": ["gel"]},
     "cage_weights": {"design": DATA, "cage": "bend"},

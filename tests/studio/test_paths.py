@@ -48,7 +48,7 @@ def test_nothing_is_written_where_nothing_was_named(mini: Any, tmp_path: Path) -
     mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     mini.optisense_search.study = str(tmp_path / "study")
-    for name in ("report", "export", "save_as", "open", "keep_variant", "add_mesh"):
+    for name in ("report", "export", "export_robot", "save_as", "open", "keep_variant", "add_mesh"):
         with pytest.raises(RuntimeError, match="Name a"):
             getattr(bpy.ops.optisense, name)(filepath=" ")
     folder = tmp_path / "pages"

@@ -1,0 +1,108 @@
+"""Formats of robot simulators, and the export of a design to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from optisense.design import SensorDesign
+from optisense.errors import DesignError, OutputError
+from optisense.registry import Registry
+from optisense.robots.body import SensorBody, sensor_body
+from optisense.robots.mjcf import mjcf
+from optisense.robots.urdf import urdf
+from optisense.workshop.mesh_formats import stl_bytes_of
+from optisense.writing import inside, written_together
+
+MESHES = "meshes"
+"""Folder of the mesh files, beside the files that name them."""
+
+
+@dataclass(frozen=True)
+class RobotFormat:
+    """File format of a robot simulator.
+
+    Attributes:
+        suffix: suffix of the file name, with its dot.
+        text: function that returns the content of the file, called with the sensor's body and the
+            folder of the mesh files (NAME.stl, binary, m).
+    """
+
+    suffix: str
+    text: Callable[[SensorBody, str], str]
+
+
+MJCF = RobotFormat(".xml", mjcf)
+URDF = RobotFormat(".urdf", urdf)
+
+
+def _check(name: str, given: Any) -> None:
+    if not isinstance(given, RobotFormat):
+        raise OutputError(f"the robot format '{name}' is no RobotFormat")
+
+
+ROBOT_FORMATS: Registry[RobotFormat] = Registry(
+    "robot format",
+    "optisense.robot_formats",
+    OutputError,
+    {"mujoco": "optisense.robots.formats:MJCF", "urdf": "optisense.robots.formats:URDF"},
+    _check,
+)
+"""Registry of all formats; other packages add theirs under the entry-point group
+`optisense.robot_formats`.
+"""
+
+
+def export_robot(
+    design: SensorDesign,
+    folder: str | Path,
+    formats: Sequence[str] = ("mujoco",),
+    notes: list[str] | None = None,
+    *,
+    mass: float | None = None,
+    densities: Mapping[str, float] | None = None,
+) -> list[Path]:
+    """Write a sensor for robot simulators: a file for each format, and its meshes in metres.
+
+    No file appears under its own name before all are written.
+
+    Args:
+        design: the design.
+        folder: folder for the files.
+        formats: names in `ROBOT_FORMATS`.
+        notes: list to which notes about the files are added, one sentence each.
+        mass: mass of the whole sensor, g; see `sensor_body`.
+        densities: densities (g/cm^3) of parts by name; see `sensor_body`.
+
+    Returns:
+        The paths of the files; those of the formats first.
+
+    Raises:
+        DesignError: see `sensor_body`; or two parts differ in upper and lower case only.
+        OutputError: there is no such format, or the folder can't be written.
+    """
+    kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(formats)]
+    body = sensor_body(design, mass=mass, densities=densities)
+    meshes = [*body.looks, *body.hulls]
+    names = [each.name.casefold() for each in meshes]
+    twice = next((each.name for each in meshes if names.count(each.name.casefold()) > 1), None)
+    if twice is not None:
+        raise DesignError(
+            f"two files would have the name '{twice}.stl'",
+            where=f"parts.{twice}",
+            hint="Rename the part: their files would overwrite each other",
+        )
+    files = {f"{body.name}{kind.suffix}": kind.text(body, MESHES).encode() for kind in kinds}
+    files |= {
+        f"{MESHES}/{each.name}.stl": stl_bytes_of(f"{each.name}, metres", each.mesh)
+        for each in meshes
+    }
+    finals = [inside(Path(folder), name) for name in files]
+    with written_together("the files for a robot simulator") as stage:
+        for final, data in zip(finals, files.values(), strict=True):
+            stage(final).write_bytes(data)
+    if notes is not None:
+        notes += body.notes
+    return finals

@@ -1,0 +1,176 @@
+"""The files of every built-in sensor in MuJoCo: masses, frames, contacts and forces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import trimesh
+
+from optisense import sensors
+from optisense.design import SensorDesign
+from optisense.design.projection import picture_places
+from optisense.errors import DesignError
+from optisense.geometry.common_space import as_manifold
+from optisense.robots import SensorBody, export_robot, sensor_body
+from optisense.robots.body import KILOGRAMS, mass_properties
+from optisense.workshop.shapes import shapes
+
+mujoco = pytest.importorskip("mujoco")
+
+BALL = 0.004
+"""Radius (m) of the ball that touches the skin."""
+BALL_MASS = 0.05
+"""Mass of the ball, kg: it presses with half a newton."""
+GRAVITY = 9.81
+"""Acceleration of free fall, m/s^2."""
+SUNK = 2e-4
+"""Depth (m) of the ball in the gel when it is looked which bodies it touches."""
+
+
+class Made(NamedTuple):
+    """A sensor, its body and its files."""
+
+    design: SensorDesign
+    body: SensorBody
+    mjcf: Path
+    urdf: Path
+
+
+@pytest.fixture(scope="module", params=sensors.SENSORS.names())
+def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Made:
+    design = sensors.build(request.param)
+    mjcf, urdf, *_ = export_robot(design, tmp_path_factory.mktemp("robot"), ["mujoco", "urdf"])
+    return Made(design, sensor_body(design), mjcf, urdf)
+
+
+def with_ball(made: Made, above: float, slides: bool = False) -> Any:
+    """Return the model with a ball whose lowest point is so far above the middle of the skin; it
+    falls freely towards the skin, or slides along the skin's normal only.
+    """
+    skin = made.body.skin
+    x, y, z = skin.origin + (BALL + above) * skin.axes[:, 2]
+    normal = " ".join(str(value) for value in skin.axes[:, 2])
+    gx, gy, gz = -GRAVITY * skin.axes[:, 2]
+    joint = f'<joint type="slide" axis="{normal}" damping="1"/>' if slides else "<freejoint/>"
+    ball = (
+        f'<body name="ball" pos="{x} {y} {z}">{joint}'
+        f'<geom type="sphere" size="{BALL}" mass="{BALL_MASS}"/></body>'
+    )
+    text = made.mjcf.read_text().replace("</worldbody>", f"{ball}</worldbody>")
+    text = text.replace("<asset>", f'<option gravity="{gx} {gy} {gz}"/><asset>')
+    return mujoco.MjModel.from_xml_string(text, meshes(made, "meshes/"))
+
+
+def meshes(made: Made, folder: str = "") -> dict[str, bytes]:
+    """Return the mesh files by the names under which MuJoCo asks for them."""
+    files = (made.mjcf.parent / "meshes").iterdir()
+    return {folder + path.name: path.read_bytes() for path in files}
+
+
+def test_mass_and_inertia(made: Made) -> None:
+    """MuJoCo's body has the mass of the parts and, with trimesh's integrals, their inertia."""
+    model = mujoco.MjModel.from_xml_path(str(made.mjcf))
+    assert model.body_mass[1] == pytest.approx(made.body.mass, rel=1e-6)
+    np.testing.assert_allclose(model.body_ipos[1], made.body.centre, atol=1e-8)
+    principal = np.sort(np.linalg.eigvalsh(made.body.inertia))
+    np.testing.assert_allclose(np.sort(model.body_inertia[1]), principal, rtol=1e-5)
+
+
+def test_mass_properties() -> None:
+    """Mass, centre and inertia of two plates agree with trimesh's."""
+    made = {each.name: each.mesh for each in shapes(sensors.build("gelsight-mini"))}
+    plates = [made[name] for name in ("tray", "guide")]
+    bodies = [as_manifold(mesh) for mesh in plates]
+    mass, centre, inertia = mass_properties(bodies, [1.19 * KILOGRAMS] * len(bodies))
+    joined = trimesh.util.concatenate(
+        [trimesh.Trimesh(1e-3 * mesh.vertices, mesh.faces) for mesh in plates]
+    )
+    assert mass == pytest.approx(1190.0 * joined.volume, rel=1e-9)
+    np.testing.assert_allclose(centre, joined.center_mass, atol=1e-12)
+    np.testing.assert_allclose(inertia, 1190.0 * joined.moment_inertia, rtol=1e-6, atol=1e-15)
+
+
+def test_a_weighed_sensor() -> None:
+    design = sensors.build("gelsight-mini")
+    one, other = sensor_body(design), sensor_body(design, mass=20.0)
+    assert other.mass == pytest.approx(0.020)
+    np.testing.assert_allclose(other.inertia, one.inertia * (0.020 / one.mass))
+    heavier = sensor_body(design, densities={"gel": 2.06})
+    gel = next(each.volume for each in shapes(design) if each.name == "gel")
+    assert gel is not None
+    assert heavier.mass - one.mass == pytest.approx(1.03e-6 * gel, rel=1e-3)
+
+
+def test_wrong_numbers_are_refused() -> None:
+    design = sensors.build("gelsight-mini")
+    with pytest.raises(DesignError, match="the mass is 0"):
+        sensor_body(design, mass=0.0)
+    with pytest.raises(DesignError, match="no solid part 'skin'"):
+        sensor_body(design, densities={"skin": 1.0})
+
+
+def test_a_ball_touches_the_gel_alone(made: Made) -> None:
+    """No hull of a rigid part covers the skin."""
+    model = with_ball(made, -SUNK)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ball = model.body("ball").id
+    touched = set()
+    for contact in data.contact:
+        first, second = contact.geom1, contact.geom2
+        other = first if model.geom_bodyid[second] == ball else second
+        touched.add(model.geom(other).name)
+    assert touched
+    gels = [each.name for each in made.body.hulls if each.is_gel]
+    assert touched <= set(gels)
+
+
+def test_the_touch_sensor_reads_the_weight_of_a_ball(made: Made) -> None:
+    """A ball that comes to rest presses with its weight."""
+    # On a curved skin a free ball would roll off.
+    model = with_ball(made, 0.0, slides=True)
+    data = mujoco.MjData(model)
+    for _ in range(1000):
+        mujoco.mj_step(model, data)
+    read = data.sensor("normal_force").data[0]
+    assert read == pytest.approx(GRAVITY * BALL_MASS, rel=0.01)
+
+
+def test_the_camera_looks_where_the_design_does(made: Made) -> None:
+    """Points of the skin appear in MuJoCo's pinhole camera where the design's camera sees them."""
+    camera = made.design.camera
+    if camera.projection != "perspective":
+        pytest.skip("a fisheye")
+    model = mujoco.MjModel.from_xml_path(str(made.mjcf))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    skin = next(each.mesh for each in shapes(made.design) if each.role == "sensing_surface")
+    points = skin.vertices[::97]
+    # MuJoCo's camera looks along its -z, and y is up in its picture.
+    local = (1e-3 * points - data.cam_xpos[0]) @ data.cam_xmat[0].reshape(3, 3)
+    right, up, back = local.T
+    high = np.tan(np.radians(model.cam_fovy[0]) / 2.0)
+    wide = high * camera.resolution[0] / camera.resolution[1]
+    straight = camera.model_copy(update={"distortion": None})
+    across, down = picture_places(straight, points)
+    np.testing.assert_allclose(0.5 + 0.5 * right / -back / wide, across, atol=1e-5)
+    np.testing.assert_allclose(0.5 - 0.5 * up / -back / high, down, atol=1e-5)
+
+
+def test_urdf_has_the_same_body_and_frames(made: Made) -> None:
+    """MuJoCo's own reader of URDF gives the mass, and the poses of camera and skin."""
+    text = made.urdf.read_text()
+    # It merges links without a body into their parent unless it is told to keep them.
+    own = '<mujoco><compiler fusestatic="false" strippath="true"/></mujoco></robot>'
+    model = mujoco.MjModel.from_xml_string(text.replace("</robot>", own), meshes(made))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    name = made.body.name
+    assert sum(model.body_mass) == pytest.approx(made.body.mass, rel=1e-6)
+    for end, frame in (("camera_optical_frame", made.body.camera), ("skin", made.body.skin)):
+        body = data.body(f"{name}_{end}")
+        np.testing.assert_allclose(body.xpos, frame.origin, atol=1e-8)
+        np.testing.assert_allclose(body.xmat.reshape(3, 3), frame.axes, atol=1e-7)
