@@ -24,9 +24,9 @@ from optisense.workshop.shapes import Shape, is_air, shapes
 FloatArray = NDArray[np.float64]
 
 METRES = 1e-3
-"""Metres per mm."""
+"""Length of one mm, m."""
 KILOGRAMS = 1e-6
-"""Kilograms per mm^3 of a density of 1 g/cm^3."""
+"""Mass of one mm^3 of a density of 1 g/cm^3, kg."""
 USUAL_FRICTION = 1.0
 """Friction of a gel whose material gives none: that of the library's silicones."""
 WIDEST_PINHOLE = 170.0
