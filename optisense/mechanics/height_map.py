@@ -16,6 +16,10 @@ PIXELS_AT_ONCE = 4_000_000
 """Number of pairs of a triangle and a grid point that are processed together; they take about 200
 MB."""
 
+SLACK = 1e-6
+"""Distance from an edge, as a share of its height and of the pitch, within which grid points are
+tested for whether they lie on a triangle."""
+
 
 def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = False) -> FloatArray:
     """Return the lowest (or highest) z of a mesh at each point of a regular grid.
@@ -53,11 +57,7 @@ def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = Fa
         done = running[begin - 1] if begin else 0
         end = max(begin + 1, int(np.searchsorted(running, done + PIXELS_AT_ONCE, side="right")))
         some = kept[begin:end]
-        face = np.repeat(some, count[some])
-        starts = np.cumsum(count[some]) - count[some]
-        number = np.arange(len(face)) - np.repeat(starts, count[some])
-        column = first_x[face] + number % wide[face]
-        row = first_y[face] + number // wide[face]
+        face, row, column = _points_on(corners, some, first_y, last_y, x, y)
         away_x, away_y = x[column] - corners[face, 0, 0], y[row] - corners[face, 0, 1]
         e, f = edges[face, 0], edges[face, 1]
         second = (away_x * f[:, 1] - away_y * f[:, 0]) / area[face]
@@ -69,6 +69,53 @@ def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = Fa
         np.minimum.at(result, row * len(x) + column, sign * z)
         begin = end
     return sign * result.reshape(len(y), len(x))
+
+
+def _points_on(
+    corners: FloatArray,
+    some: NDArray[np.int64],
+    first_row: NDArray[np.int64],
+    last_row: NDArray[np.int64],
+    x: FloatArray,
+    y: FloatArray,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return pairs of a triangle and a grid point on it, or slightly beside it.
+
+    Args:
+        corners: (faces, 3, 3) corners of all triangles, mm.
+        some: (n,) numbers of the triangles.
+        first_row, last_row: (faces,) rows of the grid between which each triangle lies.
+        x, y: grid coordinates, mm.
+
+    Returns:
+        The triangle, the row and the column of each pair.
+    """
+    face, number = _counted(some, last_row[some] - first_row[some] + 1)
+    row = first_row[face] + number
+    low, high = np.full(len(face), np.inf), np.full(len(face), -np.inf)
+    for k in range(3):
+        (ax, ay), (bx, by) = corners[face, k, :2].T, corners[face, (k + 1) % 3, :2].T
+        rise = by - ay
+        share = np.divide(y[row] - ay, rise, out=np.full_like(rise, np.inf), where=rise != 0.0)
+        met = (share >= -SLACK) & (share <= 1.0 + SLACK)
+        at = ax + np.where(met, share, 0.0) * (bx - ax)
+        low = np.where(met, np.minimum(low, at), low)
+        high = np.where(met, np.maximum(high, at), high)
+    pitch = x[1] - x[0]
+    met = np.isfinite(low)
+    face, row = face[met], row[met]
+    first = np.ceil((low[met] - x[0]) / pitch - SLACK).clip(0, len(x)).astype(np.int64)
+    last = np.floor((high[met] - x[0]) / pitch + SLACK).clip(-1, len(x) - 1).astype(np.int64)
+    pair, number = _counted(np.arange(len(face)), np.maximum(last - first + 1, 0))
+    return face[pair], row[pair], first[pair] + number
+
+
+def _counted(
+    values: NDArray[np.int64], counts: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return each value as often as its count says, and the number of each repetition from 0 on."""
+    starts = np.cumsum(counts) - counts
+    return np.repeat(values, counts), np.arange(int(counts.sum())) - np.repeat(starts, counts)
 
 
 def slopes(height: FloatArray, pitch: float) -> tuple[FloatArray, FloatArray]:

@@ -19,51 +19,48 @@ contacts are computed: a sixteenth of a contact, over which they change little."
 
 
 class Neighbours:
-    """The displacements of each contact's grid by the other contacts.
-
-    Attributes:
-        fields: the displacement of each contact; None until it is solved. What it causes at others
-            is computed again after it was replaced.
-    """
+    """The displacements of each contact's grid by the other contacts."""
 
     def __init__(self, places: Sequence[Footprint]) -> None:
         """Set the footprints of all contacts, none of which is solved yet."""
         self._places = places
-        self.fields: list[DisplacementField | None] = [None] * len(places)
-        self._known: dict[tuple[int, int], tuple[DisplacementField, FloatArray]] = {}
+        self._points = [_sparse(place) for place in places]
+        self._caused: list[dict[int, FloatArray]] = [{} for _ in places]
+
+    def set_field(self, number: int, field: DisplacementField) -> None:
+        """Set the displacement of a contact that was solved, which replaces an earlier one."""
+        others = [k for k in range(len(self._places)) if k != number]
+        if not others:
+            return
+        place = self._places[number]
+        local = place.local(np.concatenate([self._points[k].reshape(-1, 3) for k in others]))
+        depths = field.depth(local[:, 0], local[:, 1])
+        self._caused[number] = {}
+        for k in others:
+            shape = self._points[k].shape[:2]
+            depth, depths = np.split(depths, [shape[0] * shape[1]])
+            upright = max(float(place.axes[:, 2] @ self._places[k].axes[:, 2]), 0.0)
+            self._caused[number][k] = upright * depth.reshape(shape)
 
     def at(self, number: int) -> FloatArray:
         """Return the inward displacement (rows, columns), mm, of the skin on a contact's grid due
         to the others.
         """
         place = self._places[number]
-        total: FloatArray | None = None
-        for other, field in enumerate(self.fields):
-            if other == number or field is None:
-                continue
-            known = self._known.get((number, other))
-            if known is None or known[0] is not field:
-                known = field, _caused(self._places[other], field, place)
-                self._known[number, other] = known
-            total = known[1] if total is None else total + known[1]
-        if total is None:
+        caused = [at_places[number] for at_places in self._caused if number in at_places]
+        if not caused:
             return np.zeros(place.overlap.shape)
         x, y = np.meshgrid(place.x, place.y)
-        spline = GridSpline(total, place.x[0], place.y[0], SPARSE * place.pitch)
+        spline = GridSpline(np.sum(caused, axis=0), place.x[0], place.y[0], SPARSE * place.pitch)
         return spline.value(x.ravel(), y.ravel()).reshape(x.shape)
 
 
-def _caused(cause: Footprint, field: DisplacementField, place: Footprint) -> FloatArray:
-    """Return the inward displacement, mm, that one contact causes at every `SPARSE`-th point of the
-    grid of another.
-    """
+def _sparse(place: Footprint) -> FloatArray:
+    """Return every `SPARSE`-th point (rows, columns, 3), mm, of a contact's grid."""
     x, y = np.meshgrid(
         *(
             at[0] + SPARSE * place.pitch * np.arange(math.ceil((len(at) - 1) / SPARSE) + 1)
             for at in (place.x, place.y)
         )
     )
-    flat = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
-    local = cause.local(place.origin + flat @ place.axes.T)
-    upright = max(float(cause.axes[:, 2] @ place.axes[:, 2]), 0.0)
-    return upright * field.depth(local[:, 0], local[:, 1]).reshape(x.shape)
+    return np.asarray(place.origin + np.stack([x, y, np.zeros_like(x)], axis=2) @ place.axes.T)

@@ -248,7 +248,7 @@ def press(
             overlaps[i] = overlap
             patch = None if patches is None else patches[i]
             solved = contacts[i] = _pressed(place, overlap, elasticity, patch, before)
-            neighbours.fields[i] = solved.field
+            neighbours.set_field(i, solved.field)
         if change < SETTLED or len(places) == 1:
             break
     else:

@@ -134,7 +134,7 @@ class SkinShapes:
                 skin[state] = Piece("skin", part.vertices, part.faces, surface, part.normals)
         numbers = {state: surfaces[state][0] for state in skin}
         raised = [state for state in skin if state is not SkinState.RESTING]
-        balls = _balls(mesh.part(SkinState.TOUCHING, SkinState.BENT), pressed)
+        balls = _balls(mesh, pressed)
         return cls(
             list(skin.values()),
             list(numbers.values()),
@@ -149,11 +149,13 @@ def bounding_ball(points: NDArray[np.floating]) -> NDArray[np.float64]:
     return np.append(centre, np.linalg.norm(points - centre, axis=1).max())
 
 
-def _balls(raised: TriangleMesh | None, pressed: PressedSkin) -> NDArray[np.float64]:
+def _balls(mesh: SkinMesh, pressed: PressedSkin) -> NDArray[np.float64]:
     """Return a ball for each contact around the raised skin that is nearest to it."""
-    if raised is None:
+    raised = np.zeros(len(mesh.vertices), dtype=bool)
+    raised[mesh.faces[mesh.state != SkinState.RESTING]] = True
+    if not raised.any():
         return np.zeros((0, 4))
-    points = raised.vertices
+    points = mesh.vertices[raised]
     middles = np.stack([contact.place.origin for contact in pressed.contacts])
     # The squared distances, without the square of each point, which all middles share.
     nearest = ((middles**2).sum(axis=1) - 2.0 * points @ middles.T).argmin(axis=1)
