@@ -17,6 +17,10 @@ SHALLOWEST = 1e-3
 """Depth (mm) of skin inside both of two indenters above which they count as overlapping; smaller
 depths are rounding."""
 
+ALONG_AN_EDGE = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Places along the part of an open edge inside the gel, as shares of its length, at which it is
+tested for whether it touches the skin."""
+
 
 def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
     """Raise if two indenters overlap where they meet the undeformed skin.
@@ -52,8 +56,18 @@ def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
     whole = indenter.welded()
     ends = np.sort(whole.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, times = np.unique(ends, axis=0, return_counts=True)
-    local = place.local(whole.vertices[edges[times == 1]].mean(axis=1))
-    touching = (local[:, 2] < -SHALLOWEST) & (_overlap_at(place, local) > SHALLOWEST)
+    corners = place.local(whole.vertices)[edges[times == 1]]
+    height = corners[:, :, 2] + SHALLOWEST
+    corners, height = corners[height.min(axis=1) < 0.0], height[height.min(axis=1) < 0.0]
+    # Of an edge that crosses the skin, the part inside the gel is tested.
+    lower, edge = np.argmin(height, axis=1), np.arange(len(corners))
+    low, high = height[edge, lower], height[edge, 1 - lower]
+    inside = np.divide(-low, high - low, out=np.ones_like(low), where=high > 0.0)
+    start = corners[edge, lower]
+    way = inside[:, None] * (corners[edge, 1 - lower] - start)
+    touching = np.zeros(len(corners), dtype=bool)
+    for share in ALONG_AN_EDGE:
+        touching |= _overlap_at(place, start + share * way) > SHALLOWEST
     if touching.any():
         raise ContactError(
             f"an indenter has a hole where it touches the skin: {int(touching.sum())} edges there "

@@ -207,6 +207,13 @@ def test_a_mesh_with_a_hole_where_it_touches_is_told():
     assert press(Contact(without_top, at=(0.0, 0.0), depth=0.3)).contacts[0].force > 0.1
     with pytest.raises(ContactError, match="has a hole where it touches"):
         press(Contact(torn, at=(0.0, 0.0), depth=0.3))
+    # The open edges of a large pyramid whose tip touches have their middles above the skin.
+    corners = np.array([(-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1), (0, 0, 0)], dtype=float)
+    pyramid = TriangleMesh(corners, np.array([(0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]))
+    whole, three_sides = MeshIndenter(pyramid), MeshIndenter(pyramid.with_faces(pyramid.faces[:3]))
+    assert press(Contact(whole, at=(0.0, 0.0), depth=0.3)).contacts[0].force > 0.0
+    with pytest.raises(ContactError, match="has a hole where it touches"):
+        press(Contact(three_sides, at=(0.0, 0.0), depth=0.3))
 
 
 def test_a_force_finds_its_depth():
