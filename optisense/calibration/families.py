@@ -189,12 +189,13 @@ def _view(design: SensorDesign) -> list[FitQuantity]:
     most = 175.0 if design.camera.projection == "perspective" else 360.0
     field = FitQuantity(
         "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
-        FIELD_RANGE, True, True, True,
+        FIELD_RANGE, True, True, views=True,
     )  # fmt: skip
     across = [
         FitQuantity(
             f"camera.across.{axis}", f"place of the camera {words}", "mm", 0.0, -10.0, 10.0,
-            PLACE_RANGE, False, True, True, partial(_across, number), "camera.position",
+            PLACE_RANGE, renders=True, views=True, change=partial(_across, number),
+            home="camera.position",
         )
         for number, (axis, words) in enumerate(
             (("right", "to the picture's right"), ("up", "to its top"))

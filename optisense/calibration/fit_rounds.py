@@ -18,10 +18,11 @@ from optisense.calibration.quantities import designed
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
+from optisense.calibration.view_slopes import view_changes, with_view
 from optisense.design import SensorDesign
 
 if TYPE_CHECKING:
-    from optisense.optics import OpticalModel
+    from optisense.optics import ChiefRays, OpticalModel
 
 FloatArray = NDArray[np.float64]
 
@@ -33,6 +34,17 @@ in the end, and enough for the smooth responses of balls.
 DIFFERENCE = 0.35
 """Step of the difference quotients of numbers that need a rendering, in plausible ranges; it is
 large because renderings have noise.
+"""
+
+VIEW_DIFFERENCE = 0.05
+"""Step of the difference quotients of numbers of the view, in plausible ranges; chief rays have no
+noise.
+"""
+
+VIEW_SOLVES, VIEW_MOVED = 3, 0.03
+"""Largest number of fits to the layers of one rendering, and the change of the view, in plausible
+ranges, at which they end. Pictures with sharp borders change linearly for shifts of a pixel only,
+and a fit to linear changes finds about half of a larger shift.
 """
 
 OUTLYING = 1.7
@@ -68,7 +80,8 @@ class FitRounds:
         self._rendering = [number for number, each in enumerate(chosen) if each.renders]
         self.exposure = 1.0
         self._done = 0
-        self._count = 2 * settings.rounds + len(self._rendering) + 3
+        self._count = 2 * settings.rounds + 3
+        self._count += sum(not chosen[number].views for number in self._rendering)
 
     def report_step(self, what: str) -> None:
         """Report the progress by one piece."""
@@ -78,8 +91,9 @@ class FitRounds:
     def run(self) -> Solution:
         """Run all rounds; the contacts of the fitted photographs move along.
 
-        Difference quotients for numbers that need a rendering are taken in the first round only;
-        later rounds start from new renderings, and their corrections are small.
+        Difference quotients of two renderings are taken in the first round only; later rounds start
+        from new renderings, and their corrections are small. Those of the camera's view cost no
+        rendering, and each round has its own.
         """
         steps = np.zeros(len(self._chosen))
         small = self._small.subset(self._used)
@@ -94,13 +108,45 @@ class FitRounds:
                 self.exposure = matched_exposure(total, layers.chain, small.background)
                 slopes = self._slopes(small, seen, steps, layers)
             self.report_step("fitting")
-            fit = LayeredFit(small, seen, layers, self._chosen, self.exposure, steps, slopes)
-            solution = fit.solve(steps, np.zeros((len(seen), 3)))
+            solution = self._solution(small, seen, layers, steps, slopes)
             steps = solution.steps
             for index, moved in zip(self._used, solution.contacts, strict=True):
                 self._seen[index] = _moved(self._seen[index], moved)
         assert solution is not None
         return solution
+
+    def _solution(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        layers: LayeredPictures,
+        steps: FloatArray,
+        slopes: dict[int, list[NDArray[np.float32]]],
+    ) -> Solution:
+        """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
+        displaced to it and fitted again.
+        """
+        views = [number for number in self._rendering if self._chosen[number].views]
+        contacts = np.zeros((len(seen), 3))
+        if not views:
+            return LayeredFit(
+                small, seen, layers, self._chosen, self.exposure, steps, slopes
+            ).solve(steps, contacts)
+        rendered = self._rays(small, steps)
+        start, shown, rays = steps.copy(), layers, rendered
+        for _ in range(VIEW_SOLVES):
+            every = slopes | self._view_slopes(small, seen, start, shown, rays)
+            fit = LayeredFit(small, seen, shown, self._chosen, self.exposure, start, every)
+            found = fit.solve(steps, contacts)
+            steps, contacts = found.steps, found.contacts
+            moved = float(np.abs(steps[views] - start[views]).max())
+            if moved < VIEW_MOVED:
+                break
+            start = start.copy()
+            start[views] = steps[views]
+            rays = self._rays(small, start)
+            shown = with_view(layers, seen, rendered, rays)
+        return found
 
     def places(self, fitted: SensorDesign, exposure: float) -> list[SeenContact]:
         """Return the contact in each photograph by the fitted model, at the full size.
@@ -152,6 +198,38 @@ class FitRounds:
             None if contacts is None else contacts.contacts, self._kept,
         )  # fmt: skip
 
+    def _view_slopes(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        steps: FloatArray,
+        layers: LayeredPictures,
+        rays: ChiefRays,
+    ) -> dict[int, list[NDArray[np.float32]]]:
+        """Return the slopes of the numbers of the view, by index, at layers with these rays."""
+        found: dict[int, list[NDArray[np.float32]]] = {}
+        for number in self._rendering:
+            if self._chosen[number].views:
+                other = self._other(number, steps, VIEW_DIFFERENCE)
+                size = np.float32(other[number] - steps[number])
+                changes = view_changes(layers, seen, rays, self._rays(small, other))
+                found[number] = [change / size for change in changes]
+        return found
+
+    def _rays(self, small: Photographs, steps: FloatArray) -> ChiefRays:
+        moved = [self._chosen[number] for number in self._rendering]
+        self._model.set_design(designed(self._design, moved, steps[self._rendering]))
+        return self._model.chief_rays(small.size)
+
+    def _other(self, number: int, steps: FloatArray, by: float) -> FloatArray:
+        """Return steps with one of them changed, downwards if the number is at its upper limit."""
+        each = self._chosen[number]
+        other = steps.copy()
+        other[number] += by
+        if each.value(float(other[number])) == each.value(float(steps[number])):
+            other[number] -= 2.0 * by
+        return other
+
     def _slopes(
         self,
         small: Photographs,
@@ -162,11 +240,10 @@ class FitRounds:
         found: dict[int, list[NDArray[np.float32]]] = {}
         for number in self._rendering:
             each = self._chosen[number]
+            if each.views:
+                continue
             self.report_step(f"rendering another {each.words}")
-            other = steps.copy()
-            other[number] += DIFFERENCE
-            if each.value(float(other[number])) == each.value(float(steps[number])):
-                other[number] -= 2.0 * DIFFERENCE
+            other = self._other(number, steps, DIFFERENCE)
             size = float(other[number] - steps[number])
             same = None if each.moves_contacts else layers
             moved = self._layers(small, seen, other, same)

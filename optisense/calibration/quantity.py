@@ -33,6 +33,8 @@ class FitQuantity:
         change: function that returns the design with a value of the number; None if it is the value
             at `path`.
         home: path under which the design records the source of the number; `path` if empty.
+        views: whether it only changes what the camera sees of the skin, so that the derivatives of
+            pictures follow from chief rays.
     """
 
     path: str
@@ -49,6 +51,7 @@ class FitQuantity:
         default=None, repr=False, compare=False
     )
     home: str = ""
+    views: bool = False
 
     def value(self, step: float) -> float:
         """Return the number at a distance of `step` plausible ranges from its start."""

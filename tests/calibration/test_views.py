@@ -1,0 +1,70 @@
+"""Derivatives by the camera's view follow from chief rays, and a fit finds a hidden view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+import optisense as ots
+from optisense.calibration import photograph_model
+from optisense.calibration.calibrating import calibrate
+from optisense.calibration.layered_pictures import LayeredPictures
+from optisense.calibration.quantities import designed, quantities_of
+from optisense.calibration.seen_contacts import SeenContact
+from optisense.calibration.settings import CalibrationSettings
+from optisense.calibration.view_slopes import displacements, view_changes
+
+from .conftest import PHOTONS, PLACES, SIZE
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+HIDDEN = (0.06, 0.3, -0.2)
+"""Logarithm of the factor on the field of view of the photographed sensor, and place of its camera
+to the picture's right and top, mm."""
+
+
+def seen_from(change: tuple[float, float, float]) -> ots.OpticalModel:
+    """A model of GelSight Mini with another view."""
+    design = ots.load("gelsight-mini")
+    chosen = quantities_of(design, ["view"])
+    steps = np.array([off / each.spread for off, each in zip(change, chosen, strict=True)])
+    return ots.OpticalModel(designed(design, chosen, steps))
+
+
+def test_a_camera_that_moves_sees_a_flat_skin_displaced_everywhere_alike(
+    mini: OpticalModel,
+) -> None:
+    before = mini.chief_rays(SIZE)
+    pixel = float(np.linalg.norm(before.points[60, 81] - before.points[60, 80]))
+    columns, rows = displacements(before, seen_from((0.0, 0.3, 0.0)).chief_rays(SIZE))
+    assert columns == pytest.approx(np.full(SIZE[::-1], 0.3 / pixel), rel=0.08)
+    assert np.abs(rows).max() < 0.1
+    columns, rows = displacements(before, seen_from((0.0, 0.0, 0.3)).chief_rays(SIZE))
+    assert np.abs(columns).max() < 0.1
+    assert rows == pytest.approx(np.full(SIZE[::-1], -0.3 / pixel), rel=0.08)
+
+
+def test_responses_grow_with_the_skin_that_a_pixel_sees(mini: OpticalModel) -> None:
+    before, after = mini.chief_rays(SIZE), seen_from((0.06, 0.0, 0.0)).chief_rays(SIZE)
+    ground = np.ones((1, SIZE[1], SIZE[0], 3), np.float32)
+    layers = LayeredPictures(("white",), ground, (ground + 0.5,), mini.picture_chain, ())
+    found = view_changes(layers, [SeenContact((80.0, 60.0), 10.0)], before, after)
+    assert np.abs(found[0]).max() < 1e-6  # an even background looks the same from anywhere
+    wider = np.ptp(after.points[60, :, 0]) / np.ptp(before.points[60, :, 0])
+    assert found[1] == pytest.approx(np.full_like(ground, 0.5 * (wider - 1.0)), rel=0.1)
+
+
+def test_a_hidden_view_is_found() -> None:
+    real = seen_from(HIDDEN)
+    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
+    photographs = photograph_model(real, balls, resolution=SIZE, photons=PHOTONS, seed=7, noise=1.0)
+    settings = CalibrationSettings(families=("powers", "view"), rounds=1, photons=PHOTONS)
+    found = calibrate(ots.load("gelsight-mini"), photographs, settings)
+    field, right, up = found.numbers[-3:]
+    assert np.log(field.after / field.before) == pytest.approx(HIDDEN[0], abs=0.012)
+    assert right.after == pytest.approx(HIDDEN[1], abs=0.12)
+    assert up.after == pytest.approx(HIDDEN[2], abs=0.12)
+    assert all(each.determined for each in found.numbers)
