@@ -55,18 +55,18 @@ def with_lights_tilted(design: SensorDesign, group: str, angle: float) -> Sensor
     """
     ahead = design.camera.axes()[2]
 
-    def turned(light: Light) -> Light:
+    def tilted(light: Light) -> Light:
         direction = np.array(light.direction) / np.linalg.norm(light.direction)
         axis = np.cross(direction, ahead)
         if np.linalg.norm(axis) < 1e-6:
             return light
         axis /= np.linalg.norm(axis)
-        update = {"direction": tuple(_turned(direction, axis, angle).tolist())}
+        update = {"direction": tuple(turned(direction, axis, angle).tolist())}
         if light.up is not None:
-            update["up"] = tuple(_turned(np.array(light.up), axis, angle).tolist())
+            update["up"] = tuple(turned(np.array(light.up), axis, angle).tolist())
         return light.model_copy(update=update)
 
-    return _with_lights(design, group, turned)
+    return _with_lights(design, group, tilted)
 
 
 def row_length(design: SensorDesign, group: str) -> float | None:
@@ -105,7 +105,7 @@ def _with_lights(design: SensorDesign, group: str, change) -> SensorDesign:  # t
     return found
 
 
-def _turned(vector: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
+def turned(vector: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
     """Return a vector turned about a unit axis (Rodrigues)."""
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     along = axis * float(axis @ vector) * (1.0 - cosine)

@@ -4,56 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
-import numpy as np
-
-from optisense.calibration import body_changes
+from optisense.calibration import body_changes, camera_families
 from optisense.calibration.quantity import FitQuantity
-from optisense.design import SensorDesign, set_value
-from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design import SensorDesign
 from optisense.design.materials import Coating, Dielectric
 from optisense.design.materials.gel_elasticity import MAX_POISSON_RATIO
 from optisense.design.parts import Role
-from optisense.design.responses.gamma_curve import GammaCurve
 
 POWER_RANGE = 0.7
 """Plausible range of the logarithm of a light group's power: LEDs of one type differ by a factor of
 two, and their drive currents are not published.
 """
-
-MIX_RANGE = 0.5
-"""Plausible range of an entry of the colour matrix off its diagonal; those of published camera
-tunings reach 1.
-"""
-
-GAMMA_START, GAMMA_RANGE = 1.8, 0.4
-"""Initial exponent of the tone curve, and the plausible range of its logarithm: cameras of sensors
-lie between linear (1) and sRGB (about 2.2).
-"""
-
-DARK_RANGE = 0.05
-"""Plausible range of the level of a channel in the dark, as a share of full: black levels of
-published camera tunings are 0.06 and less.
-"""
-
-FALLOFF_START, FALLOFF_RANGE = 0.2, 0.3
-"""Share of the light that the lens loses in the picture's corners: initial value and plausible
-range.
-"""
-
-SHADING_POWER, SHADING_RANGE = 2.0, 0.4
-"""Power of the distance with which the loss grows, initial value, and the plausible range of its
-logarithm: lenses alone lose with the square or faster, and light guides add to it.
-"""
-
-FIELD_RANGE = 0.08
-"""Plausible range of the logarithm of the field of view: views of one type of sensor differ by a
-tenth.
-"""
-
-PLACE_RANGE = 0.8
-"""Plausible range of the camera's position across its axis, mm; it is glued in by hand."""
 
 LIGHT_PLACE_RANGE = 0.7
 """Plausible range of a light group's position along the camera's axis, mm: half an LED's
@@ -102,8 +64,6 @@ INDEX_RANGE = 0.015
 0.04.
 """
 
-_LETTERS = "RGB"
-
 
 @dataclass(frozen=True)
 class Family:
@@ -129,84 +89,6 @@ def _powers(design: SensorDesign) -> list[FitQuantity]:
         for name, group in design.lights.items()
         if group.flux > 0.0
     ]  # fmt: skip
-
-
-def _colours(design: SensorDesign) -> list[FitQuantity]:
-    matrix = np.eye(3) if design.camera.colour_matrix is None else design.camera.colour_matrix
-    return [
-        FitQuantity(
-            f"camera.colour_matrix[{row}][{column}]",
-            f"share of {_LETTERS[column]} in the picture's {_LETTERS[row]}",
-            "", float(matrix[row][column]), -4.0, 4.0, MIX_RANGE, home="camera.colour_matrix",
-        )
-        for row in range(3)
-        for column in range(3)
-        if row != column
-    ]  # fmt: skip
-
-
-def _tone(design: SensorDesign) -> list[FitQuantity]:
-    curve = design.camera.tone_curve
-    start = curve.gamma if isinstance(curve, GammaCurve) else GAMMA_START
-    return [
-        FitQuantity(
-            "camera.tone_curve.gamma", "exponent of the tone curve", "", start, 0.5, 5.0,
-            GAMMA_RANGE, True, home="camera.tone_curve",
-        )
-    ]  # fmt: skip
-
-
-def _black(design: SensorDesign) -> list[FitQuantity]:
-    start = design.camera.stray_light or (0.0, 0.0, 0.0)
-    return [
-        FitQuantity(
-            f"camera.stray_light[{channel}]", f"level of {letter} in the dark", "",
-            start[channel], 0.0, 0.5, DARK_RANGE, home="camera.stray_light",
-        )
-        for channel, letter in enumerate(_LETTERS)
-    ]  # fmt: skip
-
-
-def _shading(design: SensorDesign) -> list[FitQuantity]:
-    shading = design.camera.shading
-    start, power = FALLOFF_START, SHADING_POWER
-    if isinstance(shading, RadialShading):
-        start, power = shading.falloff, shading.power
-    return [
-        FitQuantity(
-            "camera.shading.falloff", "dimming of the picture's corners", "", start, 0.0, 0.95,
-            FALLOFF_RANGE, home="camera.shading",
-        ),
-        FitQuantity(
-            "camera.shading.power", "power with which it grows outwards", "", power, 1.0, 8.0,
-            SHADING_RANGE, True, home="camera.shading",
-        ),
-    ]  # fmt: skip
-
-
-def _view(design: SensorDesign) -> list[FitQuantity]:
-    fov = design.camera.fov
-    most = 175.0 if design.camera.projection == "perspective" else 360.0
-    field = FitQuantity(
-        "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
-        FIELD_RANGE, True, True, views=True,
-    )  # fmt: skip
-    across = [
-        FitQuantity(
-            f"camera.across.{axis}", f"place of the camera {words}", "mm", 0.0, -10.0, 10.0,
-            PLACE_RANGE, renders=True, views=True, change=partial(_across, number),
-            home="camera.position",
-        )
-        for number, (axis, words) in enumerate(
-            (("right", "to the picture's right"), ("up", "to its top"))
-        )
-    ]  # fmt: skip
-    return [field, *across]
-
-
-def _across(axis: int, design: SensorDesign, amount: float) -> SensorDesign:
-    moved = np.array(design.camera.position) + amount * design.camera.axes()[axis]
-    return set_value(design, "camera.position", tuple(moved.tolist()))
 
 
 def _lights(design: SensorDesign) -> list[FitQuantity]:
@@ -337,11 +219,15 @@ def _indices(design: SensorDesign) -> list[FitQuantity]:
 
 FAMILIES = {
     "powers": Family("power of each light group", _powers),
-    "colours": Family("colour matrix of the camera", _colours),
-    "tone": Family("exponent of the tone curve", _tone),
-    "black": Family("level of each channel in the dark: black level and stray light", _black),
-    "shading": Family("dimming of the picture's corners", _shading),
-    "view": Family("field of view and place of the camera across its axis", _view),
+    "colours": Family("colour matrix of the camera", camera_families.colours),
+    "tone": Family("exponent of the tone curve", camera_families.tone),
+    "black": Family(
+        "level of each channel in the dark: black level and stray light", camera_families.black
+    ),
+    "shading": Family("dimming of the picture's corners", camera_families.shading),
+    "view": Family("field of view and place of the camera across its axis", camera_families.view),
+    "pose": Family("turn of the camera, and its place along its axis", camera_families.pose, False),
+    "distortion": Family("radial distortion of the lens", camera_families.distortion, False),
     "lights": Family("place and tilt of each light group, along the camera's axis", _lights, False),
     "rows": Family("length of each straight row of lights", _rows, False),
     "emission": Family("width of the emission of lights", _emission, False),

@@ -10,6 +10,7 @@ import pytest
 import optisense as ots
 from optisense.calibration import photograph_model
 from optisense.calibration.calibrating import calibrate
+from optisense.calibration.camera_changes import with_camera_turned
 from optisense.calibration.layered_pictures import LayeredPictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
@@ -45,6 +46,34 @@ def test_a_camera_that_moves_sees_a_flat_skin_displaced_everywhere_alike(
     columns, rows = displacements(before, seen_from((0.0, 0.0, 0.3)).chief_rays(SIZE))
     assert np.abs(columns).max() < 0.1
     assert rows == pytest.approx(np.full(SIZE[::-1], -0.3 / pixel), rel=0.08)
+
+
+def test_turns_of_the_camera_turn_its_picture(mini: OpticalModel) -> None:
+    """A roll displaces points at right angles to their distance from the middle."""
+    before = mini.chief_rays(SIZE)
+    design = mini.design
+    rolled = ots.OpticalModel(with_camera_turned(2, design, 1.0)).chief_rays(SIZE)
+    columns, rows = displacements(before, rolled)
+    down, across = np.mgrid[: SIZE[1], : SIZE[0]] + 0.5
+    angle = np.radians(1.0)
+    assert columns == pytest.approx(-angle * (down - 60.0), abs=0.1)
+    assert rows == pytest.approx(angle * (across - 80.0), abs=0.1)
+    pitched = with_camera_turned(0, design, 1.0)
+    assert pitched.camera.axes()[2] @ design.camera.axes()[1] == pytest.approx(np.sin(angle))
+    _, rows = displacements(before, ots.OpticalModel(pitched).chief_rays(SIZE))
+    assert rows.max() < -1.0  # what is seen now was nearer to the top
+
+
+def test_distortion_moves_the_corners_of_a_picture_and_not_its_middle(mini: OpticalModel) -> None:
+    (k1,) = quantities_of(mini.design, ["distortion"])
+    made = designed(mini.design, [k1], np.array([1.0]))
+    assert made.camera.distortion is not None
+    columns, rows = displacements(mini.chief_rays(SIZE), ots.OpticalModel(made).chief_rays(SIZE))
+    away = np.hypot(columns, rows)
+    assert away[60, 80] < 0.05
+    # x (1 + 0.1 r^2) = x' has x' - x = 0.1 r^2 x to first order, r = tan of the corner's angle
+    reach = np.tan(np.radians(0.5 * mini.design.camera.fov)) * np.hypot(80.0, 60.0) / 80.0
+    assert away[0, 0] == pytest.approx(0.1 * reach**2 * 100.0, rel=0.35)
 
 
 def test_responses_grow_with_the_skin_that_a_pixel_sees(mini: OpticalModel) -> None:
