@@ -19,7 +19,7 @@ from scipy.ndimage import gaussian_filter
 
 import optisense as ots
 from benchmarks.results import measure_parts
-from optisense.calibration import CalibrationSettings, Photographs, calibrate, photograph_model
+from optisense.calibration import Photographs, calibrate, photograph_model
 from optisense.calibration.families import USUAL
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.quantity import FitQuantity
@@ -40,9 +40,9 @@ PLACES = ((0.3, 0.35), (0.7, 0.35), (0.5, 0.5), (0.3, 0.65), (0.7, 0.65), (0.5, 
 """Places of the presses, as shares of width and height of what the camera sees of the skin."""
 RADIUS, DEPTH = 3.0, 0.8
 """Radius and depth (mm) of the ball."""
-PHOTONS, FIT_PHOTONS = 1_000_000, 500_000
-"""Photons of the photographs, and of the fit: with the 300,000 that a fit takes by default, the
-noise of GelBelt's light is larger than that of the photographs."""
+PHOTONS = 10_000_000
+"""Photons of the photographs: real light has no such noise, and that of a fit is larger with its
+3 million."""
 NOISE, BLUR = 1.0, 0.4
 """Standard deviation of the noise (levels) and of the blur (pixels): those of photographs of 320
 pixels with 2 levels and 0.8 pixels that are averaged to 160."""
@@ -67,7 +67,7 @@ def measure(name: str) -> dict[str, Any]:
     real = designed(design, chosen, steps)
     photographs = photographed(real)
     start = time.process_time()
-    found = calibrate(design, photographs, CalibrationSettings(photons=FIT_PHOTONS))
+    found = calibrate(design, photographs)
     used = time.process_time() - start
     scale = total_power(design) / total_power(real)  # photographs do not determine it
     rows = []

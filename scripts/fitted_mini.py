@@ -42,11 +42,12 @@ FILE = Path(ots.__file__).parent / "sensors" / FITTED_NUMBERS
 
 
 def fitted_to(photographs: str) -> SensorDesign:
-    """The design after a fit with the usual settings, every third press held out."""
+    """The design after a fit with the usual settings, every third press held out; the field of view
+    is known."""
     found = calibrate(
         unfitted_design(),
         read_photographs(photographs),
-        CalibrationSettings(families=chosen_families([], ["edges"])),
+        CalibrationSettings(families=chosen_families(["view"], ["edges"])),
         progress=lambda *told: print(told),
     )
     for name, side in (("before", found.before), ("after", found.after)):

@@ -18,7 +18,7 @@ from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.reading_both_ways import realism_and_readings
 from optisense.calibration.result import Calibration
 from optisense.calibration.seen_contacts import check_shape
-from optisense.calibration.settings import FIT_PHOTONS, CalibrationSettings
+from optisense.calibration.settings import CalibrationSettings
 from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.errors import CalibrationError
 
@@ -79,12 +79,11 @@ def calibrate(
     for each, factor in ((design, None), (fitted, exposure)):
         fit.report_step("comparing")
         model.set_design(each)
-        photons = max(chosen_settings.photons, FIT_PHOTONS)
         shown = model_pictures(
             model,
             full,
             places,
-            photons=photons,
+            photons=chosen_settings.photons,
             seed=chosen_settings.seed,
             exposure=factor,
             kept=kept,

@@ -101,32 +101,44 @@ def black(design: SensorDesign) -> list[FitQuantity]:
 
 
 def shading(design: SensorDesign) -> list[FitQuantity]:
-    """Return strength and power of the lens shading."""
+    """Return strength of the lens shading in each channel, and its power."""
     own = design.camera.shading
-    start, power = FALLOFF_START, SHADING_POWER
+    green, red, blue, power = FALLOFF_START, FALLOFF_START, FALLOFF_START, SHADING_POWER
     if isinstance(own, RadialShading):
-        start, power = own.falloff, own.power
-    return [
+        green, power = own.falloff, own.power
+        red = green if own.red_falloff is None else own.red_falloff
+        blue = green if own.blue_falloff is None else own.blue_falloff
+    found = [
         FitQuantity(
-            "camera.shading.falloff", "dimming of the picture's corners", "", start, 0.0, 0.95,
-            FALLOFF_RANGE, home="camera.shading",
-        ),
-        FitQuantity(
-            "camera.shading.power", "power with which it grows outwards", "", power, 1.0, 8.0,
-            SHADING_RANGE, True, home="camera.shading",
-        ),
+            f"camera.shading.{name}", f"dimming of {letter} in the picture's corners", "", start,
+            0.0, 0.95, FALLOFF_RANGE, home="camera.shading",
+        )
+        for name, letter, start in (
+            ("falloff", "G", green), ("red_falloff", "R", red), ("blue_falloff", "B", blue)
+        )
     ]  # fmt: skip
+    outwards = FitQuantity(
+        "camera.shading.power", "power with which it grows outwards", "", power, 1.0, 8.0,
+        SHADING_RANGE, True, home="camera.shading",
+    )  # fmt: skip
+    return [*found, outwards]
 
 
 def view(design: SensorDesign) -> list[FitQuantity]:
-    """Return the field of view, and the camera's place across its axis."""
+    """Return the field of view."""
     fov = design.camera.fov
     most = 175.0 if design.camera.projection == "perspective" else 360.0
-    field = FitQuantity(
-        "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
-        FIELD_RANGE, True, True, views=True,
-    )  # fmt: skip
-    across = [
+    return [
+        FitQuantity(
+            "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
+            FIELD_RANGE, True, True, views=True,
+        )
+    ]  # fmt: skip
+
+
+def place(design: SensorDesign) -> list[FitQuantity]:
+    """Return the camera's place across its axis."""
+    return [
         FitQuantity(
             f"camera.across.{axis}", f"place of the camera {words}", "mm", 0.0, -10.0, 10.0,
             PLACE_RANGE, renders=True, views=True,
@@ -136,7 +148,6 @@ def view(design: SensorDesign) -> list[FitQuantity]:
             (("right", "to the picture's right"), ("up", "to its top"))
         )
     ]  # fmt: skip
-    return [field, *across]
 
 
 def pose(design: SensorDesign) -> list[FitQuantity]:

@@ -225,7 +225,8 @@ FAMILIES = {
         "level of each channel in the dark: black level and stray light", camera_families.black
     ),
     "shading": Family("dimming of the picture's corners", camera_families.shading),
-    "view": Family("field of view and place of the camera across its axis", camera_families.view),
+    "view": Family("field of view", camera_families.view),
+    "place": Family("place of the camera across its axis", camera_families.place),
     "pose": Family("turn of the camera, and its place along its axis", camera_families.pose, False),
     "distortion": Family("radial distortion of the lens", camera_families.distortion, False),
     "lights": Family("place and tilt of each light group, along the camera's axis", _lights, False),

@@ -47,6 +47,12 @@ ranges, at which they end. Pictures with sharp borders change linearly for shift
 and a fit to linear changes finds about half of a larger shift.
 """
 
+ROUGH_SHARE, ROUGH_PIXELS = 0.5, 36.0
+"""Share of the rounds, the first one at least, that count one independent error for so many pixels
+of each picture. The errors of the start extend over the whole picture: weights estimated from them
+would neglect the background, and its errors would remain.
+"""
+
 OUTLYING = 1.7
 """Ratio of a press's error to the median from which on it is named as an outlier."""
 
@@ -102,14 +108,18 @@ class FitRounds:
         for number in range(self._settings.rounds):
             seen = [self._seen[index] for index in self._used]
             self.report_step("rendering")
-            layers = self._layers(small, seen, steps)
+            layers = self._layers(small, seen, steps, number)
             if number == 0:
                 total = layers.background.sum(axis=0)
                 self.exposure = matched_exposure(total, layers.chain, small.background)
                 slopes = self._slopes(small, seen, steps, layers)
             self.report_step("fitting")
-            solution = self._solution(small, seen, layers, steps, slopes)
-            steps = solution.steps
+            rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
+            pixels = ROUGH_PIXELS if rough else None
+            found = self._solution(small, seen, layers, steps, slopes, pixels)
+            if number:
+                found = found.with_changes(found.steps - steps)
+            solution, steps = found, found.steps
             for index, moved in zip(self._used, solution.contacts, strict=True):
                 self._seen[index] = _moved(self._seen[index], moved)
         assert solution is not None
@@ -122,6 +132,7 @@ class FitRounds:
         layers: LayeredPictures,
         steps: FloatArray,
         slopes: dict[int, list[NDArray[np.float32]]],
+        pixels: float | None,
     ) -> Solution:
         """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
         displaced to it and fitted again.
@@ -129,14 +140,15 @@ class FitRounds:
         views = [number for number in self._rendering if self._chosen[number].views]
         contacts = np.zeros((len(seen), 3))
         if not views:
-            return LayeredFit(
-                small, seen, layers, self._chosen, self.exposure, steps, slopes
-            ).solve(steps, contacts)
+            fit = LayeredFit(
+                small, seen, layers, self._chosen, self.exposure, steps, slopes, pixels
+            )
+            return fit.solve(steps, contacts)
         rendered = self._rays(small, steps)
         start, shown, rays = steps.copy(), layers, rendered
         for _ in range(VIEW_SOLVES):
             every = slopes | self._view_slopes(small, seen, start, shown, rays)
-            fit = LayeredFit(small, seen, shown, self._chosen, self.exposure, start, every)
+            fit = LayeredFit(small, seen, shown, self._chosen, self.exposure, start, every, pixels)
             found = fit.solve(steps, contacts)
             steps, contacts = found.steps, found.contacts
             moved = float(np.abs(steps[views] - start[views]).max())
@@ -186,15 +198,17 @@ class FitRounds:
         small: Photographs,
         seen: Sequence[SeenContact],
         steps: FloatArray,
+        number: int,
         contacts: LayeredPictures | None = None,
     ) -> LayeredPictures:
-        """Return layers at the current values of numbers that need a rendering; all others are
-        those of the design.
+        """Return layers of a round, with light of its own noise, at the current values of numbers
+        that need a rendering; all others are those of the design.
         """
         moved = [self._chosen[number] for number in self._rendering]
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
         return layered_pictures(
-            self._model, small, seen, self._settings.photons, self._settings.seed,
+            self._model, small, seen, self._settings.photons_of(number),
+            self._settings.seed + number,
             None if contacts is None else contacts.contacts, self._kept,
         )  # fmt: skip
 
@@ -246,7 +260,7 @@ class FitRounds:
             other = self._other(number, steps, DIFFERENCE)
             size = float(other[number] - steps[number])
             same = None if each.moves_contacts else layers
-            moved = self._layers(small, seen, other, same)
+            moved = self._layers(small, seen, other, 0, same)
             pairs = zip(
                 [moved.background, *moved.presses], [layers.background, *layers.presses],
                 strict=True,

@@ -1,19 +1,21 @@
 """Fit of a layered model to photographs by damped Gauss-Newton steps.
 
 The residuals are those of the background, divided by its usual error, and of each press's response
-near its contact, divided by the usual error of all responses; both are estimated anew before each
-round. So the background, which differs more, does not outweigh the contacts. Priors of the
-plausible ranges are added. Huber's weights limit the influence of dust and scratches.
+near its contact, divided by the usual error of all responses. Each set counts as many times as it
+contains independent errors. Both are estimated anew before each descent. So the background, whose
+errors are larger and smoother, does not outweigh the contacts. Priors of the plausible ranges are
+added. Huber's weights limit the influence of dust and scratches.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.calibration.correlated_errors import ErrorScale, error_scale
 from optisense.calibration.layered_pictures import LayeredPictures, contact_slopes
 from optisense.calibration.model_pictures import levels_of
 from optisense.calibration.photographs import Photographs
@@ -29,21 +31,10 @@ NEAR = 2.2
 noise.
 """
 
-LEAST_ERROR = 2.0
-"""Smallest error by which residuals are divided, in levels: the noise of a photograph."""
-
-INDEPENDENT = 36.0
-"""Number of pixels of a photograph for which there is one independent error: errors of the model
-extend over some six pixels in each direction.
-"""
-
 HUBER = 2.0
 """Residual, in units of the root mean square, beyond which it counts linearly instead of
 quadratically (Huber 1964).
 """
-
-TO_DEVIATION = 1.4826
-"""Ratio of the standard deviation of a normal distribution to the median of its absolute values."""
 
 STEP = 0.02
 """Step of a number's difference quotient, in plausible ranges."""
@@ -53,13 +44,18 @@ CONTACT_SPREAD = (2.0, 2.0, 0.1)
 of its radius: the errors of hand labels.
 """
 
-TILE = 16
-"""Side of tiles whose errors are assumed to be independent in the estimate of uncertainties, in
-pixels.
+TILE = 2.0
+"""Side of tiles, relative to the side of the square that contains one independent error, whose
+errors are regarded as independent of each other in the estimate of uncertainties. Errors at one
+place of all pictures are not: those of the light are the same in all, and those of the background
+are in each response.
 """
 
 MOST_STEPS = 20
 """Largest number of damped steps of one descent; several times as many as a fit needs."""
+
+MOST_DESCENTS = 4
+"""Largest number of descents, each with the scales of the residuals that the one before leaves."""
 
 SMALL_GAIN = 0.02
 """Decrease of the sum of squares below which a descent ends. A number that is off by its
@@ -83,8 +79,8 @@ class Solution:
         steps: steps (n,) of the quantities, in plausible ranges from their starts.
         contacts: changes (presses, 3) of column and row, pixels, and of the logarithm of the
             radius.
-        covariance: covariance (n, n) of the steps: that of the posterior, with one independent
-            error for 36 pixels, plus that of errors which are correlated within tiles.
+        covariance: covariance (n, n) of the steps: that of the posterior, plus that of errors which
+            are correlated within tiles, plus that of the changes since an earlier solution.
         errors: root mean square errors of the background and of the responses, levels.
         outlying: root mean square error of each press's response, levels.
     """
@@ -94,6 +90,17 @@ class Solution:
     covariance: FloatArray
     errors: tuple[float, float]
     outlying: FloatArray
+
+    def with_changes(self, changes: FloatArray) -> Solution:
+        """Return the solution with the variance of the changes (n,) of its steps since an earlier
+        one, whose light had other noise: it shows what noise does, and how far the fit is from its
+        end.
+        """
+        return replace(self, covariance=self.covariance + np.diag(changes**2))
+
+
+Scales = tuple[ErrorScale, ErrorScale]
+"""Errors of the background and of the responses."""
 
 
 class LayeredFit:
@@ -108,6 +115,7 @@ class LayeredFit:
         exposure: float,
         start: FloatArray,
         slopes: dict[int, list[NDArray[np.float32]]],
+        pixels: float | None = None,
     ) -> None:
         """Prepare a round.
 
@@ -120,9 +128,14 @@ class LayeredFit:
             start: steps (n,) of the quantities at which the layers were rendered.
             slopes: slopes of quantities that need a rendering, by index: changes of the layers of
                 the background and of each press per plausible range.
+            pixels: number of pixels for which there is one independent error; estimated from the
+                errors if None.
         """
+        self._pixels = pixels
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
         self._start, self._slopes = start, slopes
+        limits = np.array([each.limits() for each in chosen]).reshape(-1, 2)
+        self._low, self._high = limits[:, 0], limits[:, 1]
         self._real = photographs.background.astype(np.float64)
         self._responses = [p.picture.astype(np.float64) - self._real for p in photographs.presses]
         shape = self._real.shape[:2]
@@ -132,8 +145,6 @@ class LayeredFit:
         self._contact_slopes = [
             contact_slopes(layers, index, place) for index, place in enumerate(seen)
         ]
-        rows, columns = np.mgrid[: shape[0], : shape[1]] // TILE
-        self._tiles = rows * (shape[1] // TILE + 1) + columns
 
     @property
     def count(self) -> int:
@@ -170,9 +181,13 @@ class LayeredFit:
         progress: Callable[[], None] = lambda: None,
     ) -> Solution:
         """Run damped Gauss-Newton steps until the sum of squares stops falling."""
-        steps, contacts, pictures, _ = self._descend(steps, contacts, progress)
-        # The errors are smaller now, and so are the scales of the residuals.
-        steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
+        for _ in range(MOST_DESCENTS):
+            steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
+            # The errors are smaller now, and so are the scales of the residuals.
+            if all(
+                now.like(used) for now, used in zip(self._scales(pictures), scales, strict=True)
+            ):
+                break
         matrix, _, tiles = self._normal(pictures, steps, contacts, scales)
         inverse = np.linalg.inv(matrix)
         # The first term comes from noise and priors, the second from errors correlated within
@@ -188,7 +203,7 @@ class LayeredFit:
 
     def _descend(
         self, steps: FloatArray, contacts: FloatArray, progress: Callable[[], None]
-    ) -> tuple[FloatArray, FloatArray, list[FloatArray], tuple[float, float]]:
+    ) -> tuple[FloatArray, FloatArray, list[FloatArray], Scales]:
         """Return steps, contacts, their pictures and the scales of the residuals at the least
         cost.
         """
@@ -200,11 +215,13 @@ class LayeredFit:
             progress()
             matrix, gradient, _ = self._normal(pictures, steps, contacts, scales)
             fell = False
+            free = self._free(steps, gradient)
             for _ in range(6):
-                damped = matrix + damping * np.diag(np.diag(matrix))
-                move = -np.linalg.solve(damped, gradient)
+                damped = (matrix + damping * np.diag(np.diag(matrix)))[np.ix_(free, free)]
+                move = np.zeros(len(gradient))
+                move[free] = -np.linalg.solve(damped, gradient[free])
                 move *= min(1.0, LARGEST_STEP / max(float(np.abs(move).max()), 1e-12))
-                new_steps = steps + move[: self.count]
+                new_steps = np.clip(steps + move[: self.count], self._low, self._high)
                 new_contacts = contacts + move[self.count :].reshape(-1, 3) * self._contact_spread
                 shown = self.pictures(new_steps, new_contacts)
                 new_cost = self._cost(shown, new_steps, new_contacts, scales)
@@ -221,6 +238,12 @@ class LayeredFit:
                 break
         return steps, contacts, pictures, scales
 
+    def _free(self, steps: FloatArray, gradient: FloatArray) -> NDArray[np.bool_]:
+        """Return which unknowns may move: all but numbers at a limit that would leave it."""
+        slope = gradient[: self.count]
+        stuck = (steps <= self._low) & (slope > 0.0) | (steps >= self._high) & (slope < 0.0)
+        return np.concatenate([~stuck, np.ones(len(gradient) - self.count, dtype=bool)])
+
     def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:
         ground = float(np.sqrt(((pictures[0] - self._real) ** 2).mean()))
         pressed = self._press_errors(pictures)
@@ -236,43 +259,40 @@ class LayeredFit:
             ]
         )
 
-    def _scales(self, pictures: list[FloatArray]) -> tuple[float, float]:
-        """Return robust estimates of the error of the background and of responses, unaffected by
-        dust.
-        """
+    def _scales(self, pictures: list[FloatArray]) -> Scales:
+        """Return the errors of the background and of responses, unaffected by dust."""
         ground = pictures[0] - self._real
         pressed = [
-            (shown - pictures[0] - real)[mask].ravel()
-            for shown, real, mask in zip(pictures[1:], self._responses, self._masks, strict=True)
+            shown - pictures[0] - real
+            for shown, real in zip(pictures[1:], self._responses, strict=True)
         ]
+        everywhere = np.ones(ground.shape[:2], dtype=bool)
         return (
-            max(TO_DEVIATION * float(np.median(np.abs(ground))), LEAST_ERROR),
-            max(TO_DEVIATION * float(np.median(np.abs(np.concatenate(pressed)))), LEAST_ERROR),
+            error_scale([ground], [everywhere], HUBER, self._pixels),
+            error_scale(pressed, self._masks, HUBER, self._pixels),
         )
 
-    def _residuals(
-        self, pictures: list[FloatArray], index: int, scales: tuple[float, float]
-    ) -> FloatArray:
+    def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
         """Return the residuals (k, 3) of the background (index -1), or of a press's pixels near its
         contact.
         """
         if index < 0:
-            return ((pictures[0] - self._real) / scales[0]).reshape(-1, 3)
+            return ((pictures[0] - self._real) / scales[0].size).reshape(-1, 3)
         error = pictures[index + 1] - pictures[0] - self._responses[index]
-        return np.asarray(error[self._masks[index]] / scales[1])
+        return np.asarray(error[self._masks[index]] / scales[1].size)
 
     def _cost(
         self,
         pictures: list[FloatArray],
         steps: FloatArray,
         contacts: FloatArray,
-        scales: tuple[float, float],
+        scales: Scales,
     ) -> float:
         total = float((steps**2).sum() + ((contacts / self._contact_spread) ** 2).sum())
         for index in range(-1, len(self._masks)):
             size = np.abs(self._residuals(pictures, index, scales))
             loss = np.where(size < HUBER, size**2, HUBER * (2.0 * size - HUBER))
-            total += float(loss.sum()) / INDEPENDENT
+            total += float(loss.sum()) / scales[min(index + 1, 1)].pixels
         return total
 
     def _normal(
@@ -280,22 +300,23 @@ class LayeredFit:
         pictures: list[FloatArray],
         steps: FloatArray,
         contacts: FloatArray,
-        scales: tuple[float, float],
+        scales: Scales,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return matrix and gradient of the normal equations, and the covariance of the tiles'
         gradients.
         """
         n, count = self.count, len(self._masks)
         size = n + 3 * count
-        matrix, tiles = np.zeros((size, size)), np.zeros((size, size))
-        gradient = np.zeros(size)
+        matrix, gradient = np.zeros((size, size)), np.zeros(size)
+        tiles = self._tiles(scales)
+        sums = np.zeros((int(tiles.max()) + 1, size))
         moved = [self._moved(steps, contacts, k) for k in range(n)]
         for index in range(-1, count):
             residual = self._residuals(pictures, index, scales)
             columns = list(range(n))
             if not columns and index < 0:
                 continue
-            slopes = [(self._residuals(m, index, scales) - residual) / STEP for m in moved]
+            slopes = [(self._residuals(m, index, scales) - residual) / by for by, m in moved]
             if index >= 0:
                 columns += range(n + 3 * index, n + 3 * index + 3)
                 slopes += [
@@ -303,24 +324,34 @@ class LayeredFit:
                     for m in self._contact_moved(pictures, steps, contacts, index)
                 ]
             jacobian = np.stack(slopes, axis=-1)  # (k, 3, columns)
-            weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12)) / INDEPENDENT
+            weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
+            weight /= scales[min(index + 1, 1)].pixels
             flat = jacobian.reshape(-1, len(columns))
             weighted = flat * weight.reshape(-1, 1)
             place = np.ix_(columns, columns)
             matrix[place] += weighted.T @ flat
             scores = (jacobian * (weight * residual)[..., None]).sum(axis=1)
             gradient[columns] += scores.sum(axis=0)
-            where = self._tiles.ravel() if index < 0 else self._tiles[self._masks[index]]
-            sums = np.zeros((int(self._tiles.max()) + 1, len(columns)))
-            np.add.at(sums, where, scores)
-            tiles[place] += sums.T @ sums
+            where = tiles.ravel() if index < 0 else tiles[self._masks[index]]
+            np.add.at(sums, (where[:, None], np.array(columns)[None, :]), scores)
         prior = np.concatenate([steps, (contacts / self._contact_spread).ravel()])
-        return matrix + np.eye(size), gradient + prior, tiles
+        return matrix + np.eye(size), gradient + prior, sums.T @ sums
 
-    def _moved(self, steps: FloatArray, contacts: FloatArray, number: int) -> list[FloatArray]:
+    def _tiles(self, scales: Scales) -> NDArray[np.int64]:
+        """Return the number of the tile of each pixel, (h, w)."""
+        height, width = self._real.shape[:2]
+        side = round(TILE * np.sqrt(max(scale.pixels for scale in scales)))
+        rows, columns = np.mgrid[:height, :width] // side
+        return np.asarray(rows * (width // side + 1) + columns, dtype=np.int64)
+
+    def _moved(
+        self, steps: FloatArray, contacts: FloatArray, number: int
+    ) -> tuple[float, list[FloatArray]]:
+        """Return a small step of a number, away from its upper limit, and the pictures after it."""
+        by = -STEP if steps[number] + STEP > self._high[number] else STEP
         other = steps.copy()
-        other[number] += STEP
-        return self.pictures(other, contacts)
+        other[number] += by
+        return by, self.pictures(other, contacts)
 
     def _contact_moved(
         self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray, index: int

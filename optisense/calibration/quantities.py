@@ -104,12 +104,13 @@ def _prepared(design: SensorDesign, values: dict[str, float]) -> SensorDesign:
         camera["tone_curve"] = {"kind": "gamma", "gamma": values["camera.tone_curve.gamma"]}
     if any(path.startswith("camera.stray_light") for path in values):
         camera["stray_light"] = design.camera.stray_light or (0.0, 0.0, 0.0)
-    if "camera.shading.falloff" in values:
-        camera["shading"] = {
-            "kind": "radial",
-            "falloff": values["camera.shading.falloff"],
-            "power": values["camera.shading.power"],
-        }
+    shading = {
+        path.rpartition(".")[2]: value
+        for path, value in values.items()
+        if path.startswith("camera.shading.")
+    }
+    if shading:
+        camera["shading"] = {"kind": "radial", **shading}
     found = design
     for name, value in camera.items():
         found = set_value(found, f"camera.{name}", value)

@@ -62,6 +62,16 @@ class FitQuantity:
             found = self.start + self.spread * step
         return min(max(found, self.low), self.high)
 
+    def limits(self) -> tuple[float, float]:
+        """Return the distances of the limits from the start, in plausible ranges."""
+        low, high = (self._step(limit) for limit in (self.low, self.high))
+        return low, high
+
+    def _step(self, value: float) -> float:
+        if not self.logarithmic:
+            return (value - self.start) / self.spread
+        return math.log(value / self.start) / self.spread if value > 0.0 else -math.inf
+
     def slope(self, step: float) -> float:
         """Return the change of the number per plausible range."""
         return self.spread * (self.value(step) if self.logarithmic else 1.0)

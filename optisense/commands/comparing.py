@@ -45,13 +45,13 @@ class CalibrateOptions(PhotographOptions):
 
     keep: Annotated[list[str], OptionNotation("NAME")] = Field(
         [],
-        description="What the fit does not change: powers, colours, tone, black, shading or view. "
-        "May be given several times.",
+        description="What the fit does not change: powers, colours, tone, black, shading, view or "
+        "place. May be given several times.",
     )
     also: Annotated[list[str], OptionNotation("NAME")] = Field(
         [],
-        description="What the fit also changes: lights, emission, edges, coating, gel or indices. "
-        "May be given several times.",
+        description="What the fit also changes: pose, distortion, lights, rows, emission, edges, "
+        "coating, gel or indices. May be given several times.",
     )
     fit: Annotated[list[str], OptionNotation("PATH=LO:HI")] = Field(
         [],
@@ -64,9 +64,11 @@ class CalibrateOptions(PhotographOptions):
         "result; every third press if none is named. May be given several times.",
     )
     rounds: Annotated[int, Ge(1), Le(20), OptionNotation("N")] = Field(
-        3, description="Number of rounds of rendering and fitting."
+        4, description="Number of rounds of rendering and fitting."
     )
-    photons: Photons = Field(300_000, description="Photons to trace in each round.")
+    photons: Photons = Field(
+        3_000_000, description="Photons of the last round; the others have 0.3 times as many."
+    )
     seed: Seed = Field(0, description="The same seed gives the same light.")
 
 

@@ -1,6 +1,6 @@
 """GelSight Mini, fitted to photographs of a real unit.
 
-`optisense calibrate` has fitted the powers of the lights, the camera's view and its processing to
+`optisense calibrate` has fitted the powers of the lights, the camera's place and its processing to
 published photographs; `scripts/fitted_mini.py` repeats the fit. The numbers are in a YAML file
 beside this module.
 """
@@ -40,6 +40,11 @@ def unfitted_design() -> SensorDesign:
         status=assumed,
         source=f"{width:g} x {height:g} x 4 mm acrylic, as large as the tray: so photographs show "
         "no green border",
+    )
+    design.provenance["camera.fov"] = Provenance(
+        status=Status.DERIVED,
+        source=f"the width that shows {VIEW_WIDTH:g} mm of the flat gel, as photographs of balls "
+        "do, refracted through air, acrylic and gel; from the assumed pupil",
     )
     return design
 

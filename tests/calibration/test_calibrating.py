@@ -42,6 +42,7 @@ HIDDEN = {
     "camera.stray_light[0]": 0.02,
     "camera.stray_light[1]": 0.06,
     "camera.shading.falloff": 0.35,
+    "camera.shading.red_falloff": 0.5,
 }
 """Numbers of the photographed sensor that differ from those of the start."""
 
@@ -100,6 +101,27 @@ def test_hidden_numbers_are_found_within_their_uncertainties(
     assert found.errors[1] < 3.5
 
 
+def test_a_number_leaves_its_limit_where_the_photographs_ask_for_it(
+    photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
+) -> None:
+    """Beyond a limit a number has no derivative, so that a fit would stay there."""
+    chosen = quantities_of(ots.load("gelsight-mini"), ["shading"])
+    still, start = np.zeros((len(seen), 3)), np.zeros(len(chosen))
+    truth, stuck = start.copy(), start.copy()
+    truth[0], stuck[0] = (0.6 - 0.2) / chosen[0].spread, chosen[0].limits()[1]
+    made = LayeredFit(photographs, seen, layers, chosen, 250.0, start, {})
+    pictures = [np.round(levels).astype(np.uint8) for levels in made.pictures(truth, still)]
+    presses = [
+        replace(press, picture=picture)
+        for press, picture in zip(photographs.presses, pictures[1:], strict=True)
+    ]
+    real = replace(photographs, background=pictures[0], presses=tuple(presses))
+    fit = LayeredFit(real, seen, layers, chosen, 250.0, start, {})
+    found = fit.solve(stuck, still)
+    assert chosen[0].value(float(found.steps[0])) == pytest.approx(0.6, abs=0.02)
+    assert (found.steps <= [each.limits()[1] for each in chosen]).all()
+
+
 def test_what_a_change_of_contact_does_is_known_without_rendering(
     mini: OpticalModel, photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
 ) -> None:
@@ -126,7 +148,7 @@ def test_what_a_change_of_contact_does_is_known_without_rendering(
 
 def test_fitted_numbers_become_a_design() -> None:
     design = ots.load("gelsight-mini")
-    chosen = quantities_of(design, [*CHEAP, "view"], [("coating.specularity", 0.0, 0.4)])
+    chosen = quantities_of(design, [*CHEAP, "view", "place"], [("coating.specularity", 0.0, 0.4)])
     steps = np.linspace(-0.5, 0.5, len(chosen))
     made = designed(design, chosen, steps)
     for each, step in zip(chosen, steps, strict=True):
@@ -176,7 +198,18 @@ def test_a_design_is_fitted_and_marked(photographs: Photographs, tmp_path: Path)
     run = CliRunner().invoke(
         app,
         ["calibrate", str(tmp_path / "start"), str(tmp_path / "photos"), "--rounds", "1"]
-        + ["--keep", "view", "--keep", "tone", "--keep", "black", "--keep", "shading"]
+        + [
+            "--keep",
+            "view",
+            "--keep",
+            "place",
+            "--keep",
+            "tone",
+            "--keep",
+            "black",
+            "--keep",
+            "shading",
+        ]
         + ["--photons", "60000", "--out", str(tmp_path / "fitted")],
     )
     assert run.exit_code == 0, run.output

@@ -134,6 +134,8 @@ def test_radial_shading_falls_to_its_share_in_the_corners() -> None:
     assert share[240, 320] == pytest.approx(1.0, abs=1e-6)
     assert share[0, 0] == pytest.approx(0.6, abs=4e-3)
     assert share[240, 0, 1] == pytest.approx(1.0 - 0.4 * 0.8**4, abs=2e-3)
+    own = RadialShading(falloff=0.4, power=4.0, red_falloff=0.7).transmission(places)
+    assert own[0, 0] == pytest.approx([0.3, 0.6, 0.6], abs=7e-3)
 
 
 def test_a_shading_table_is_read_at_the_middles_of_its_cells() -> None:

@@ -1,0 +1,121 @@
+"""Extent over which the errors of a model are correlated.
+
+Neighbouring pixels have similar errors if the model is wrong, or if its light is noisy: both are
+smooth. So a picture contains fewer independent errors than pixels. If each pixel counted as one, a
+smooth error of the background would outweigh the contacts, and uncertainties would be too small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import irfft2, next_fast_len, rfft2
+
+FloatArray = NDArray[np.float64]
+
+UNCORRELATED = 0.1
+"""Correlation below which errors at a distance are regarded as independent: the estimate from one
+picture scatters by about as much.
+"""
+
+
+FARTHEST = 0.2
+"""Largest distance over which a correlation is summed, as a share of the picture's width: one
+picture contains too few independent errors of a larger extent to tell it, and without this limit a
+model that is wrong everywhere would not be fitted to the background at all.
+"""
+
+
+LEAST_ERROR = 1.0
+"""Smallest error by which residuals are divided, in levels: the noise of a photograph that is
+averaged to half its width.
+"""
+
+TO_DEVIATION = 1.4826
+"""Ratio of the standard deviation of a normal distribution to the median of its absolute values."""
+
+LEAST_PIXELS = 9.0
+"""Smallest number of pixels for which there is one independent error: cameras interpolate colours
+from neighbouring pixels, and dust and overexposure bias more than the residuals show.
+"""
+
+SCALE_CHANGE = 0.1
+"""Relative difference up to which two scales of errors are alike."""
+
+
+@dataclass(frozen=True)
+class ErrorScale:
+    """Errors of a set of pictures.
+
+    Attributes:
+        size: robust estimate of their standard deviation, levels.
+        pixels: number of pixels for which there is one independent error.
+    """
+
+    size: float
+    pixels: float
+
+    def like(self, other: ErrorScale) -> bool:
+        """Return whether both numbers are close to those of another scale."""
+        pairs = ((self.size, other.size), (self.pixels, other.pixels))
+        return all(abs(one - two) < SCALE_CHANGE * two for one, two in pairs)
+
+
+def correlated_pixels(errors: Sequence[FloatArray], masks: Sequence[NDArray[np.bool_]]) -> float:
+    """Return the number of pixels for which there is one independent error, 1 or more.
+
+    It is the sum of the correlation over all displacements, up to the distance at which the mean
+    over the directions falls below 0.1, and at most a fifth of the picture's width.
+
+    Args:
+        errors: errors (h, w, 3) of each picture.
+        masks: pixels (h, w) of each picture that count.
+    """
+    height, width = masks[0].shape
+    shape = next_fast_len(2 * height, real=True), next_fast_len(2 * width, real=True)
+    products, pairs = np.zeros(shape), np.zeros(shape)
+    for error, mask in zip(errors, masks, strict=True):
+        inside = np.where(mask[..., None], error, 0.0)
+        for channel in range(inside.shape[-1]):
+            products += irfft2(np.abs(rfft2(inside[..., channel], shape)) ** 2, shape)
+        pairs += inside.shape[-1] * irfft2(np.abs(rfft2(mask.astype(float), shape)) ** 2, shape)
+    if products[0, 0] <= 0.0:
+        return 1.0
+    known = pairs > 0.5
+    correlation = np.where(known, products / np.maximum(pairs, 1.0), 0.0)
+    correlation /= correlation[0, 0]
+    rows, columns = (np.minimum(np.arange(size), size - np.arange(size)) for size in shape)
+    distance = np.hypot(rows[:, None], columns[None, :])
+    rings = np.round(distance).astype(np.int64)
+    weights = np.where(known, pairs, 0.0).ravel()
+    count = np.maximum(np.bincount(rings.ravel(), weights), 1e-12)
+    profile = np.bincount(rings.ravel(), weights * correlation.ravel()) / count
+    limit = max(round(FARTHEST * width), 1)
+    below = np.flatnonzero(profile[:limit] < UNCORRELATED)
+    near = rings < (below[0] if below.size else limit)
+    return max(float(correlation[near & known].sum()), 1.0)
+
+
+def error_scale(
+    errors: Sequence[FloatArray],
+    masks: Sequence[NDArray[np.bool_]],
+    limit: float,
+    pixels: float | None = None,
+) -> ErrorScale:
+    """Return the scale of errors, unaffected by dust.
+
+    Args:
+        errors: errors (h, w, 3) of each picture, levels.
+        masks: pixels (h, w) of each picture that count.
+        limit: largest error, in standard deviations, in the estimate of their correlation.
+        pixels: number of pixels for which there is one independent error; estimated if None.
+    """
+    inside = np.concatenate([error[mask] for error, mask in zip(errors, masks, strict=True)])
+    size = max(TO_DEVIATION * float(np.median(np.abs(inside))), LEAST_ERROR)
+    if pixels is None:
+        limited = [np.clip(error, -limit * size, limit * size) for error in errors]
+        pixels = max(correlated_pixels(limited, masks), LEAST_PIXELS)
+    return ErrorScale(size, pixels)
