@@ -219,7 +219,7 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     bench.photograph("6-opened-again")
 
 
-def test_a_report_and_files_for_the_workshop_are_written(bench: Bench) -> None:
+def test_a_report_and_files_for_workshop_and_robot_are_written(bench: Bench) -> None:
     bench.only(REPORT)
     bench.photograph("7-report")
     bench.press("optisense.report")
@@ -232,6 +232,11 @@ def test_a_report_and_files_for_the_workshop_are_written(bench: Bench) -> None:
     bench.until("'files in' in state().note")
     written = bench.home / "gelsight-mini-workshop"
     assert {"gel.stl", "skin.stl"} <= {each.name for each in written.rglob("*.stl")}
+    bench.press("optisense.export_robot")
+    bench.choose_file()
+    bench.until("'-robot' in state().note")
+    robot = bench.home / "gelsight-mini-robot"
+    assert {"gelsight-mini.xml", "gelsight-mini.urdf"} <= {each.name for each in robot.iterdir()}
 
 
 def test_a_click_on_a_group_selects_its_lights(bench: Bench) -> None:
