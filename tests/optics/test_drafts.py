@@ -104,7 +104,7 @@ def test_a_moved_camera_or_a_bent_skin_makes_anew_what_depends_on_it(
     rays, same = draft.chief_rays(SIZE), OpticalModel(nearer).chief_rays(SIZE)
     np.testing.assert_allclose(rays.points, same.points, atol=1e-4)
     assert draft._store.cells is cells
-    bent = ots.set_value(mini, "cages.skin.points[14].z", 1.0)
+    bent = ots.set_value(mini, "cages.skin.points[14].z", 2.0)
     draft.set_design(bent)
     assert draft._store.cells is not cells
     ordinary.set_design(bent)
@@ -180,7 +180,9 @@ def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
         draft.set_design(ots.set_value(mini, "cages.skin.points[14].z", height))
         bent = draft.render(PRESS, SIZE, photons=60_000)
     assert bent.settings["kept_media"]
+    cells = draft._store.cells
     again = draft.render(PRESS, SIZE, photons=60_000)
     assert not again.settings["kept_media"]
+    assert draft._store.cells is not cells, "those of the shape before were kept until then"
     a, b = blocks(bent.radiance), blocks(again.radiance)
     np.testing.assert_allclose(a, b, atol=0.2 * SAME * b.mean(axis=0).max())
