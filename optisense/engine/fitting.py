@@ -31,8 +31,13 @@ class NoFields(Fields):
 
 @handles("calibration_families", NoFields, Lane.QUICK)
 def calibration_families(session: Session, fields: NoFields, job: Job) -> dict[str, Any]:
-    """Return the families of parameters that a calibration fits by default."""
-    return {"families": [{"name": name, "words": FAMILIES[name].words} for name in USUAL]}
+    """Return the families of parameters that a calibration fits by default, then the others."""
+    names = [*USUAL, *(name for name in FAMILIES if name not in USUAL)]
+    return {
+        "families": [
+            {"name": name, "words": FAMILIES[name].words, "usual": name in USUAL} for name in names
+        ]
+    }
 
 
 @handles("calibrate", Calibrate, Lane.RENDER)

@@ -9,6 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..core.engine import EngineError
+from ..core.vary import listed
 from ..engine import catalogue, polls, session
 from ..engine.operators import fail, refuse, start_with_design
 from ..scene.paths import absolute, suggested
@@ -41,6 +42,20 @@ class OPTISENSE_PG_calibration(bpy.types.PropertyGroup):
     kept: EnumProperty(
         name="Keep", items=_families, options={"ENUM_FLAG", "SKIP_SAVE"},
         description="Groups of numbers that the fit leaves as they are in the design",
+    )  # fmt: skip
+    added: EnumProperty(
+        name="Also", items=_families, options={"ENUM_FLAG", "SKIP_SAVE"},
+        description="Groups of numbers of the sensor's body that the fit changes, too",
+    )  # fmt: skip
+    fit: StringProperty(
+        name="Also Fit", options={"SKIP_SAVE"},
+        description="Other numbers that the fit changes, with their ranges, separated "
+        "by commas, such as coating.specularity=0:0.4",
+    )  # fmt: skip
+    hold_out: StringProperty(
+        name="Hold Out", options={"SKIP_SAVE"},
+        description="File names of presses that test the result instead of being fitted, separated "
+        "by commas; every third press if empty",
     )  # fmt: skip
     ball: FloatProperty(
         name="Ball (mm)", min=0.0, max=1000.0, precision=2, options={"SKIP_SAVE"},
@@ -77,9 +92,13 @@ class OPTISENSE_OT_keep_family(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         values = _values(context)
-        if self.family not in [each[0] for each in _families(values, context)]:
+        rows = {each["name"]: each for each in catalogue.entries("calibration_families")}
+        if self.family not in rows:
             return refuse(self, f"There is nothing called '{self.family}' to fit")
-        values.kept = set(values.kept) ^ {self.family}
+        if rows[self.family]["usual"]:
+            values.kept = set(values.kept) ^ {self.family}
+        else:
+            values.added = set(values.added) ^ {self.family}
         return {"FINISHED"}
 
 
@@ -107,7 +126,8 @@ class OPTISENSE_OT_calibrate(polls.Checked, bpy.types.Operator):
         ball = {"ball": round(values.ball, 4)} if values.ball > 0.0 else {}
         return start_with_design(
             self, context, TITLE, "calibrate", _take, photos=str(photos), to=str(to),
-            keep=sorted(values.kept), as_labelled=values.as_labelled, **ball,
+            keep=sorted(values.kept), also=sorted(values.added), fit=listed(values.fit),
+            hold_out=listed(values.hold_out), as_labelled=values.as_labelled, **ball,
         )  # fmt: skip
 
 

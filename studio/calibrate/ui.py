@@ -24,14 +24,25 @@ class OPTISENSE_PT_calibrate(SidebarPanel, bpy.types.Panel):
         column.prop(values, "photos")
         column.prop(values, "ball")
         column.prop(values, "as_labelled")
-        layout.label(text="What may change:")
-        grid = layout.grid_flow(columns=2, even_columns=True, align=True)
-        for row in catalogue.entries("calibration_families"):
-            may = row["name"] not in values.kept
-            grid.operator(
-                "optisense.keep_family", text=row["name"].capitalize(), depress=may,
-                icon="CHECKBOX_HLT" if may else "CHECKBOX_DEHLT",
-            ).family = row["name"]  # fmt: skip
+        for text, is_usual, ticked in (
+            ("What may change:", True, False),
+            ("The sensor's body, too:", False, True),
+        ):
+            rows = catalogue.entries("calibration_families")
+            rows = [row for row in rows if row["usual"] == is_usual]
+            if rows:
+                layout.label(text=text)
+            grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+            chosen = values.added if ticked else values.kept
+            for row in rows:
+                may = (row["name"] in chosen) == ticked
+                grid.operator(
+                    "optisense.keep_family", text=row["name"].capitalize(), depress=may,
+                    icon="CHECKBOX_HLT" if may else "CHECKBOX_DEHLT",
+                ).family = row["name"]  # fmt: skip
+        column = labelled(layout)
+        column.prop(values, "fit")
+        column.prop(values, "hold_out")
         if not show_job(layout, TITLE):
             layout.operator("optisense.calibrate", icon="CAMERA_DATA")
         show_outcome(layout, TITLE)

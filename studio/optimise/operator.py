@@ -140,6 +140,7 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
             expected = advising.advice(design, search, fields)
         except EngineError as error:
             return fail(self, error, TITLE)
+        fields |= more_fields(search)
         following.begin()
         bpy.context.window_manager.optisense_found.expected = expected
         return start(
@@ -161,6 +162,21 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
             name="search",
             **fields,
         )
+
+
+def more_fields(search: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """Return the fields of a request for the options that few searches need."""
+    fields: dict[str, Any] = {
+        "coarse_first": search.coarse_first,
+        "may_cross": search.may_cross,
+        "errors": vary.listed(search.errors),
+        "rules": [objective(each) for each in vary.listed(search.rules)],
+        "options": vary.listed(search.options),
+        "settings": vary.listed(search.settings),
+    }
+    if fields["errors"]:
+        fields["samples"] = search.samples
+    return fields
 
 
 class _WithStudy(polls.Checked):

@@ -82,6 +82,42 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
         name="Seed", min=0, max=2**31 - 1,
         description="Seed of the method's random numbers: the same seed gives the same search",
     )  # fmt: skip
+    coarse_first: BoolProperty(
+        name="Coarse First",
+        description="Score trials by fewer photons and pixels, and in full only those that may be "
+        "the best; saves most of the time of a search by pictures",
+    )
+    shows_more: BoolProperty(
+        name="More Options", description="Show the options that few searches need"
+    )
+    errors: StringProperty(
+        name="Errors",
+        description="Manufacturing errors: values and the standard deviations of their errors, "
+        "separated by commas, such as lights.*.position.z=0.1; the search then maximises the score "
+        "that nine of ten sensors reach",
+    )
+    samples: IntProperty(
+        name="Sensors a Trial", min=2, max=1000, default=8,
+        description="With errors: number of manufactured sensors simulated for each trial",
+    )  # fmt: skip
+    rules: StringProperty(
+        name="Rules",
+        description="Functions FILE.py:FUNCTION of a design that say whether it is allowed, "
+        "separated by commas",
+    )
+    options: StringProperty(
+        name="Of the Method",
+        description="Options of the method, separated by commas, such as sigma=0.1, population=20",
+    )
+    settings: StringProperty(
+        name="Of the Objectives",
+        description="Settings of the objectives, separated by commas, such as photons=1000000",
+    )
+    may_cross: BoolProperty(
+        name="Parts May Cross",
+        description="Allow parts that cut through one another or lose contact with those on which "
+        "they rest, and a much larger sensor",
+    )
     go_on: BoolProperty(
         name="Go on without Blender",
         description="Continue the search when Blender is closed; Resume connects to it again",

@@ -46,7 +46,15 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         column.prop(search, "require")
         for name in ("budget", "workers", "seed", "study"):
             column.prop(search, name)
-        layout.prop(search, "go_on")  # its name is longer than half a line
+        for name in ("coarse_first", "go_on"):
+            layout.prop(search, name)  # their names are longer than half a line
+        shown = "DISCLOSURE_TRI_DOWN" if search.shows_more else "DISCLOSURE_TRI_RIGHT"
+        layout.prop(search, "shows_more", icon=shown, emboss=False)
+        if search.shows_more:
+            column = labelled(layout)
+            for name in ("errors", "samples", "rules", "options", "settings"):
+                column.prop(search, name)
+            layout.prop(search, "may_cross")
         if found.offer:
             paragraph(layout, found.offer, "TIME")
         row = layout.row(align=True)

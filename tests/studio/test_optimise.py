@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -87,6 +88,28 @@ def test_the_best_of_a_search_keeps_the_conditions(mini: Any, tmp_path: Path) ->
     found = bpy.context.window_manager.optisense_found
     assert float(found.best) == pytest.approx(max(scores.values()), rel=1e-3)
     assert found.conditions.splitlines()[0].startswith("coverage >= 0.5: 0.")
+
+
+def test_a_search_takes_all_options_of_the_command_line(mini: Any, tmp_path: Path) -> None:
+    rules = tmp_path / "rules.py"
+    rules.write_text("def not_too_wide(design):\n    return design.camera.fov < 55\n")
+    search = mini.optisense_search
+    row = search.vary.add()
+    row.text = "camera.fov=45:60"
+    search.objective, search.method, search.budget = "aoap", "cma-es", 4
+    search.study = str(tmp_path / "study")
+    search.coarse_first = search.may_cross = True
+    search.options, search.rules = "population=4, sigma=0.2", f"{rules}:not_too_wide"
+    search.errors, search.samples = "camera.position.z=0.05", 2
+    search.settings = "photons=50000"
+    with pytest.raises(RuntimeError, match="needs pictures"):
+        bpy.ops.optisense.search()  # scores of rays are not made faster
+    search.coarse_first = False
+    assert bpy.ops.optisense.search() == {"FINISHED"}
+    stored = json.loads((tmp_path / "study" / "study.json").read_text())
+    assert stored["options"] == {"population": 4, "sigma": 0.2} and stored["samples"] == 2
+    assert not stored["apart"] and stored["errors"]
+    assert stored["settings"]["photons"] == 50000 and len(stored["rules"]) == 1
 
 
 def test_several_objectives_are_weighed_against_each_other(mini: Any, tmp_path: Path) -> None:

@@ -81,7 +81,8 @@ def test_a_sensor_is_fitted_to_photographs(bench: Bench) -> None:
     bench.enter("photos", str(photographs))
     bench.until(f"{CALIBRATION}.photos == {str(photographs)!r}")
     names = bench.see(
-        "[each['name'] for each in part('engine.catalogue').entries('calibration_families')]"
+        "[each['name'] for each in part('engine.catalogue').entries('calibration_families')"
+        " if each['usual']]"
     )
     for number, name in enumerate(names):
         if name != "powers":
