@@ -34,6 +34,9 @@ class GelElements:
         fixed: (f, 3) nodes that are fixed, mm.
         points: (faces, 4, 3) Gauss points of the skin and of the free sides, mm.
         normals: (faces, 4, 3) outward normals there, times each point's share of the area.
+        supports: (s, 4, 3) Gauss points of the base and of the sides beyond which the gel
+            continues, mm.
+        support_normals: (s, 4, 3) outward normals there, times each point's share of the area.
         size: number of free displacements.
     """
 
@@ -68,9 +71,12 @@ class GelElements:
             [number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]], axis=2
         )
         self._cells = corners[columns.cells]
-        self._faces, signs = self._free_faces()
-        self.points, normals, self._weights = face_points(self._nodes[self._faces])
-        self.normals = normals * signs[:, None, None]
+        faces, signs, free_ones = self._outer_faces()
+        points, normals, self._weights = face_points(self._nodes[faces])
+        normals = normals * signs[:, None, None]
+        self._faces = faces[free_ones]
+        self.points, self.normals = points[free_ones], normals[free_ones]
+        self.supports, self.support_normals = points[~free_ones], normals[~free_ones]
 
     @cached_property
     def _elements(self) -> IntArray:
@@ -161,19 +167,33 @@ class GelElements:
         total = np.bincount(place.ravel(), values[free].ravel(), minlength=self.size * count)
         return np.asarray(total.reshape(self.size, count))
 
-    def _free_faces(self) -> tuple[IntArray, FloatArray]:
-        """Return the nodes (faces, 4) of the skin's faces and of the free sides of the gel, and the
-        signs that turn their normals outward.
+    def at_skin(self, columns: IntArray, force: FloatArray) -> FloatArray:
+        """Return the forces (free, sources) of forces (sources, 3), each at the skin's node of its
+        column; those at fixed nodes are left out.
+        """
+        result = np.zeros((self.size, len(columns)))
+        freedom = self._freedom.reshape(-1, LAYERS + 1, 3)[columns, 0]
+        free = freedom >= 0
+        result[freedom[free], np.nonzero(free)[0]] = force[free]
+        return result
+
+    def _outer_faces(self) -> tuple[IntArray, FloatArray, NDArray[np.bool_]]:
+        """Return the nodes (faces, 4) of all outer faces of the elements, the signs that turn their
+        normals outward, and a mask of those on the skin and on free sides.
         """
         cells, count = self._cells, len(self.top)
-        nodes, signs = [cells * (LAYERS + 1)], [np.ones(len(cells))]
+        base = cells * (LAYERS + 1)
+        nodes = [base, base + LAYERS]
+        signs = [np.ones(len(cells)), -np.ones(len(cells))]
+        free = [np.ones(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)]
         held = (self._freedom.reshape(-1, LAYERS + 1, 3)[:, 0, 0]) < 0
         for (one, other, sign), (third, fourth) in zip(SIDES, OPPOSITE, strict=True):
             ends = cells[:, one], cells[:, other]
             beyond = cells[:, third] * count + cells[:, fourth]
-            free = ~np.isin(ends[0] * count + ends[1], beyond) & ~(held[ends[0]] & held[ends[1]])
-            run = np.stack(ends, axis=1)[free]
+            outer = ~np.isin(ends[0] * count + ends[1], beyond)
+            run = np.stack(ends, axis=1)[outer]
             base = run[:, None, :] * (LAYERS + 1) + np.arange(LAYERS)[None, :, None]
             nodes.append(np.concatenate([base + 1, base], axis=2).reshape(-1, 4))
             signs.append(np.full(len(nodes[-1]), sign))
-        return np.concatenate(nodes), np.concatenate(signs)
+            free.append(np.repeat(~held[run].all(axis=1), LAYERS))
+        return np.concatenate(nodes), np.concatenate(signs), np.concatenate(free)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property, partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ from optisense.mechanics.gel_columns import GelColumns
 from optisense.mechanics.gel_elements import GelElements
 from optisense.mechanics.layer import FARTHEST, layer_correction, surface_displacement
 from optisense.mechanics.point_load import INTO
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -169,7 +173,7 @@ class GelPatch:
         none, and 0 at the rim.
         """
         result = np.zeros(self.columns.solid.shape)
-        result[self._elements.rows, self._elements.cols] = values
+        result[self._elements.rows, self._elements.cols] = self._shares @ values
         nearest = ndimage.distance_transform_edt(
             ~self.columns.solid, return_distances=False, return_indices=True
         )
@@ -184,11 +188,45 @@ class GelPatch:
 
         rows, cols = np.nonzero(force.any(axis=0))
         points = np.column_stack([self.x[cols], self.y[rows]])
-        _, nearest = cKDTree(self._top[self._sources, :2]).query(points)
-        loads = np.zeros((len(force), len(self._sources)))
+        _, nearest = cKDTree(self._home[self._sources]).query(points)
+        loads = np.zeros((len(force), len(self._top)))
         for one, given in zip(loads, force, strict=True):
-            np.add.at(one, nearest, given[rows, cols])
-        return loads
+            np.add.at(one, self._sources[nearest], given[rows, cols])
+        return np.asarray((self._shares.T @ loads.T).T[:, self._sources])
+
+    @cached_property
+    def _home(self) -> FloatArray:
+        """Return the points (columns, 2) of the grid to which the columns belong."""
+        return np.column_stack(
+            [self.columns.x[self._elements.cols], self.columns.y[self._elements.rows]]
+        )
+
+    @cached_property
+    def _shares(self) -> csr_matrix:
+        """Return the matrix (columns, columns) that interpolates from the columns to their points
+        of the grid, which columns at the border of the gel have left.
+        """
+        from scipy.sparse import csr_matrix
+
+        elements, count = self._elements, len(self._top)
+        number = np.full(self.columns.solid.shape, -1)
+        number[elements.rows, elements.cols] = np.arange(count)
+        number = np.pad(number, 1, constant_values=-1)
+        itself = np.arange(count)
+        moved = self._top[:, :2] - self._home
+        own, parts = np.ones(count), []
+        for axis in (0, 1):
+            back = -np.sign(moved[:, axis]).astype(np.int64)
+            row = elements.rows + 1 + (back if axis == 1 else 0)
+            beside = number[row, elements.cols + 1 + (back if axis == 0 else 0)]
+            some = (beside >= 0) & (back != 0)
+            apart = np.abs(self._top[beside[some], axis] - self._top[some, axis])
+            share = np.abs(moved[some, axis]) / apart
+            own[some] -= share
+            parts.append((share, itself[some], beside[some]))
+        parts.append((own, itself, itself))
+        values, rows, columns = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return csr_matrix((values, (rows, columns)), shape=(count, count))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -272,12 +310,29 @@ class GelPatch:
         """
         elements = self._elements
         moved = point_load.displacements(self._offsets(elements.fixed, new), self._nu, axis)
-        offsets = self._offsets(elements.points.reshape(-1, 3), new)
-        stress = point_load.stresses(offsets, self._nu, axis)
-        out = elements.normals.reshape(-1, 3) @ self._frames[new]
-        push = self._in_frame(np.einsum("snij,snj->sni", stress, out), new)
-        blind = (offsets**2).sum(axis=2) < (BLIND * self.columns.pitch) ** 2
-        push[blind] = 0.0
-        return elements.held_back(self._in_frame(moved, new)) - elements.pushed(
-            push.reshape(len(push), -1, 4, 3)
+        push = self._tractions(axis, new, elements.points, elements.normals)
+        kept = self._tractions(axis, new, elements.supports, elements.support_normals)
+        missing = self._frames[new, :, axis] + push.sum(axis=1) + kept.sum(axis=1)
+        return (
+            elements.held_back(self._in_frame(moved, new))
+            - elements.pushed(push.reshape(len(push), -1, 4, 3))
+            + elements.at_skin(self._sources[new], missing)
         )
+
+    def _tractions(
+        self, axis: int, new: IntArray, points: FloatArray, normals: FloatArray
+    ) -> FloatArray:
+        """Return the forces (new, n, 3) of the half-spaces on Gauss points of faces.
+
+        Args:
+            axis: axis of the forces in the frames of the sources.
+            new: (new,) numbers of the sources.
+            points: (faces, 4, 3) Gauss points, mm.
+            normals: (faces, 4, 3) outward normals, times each point's share of the area.
+        """
+        offsets = self._offsets(points.reshape(-1, 3), new)
+        stress = point_load.stresses(offsets, self._nu, axis)
+        out = normals.reshape(-1, 3) @ self._frames[new]
+        push = self._in_frame(np.einsum("snij,snj->sni", stress, out), new)
+        push[(offsets**2).sum(axis=2) < (BLIND * self.columns.pitch) ** 2] = 0.0
+        return push

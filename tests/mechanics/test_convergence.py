@@ -13,7 +13,7 @@ from optisense.mechanics import Elasticity, Gel, normal_contact, pressed_skin, t
 TOP = TriangleMesh.grid((25.25, 20.75)).flipped()
 BLOCK = TriangleMesh.box((-12.625, -10.375, -4.25), (12.625, 10.375, 0.0))
 SURFACE = SensingSurface(TOP, (0, 0, 0), (1, 0, 0), (0, 1, 0))
-MIDDLE, CORNER = (0.0, 0.0), (11.0, 8.5)
+MIDDLE, BESIDE_SIDES, CORNER = (0.0, 0.0), (9.0, 7.0), (11.0, 8.5)
 
 
 def press(at=MIDDLE, neighbour=None, **motion):
@@ -37,8 +37,8 @@ def press(at=MIDDLE, neighbour=None, **motion):
         (
             pressed_skin,
             "MAX_TURNS",
-            4,
-            {"at": CORNER, "shift": (0.5, 0.5)},
+            3,
+            {"at": BESIDE_SIDES, "shift": (0.5, 0.5)},
             r"shear .* moved the skin by (\S+) mm",
         ),
         (pressed_skin, "MAX_SWEEPS", 2, {"neighbour": (2.8, 0.0)}, r"moved the skin by (\S+) mm"),

@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 from hertz import plane_strain_modulus
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import spsolve
 
-from optisense.geometry import Contact, SensingSurface, Sphere, TriangleMesh
+from optisense.geometry import Contact, Plane, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
 from optisense.mechanics import Elasticity, Gel, gel_patches, point_load
 from optisense.mechanics.gel_columns import gel_columns
@@ -152,7 +154,8 @@ def test_a_gel_that_is_curved_or_ends_resists_a_drag_less(monkeypatch, shape):
     elements = pressed(*body, at=at, shift=(0.2, 0.0))
     monkeypatch.setattr(gel_patches, "FLAT", math.inf)
     flat = pressed(*body, at=at, shift=(0.2, 0.0))
-    low, high = (0.85, 0.95) if shape == "dome" else (0.7, 0.9)
+    # With columns less than half as far apart the dome takes 0.85 of the shear.
+    low, high = (0.83, 0.87) if shape == "dome" else (0.7, 0.9)
     assert low < elements.shear_force[0] / flat.shear_force[0] < high
 
 
@@ -165,6 +168,49 @@ def test_free_sides_make_a_pad_softer(monkeypatch):
     assert forces[0] == pytest.approx(0.9965, abs=0.003)
     assert forces == sorted(forces, reverse=True)
     assert 0.75 < forces[-1] < 0.9
+
+
+def pad_under_a_plate(half, thickness, counts):
+    """The force (N per MPa of shear modulus) that moves the whole top of a pad by 1 mm without
+    friction, by elements of equal size in a quarter of the pad."""
+    nodes = np.stack(
+        np.meshgrid(
+            *(
+                np.linspace(0.0, size, n + 1)
+                for size, n in zip((*half, thickness), counts, strict=True)
+            ),
+            indexing="ij",
+        ),
+        axis=3,
+    )
+    number = np.arange(nodes[..., 0].size).reshape(nodes.shape[:3])
+    ends = [slice(None, -1), slice(1, None)]
+    cells = np.stack([number[x, y, z].ravel() for z in ends for y in ends for x in ends], axis=1)
+    points = nodes.reshape(-1, 3)
+    freedom = (3 * cells[:, :, None] + np.arange(3)).reshape(-1, 24)
+    rows, columns = np.repeat(freedom, 24, axis=1), np.tile(freedom, (1, 24))
+    values = stiffnesses(points[cells], GEL.poisson_ratio)
+    matrix = csc_matrix((values.ravel(), (rows.ravel(), columns.ravel())))
+    base, top = points[:, 2] == 0.0, points[:, 2] == thickness
+    fixed = (points == 0.0) | base[:, None]
+    fixed[top, 2] = True
+    moved = np.zeros_like(points)
+    moved[top, 2] = 1.0
+    moved, free = moved.ravel(), ~fixed.ravel()
+    moved[free] = spsolve(matrix[free][:, free], -matrix[free] @ moved)
+    return 4.0 * (matrix @ moved).reshape(-1, 3)[top, 2].sum()
+
+
+def test_a_plate_over_the_whole_pad_takes_the_force_of_plain_elements():
+    # Loads on the free sides themselves: half of each acts on what is beside the gel.
+    half, thickness, depth = (25.25 / 2, 20.75 / 2), 4.25, 0.3
+    skin, body = layer(2 * half[0], 2 * half[1], thickness)
+    surface = SensingSurface(skin, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+    gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
+    force = gel.pressed([Contact(Plane(0.0, 0.0, 30.0), at=(0.0, 0.0), depth=depth)])
+    plain = pad_under_a_plate(half, thickness, (12, 10, 4)) * GEL.shear_modulus * depth
+    # With elements of half the size, the plain model is 1.4 % softer.
+    assert force.contacts[0].force == pytest.approx(plain, rel=0.04)
 
 
 def test_a_thick_dome_takes_the_force_and_radius_of_hertz():

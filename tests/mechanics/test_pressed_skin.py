@@ -171,7 +171,8 @@ def test_the_mesh_is_fine_in_contacts_and_joins_the_rest(ball):
 def test_a_contact_that_hangs_over_the_border_presses_on_what_is_there():
     over = press(Contact(Sphere(1.5), at=(9.8, 0.0), depth=0.5))
     inside = press(Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.5))
-    assert 0.4 < over.contacts[0].force / inside.contacts[0].force < 0.9
+    # With columns less than half as far apart the ball takes 0.44 of the force.
+    assert 0.3 < over.contacts[0].force / inside.contacts[0].force < 0.5
     x, _ = np.meshgrid(over.contacts[0].place.x, over.contacts[0].place.y)
     touching = over.contacts[0].pressure > 0
     points = over.contacts[0].place.origin[0] + x * over.contacts[0].place.axes[0, 0]
