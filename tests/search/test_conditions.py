@@ -328,3 +328,26 @@ def test_a_part_that_does_not_exist_ends_a_search_before_its_trials(svelte: Sens
     with pytest.raises(UnknownPartError, match="aoap has no part 'nothing'") as told:
         search(svelte, {"cages.M1.blend": (0.0, 1.0)}, "aoap", require="aoap.nothing >= 0.1")
     assert "coverage" in str(told.value.hint)
+
+
+@pytest.mark.parametrize(
+    ("space", "goal", "options"),
+    [
+        ({"camera.fov": (45.0, 60.0)}, "aoap", {}),
+        ({"lights.*.colour": ["red", "blue"]}, "normdiff", {"method": "light-colours"}),
+    ],
+)
+def test_long_searches_read_the_start_and_the_best_so_far(
+    mini: SensorDesign,
+    monkeypatch: pytest.MonkeyPatch,
+    space: dict[str, object],
+    goal: str,
+    options: dict[str, Any],
+) -> None:
+    monkeypatch.setattr("optisense.search.study.reading_watch.FIRST_SECONDS", 0.0)
+    settings = {"photons": 60_000, "resolution": [160, 120]}
+    found = search(mini, space, goal, budget=3, settings=settings, **options)
+    best = max((each for each in found.trials if not each.failure), key=lambda each: each.score)
+    assert not best.is_start
+    for trial in (found.start, best):
+        assert 0.5 < trial.parts[WATCHED]["reading"] < 40.0

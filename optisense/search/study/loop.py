@@ -23,6 +23,7 @@ from optisense.search.study.conditions import condition_note, worsened_note
 from optisense.search.study.evaluators import evaluators, usual_times
 from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
 from optisense.search.study.promotion import promote
+from optisense.search.study.reading_watch import ReadingWatch
 from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
 from optisense.search.study.rescoring import rescore
 from optisense.search.study.settings import package_versions
@@ -106,6 +107,7 @@ class StudyRun:
         self._notes: list[str] = []
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
         self._tally = Tally(study.objective)
+        self._watch = ReadingWatch(study, self._tally, usual)
         self._first_seconds = 0.0
         self._last_report = time.monotonic()
         self._stage = START_STAGE
@@ -148,6 +150,7 @@ class StudyRun:
                 self._score_start(runner)
                 self._begin(TRIALS, self._tally.done)
                 ended = self._search(runner)
+                self._look(last=True)
                 self._report(now=True)
                 if not self._coarse:
                     self._begin(FRESH)
@@ -204,6 +207,12 @@ class StudyRun:
             outcomes = [row.outcome for row in whole if row.outcome is not None]
             self.method.tell(np.array([row.vector for row in whole]), outcomes)
             generation += 1
+            self._look()
+
+    def _look(self, *, last: bool = False) -> None:
+        """Read the best design so far, unless the method looks for a front."""
+        if not self.method.several:
+            self._watch.look(last=last)
 
     def _score_start(self, runner: Runner) -> None:
         store = self.study.store

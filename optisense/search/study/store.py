@@ -248,6 +248,12 @@ class Store:
         if changed != 1:
             raise SearchError(f"trial {number} was finished twice", where=str(self.path))
 
+    def add_parts(self, number: int, parts: Mapping[str, Any]) -> None:
+        """Replace the parts of a finished trial by others that contain them."""
+        row = json.dumps(parts), number
+        with translated_errors(self.path):
+            self._writer.execute("update trials set parts = ? where number = ?", row)
+
     def finish_fresh(self, number: int, seed: int, outcome: Outcome) -> None:
         """Write the outcome of a trial with another seed."""
         with translated_errors(self.path):
@@ -264,9 +270,7 @@ class Store:
             )
 
     def rows(self, generation: int | None = None) -> list[Row]:
-        """Return all trials, or those of one generation, in the order in which they were
-        proposed.
-        """
+        """Return all trials, or those of one generation, in the order of their proposal."""
         query = (
             "select number, generation, place, vector, done, scores, failure, parts, gradient, "
             "seconds, worker, finished from trials"

@@ -41,6 +41,7 @@ class Tally:
         self._nearest: Outcome | None = None
         self._best_outcome: Outcome | None = None
         self._start_outcome: Outcome | None = None
+        self._best_number = self._start_number = -1
         self._reasons: dict[str, list[str]] = {}
 
     def count(self, row: Row, outcome: Outcome) -> None:
@@ -52,6 +53,7 @@ class Tally:
         score = outcome.scores.get(self._objective, math.nan)
         if row.generation == START:
             self.start, self._start_outcome = score, outcome
+            self._start_number = row.number
         else:
             self.done += 1
             self.failed += outcome.failed
@@ -62,6 +64,7 @@ class Tally:
             self.scored[row.vector.tobytes()] = outcome
             if outcome.is_feasible and not score <= self.best:
                 self.best, self._best_outcome = score, outcome
+                self._best_number = row.number
             if self._nearest is None or outcome.breach < self._nearest.breach:
                 self._nearest = outcome
         enough = ALL_FAIL_WITH_START if math.isnan(self.start) else ALL_FAIL
@@ -91,12 +94,27 @@ class Tally:
             return ""
         return ", ".join(unmet(self._nearest.conditions))
 
+    def leading(self) -> list[tuple[int, Outcome]]:
+        """Return numbers and outcomes of the start and of the best trial, if that is better."""
+        best, start = self._best_outcome, self._start_outcome
+        if best is None or start is None or start.failed or not self.best > self.start:
+            return []
+        return [(self._start_number, start), (self._best_number, best)]
+
+    def replace(self, number: int, outcome: Outcome) -> None:
+        """Replace the outcome of the start or of the best trial by one with further parts."""
+        if number == self._start_number:
+            self._start_outcome = outcome
+        if number == self._best_number:
+            self._best_outcome = outcome
+
     def lost(self) -> tuple[str, ...]:
         """Return the watched quantities that are worse in the best trial so far than in the
         start.
         """
-        best, start = self._best_outcome, self._start_outcome
-        if best is None or start is None or start.failed or not self.best > self.start:
+        leading = self.leading()
+        if not leading:
             return ()
+        (_, start), (_, best) = leading
         worse = lost(best, start)
         return tuple(f"{name} {now:.3g} (start {was:.3g})" for name, (now, was) in worse.items())
