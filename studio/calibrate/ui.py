@@ -26,7 +26,7 @@ class OPTISENSE_PT_calibrate(SidebarPanel, bpy.types.Panel):
         column.prop(values, "as_labelled")
         for text, is_usual, ticked in (
             ("What may change:", True, False),
-            ("The sensor's body, too:", False, True),
+            ("What else may change:", False, True),
         ):
             rows = catalogue.entries("calibration_families")
             rows = [row for row in rows if row["usual"] == is_usual]

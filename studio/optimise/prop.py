@@ -106,11 +106,11 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
         "separated by commas",
     )
     options: StringProperty(
-        name="Of the Method",
+        name="Method's",
         description="Options of the method, separated by commas, such as sigma=0.1, population=20",
     )
     settings: StringProperty(
-        name="Of the Objectives",
+        name="Objectives'",
         description="Settings of the objectives, separated by commas, such as photons=1000000",
     )
     may_cross: BoolProperty(

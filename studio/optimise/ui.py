@@ -49,7 +49,9 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
         for name in ("coarse_first", "go_on"):
             layout.prop(search, name)  # their names are longer than half a line
         shown = "DISCLOSURE_TRI_DOWN" if search.shows_more else "DISCLOSURE_TRI_RIGHT"
-        layout.prop(search, "shows_more", icon=shown, emboss=False)
+        row = layout.row()
+        row.alignment = "LEFT"
+        row.prop(search, "shows_more", icon=shown, emboss=False)
         if search.shows_more:
             column = labelled(layout)
             for name in ("errors", "samples", "rules", "options", "settings"):

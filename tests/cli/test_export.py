@@ -48,7 +48,7 @@ def test_a_model_for_robot_simulators(tmp_path: Path) -> None:
     assert {path.stem for path in (tmp_path / "meshes").iterdir()} == {
         "skin", "gel", "tray", "guide", "gel-hull", "tray-hull", "guide-hull",
     }  # fmt: skip
-    assert "gel 0.97" in text and "--mass" in text
+    assert "gel 0.97" in text and "weighs" in text
 
 
 def test_the_command_offers_what_can_be_written() -> None:
