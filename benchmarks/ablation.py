@@ -99,13 +99,13 @@ def ablations() -> list[Ablation]:
         beam_sums,
         beams,
         bin_sums,
-        cache,
         glossy_interreflection,
         interreflection,
         shading,
         shading_points,
         smoothing,
         store,
+        tally,
     )
     from optisense.optics.scene import assembly
     from optisense.optics.transport import emission_guide, interact, photons
@@ -190,7 +190,7 @@ def ablations() -> list[Ablation]:
         of_light("kernels by the pilot photons", Change(smoothing, "varies_over", one_length)),
         of_light("narrow kernels out of view", Change(store, "SMOOTHED_MARGIN", 1e6)),
         of_light("sharpening", Change(smoothing, "MAX_SHARPENING", 0.0)),
-        of_light("overlapping bins", Change(cache, "dither", no_overlap)),
+        of_light("overlapping bins", Change(tally, "dither", no_overlap)),
         of_light("weak beams merged", Change(beams, "STRONG_SHARE", 0.0)),
         of_light("flat faces merged", Change(assembly, "_merged", every_facet)),
     ]  # fmt: skip

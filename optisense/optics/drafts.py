@@ -21,7 +21,8 @@ from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel
-from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore, LitScene
+from optisense.optics.radiance_cache.lit_scene import LitScene
+from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore
 from optisense.optics.scene.assembly import assemble
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.sensor_scenes import SensorScenes
@@ -63,7 +64,7 @@ class DraftCacheStore(CacheStore):
     """Store of radiance caches in coarse cells that reuses data of the store before it."""
 
     cell_size = DRAFT_CELL_SCALE * CELL_SIZE
-    tells_curved = False
+    thorough = False
     uses_pilot = False  # saves half of the tracing time, for some per cent on flanks of contacts
 
     def __init__(

@@ -23,7 +23,8 @@ from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
 from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
-from optisense.optics.radiance_cache.store import CacheStore, LitScene
+from optisense.optics.radiance_cache.lit_scene import LitScene
+from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.ray_model import RayModel
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.sensor_scenes import SensorScenes

@@ -16,7 +16,8 @@ from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
-from optisense.optics.radiance_cache.store import CacheStore, LitScene
+from optisense.optics.radiance_cache.lit_scene import LitScene
+from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import (
     Emitter,

@@ -13,7 +13,7 @@ from optisense.design import set_value
 from optisense.errors import LibraryError, RenderError
 from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
-from optisense.optics.radiance_cache.direction_bins import DIFFUSE_BINS
+from optisense.optics.radiance_cache.direction_bins import COARSE_BINS
 from optisense.sensors import build
 
 PIXELS = (80, 60)
@@ -281,7 +281,7 @@ def test_light_in_a_contact_hardly_depends_on_how_bins_of_directions_lie() -> No
         of = OpticalModel(design(), "llvm")
         axes = of._store.cells.axes
         if turned:
-            angle = np.pi / DIFFUSE_BINS.across
+            angle = np.pi / COARSE_BINS.across
             cos, sin = np.cos(angle), np.sin(angle)
             axes[:2] = np.array([[cos, sin], [-sin, cos]]) @ axes[:2]
         images.append(of.render([BALL], resolution=(160, 120), photons=2_000_000))

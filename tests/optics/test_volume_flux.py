@@ -11,7 +11,8 @@ from reference_scenes import diffuse_coating, quad
 from optisense.geometry import Sphere
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
-from optisense.optics.radiance_cache.store import CacheStore, LitScene
+from optisense.optics.radiance_cache.lit_scene import LitScene
+from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import Emitter, EmitterShape, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene

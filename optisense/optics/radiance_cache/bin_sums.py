@@ -17,9 +17,11 @@ from optisense.optics.radiance_cache.angular_variance import (
     squared_radius,
     two_discs,
 )
-from optisense.optics.radiance_cache.cache import MIN_COSINE, BinnedLight
+from optisense.optics.radiance_cache.cache import BinnedLight
 from optisense.optics.radiance_cache.irradiance import irradiance
+from optisense.optics.radiance_cache.raised_plane import RAISED_HEIGHT, sampled_plane
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
+from optisense.optics.radiance_cache.tally import MIN_COSINE
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene
@@ -55,8 +57,9 @@ def sum_bins(
     are drawn in proportion to the light, evenly spaced in its running sum (systematic sampling);
     without occlusion, the sum is exact to half a step.
 
-    If the cache also holds the light half-way up the flux layer, points on indenters interpolate
-    between that light and the light on the surface below them.
+    If the cache also holds the light in the raised plane, points on indenters look up either plane,
+    at random. If it holds the light half-way up the flux layer, they interpolate between that light
+    and the light on the surface below them.
     """
     moments, heights, colours = light.tables
     upper, groups, bins, points = light.above, light.groups, light.bins, at.seen
@@ -79,11 +82,16 @@ def sum_bins(
     up = dr.clip(up, 0, MAX_EXTRAPOLATION)
     rise = dr.dot(upright, points.point) - offset
     axis = bin_axis(light.cells, 2)
+    level, first = mi.Float(0), mi.UInt32(0)
+    if dr.hint(light.planes > 1, mode="scalar"):
+        above = sampled_plane(points, rise, raised)
+        level = dr.select(above, RAISED_HEIGHT, 0)
+        first = dr.select(above, dr.opaque(mi.UInt32, light.cells.cells), 0)
     k = mi.UInt32(0)
     while active & (k < bins):
         there = mi.UInt32(at.cell)
         if upper is None:
-            there = _place(light, scenes.fixed, at, k)
+            there = first + _place(light, scenes.fixed, at, k, level)
         for g in range(groups):
             entry = (there * bins + k) * groups + g
             value = dr.gather(mi.Vector4f, moments, entry, active)
@@ -184,11 +192,14 @@ def _shorter_path_factor(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) 
 
 
 @dr.syntax
-def _place(light: BinnedLight, fixed: RayScene, at: ShadingPoints, k: mi.UInt32) -> mi.UInt32:
+def _place(
+    light: BinnedLight, fixed: RayScene, at: ShadingPoints, k: mi.UInt32, level: mi.Float
+) -> mi.UInt32:
     """Return the number of the cell in which bin ``k`` is looked up for each point.
 
     For a point on an indenter, it is the cell where the line through the point along the bin's
-    middle direction meets the undeformed surface; the planes of two cells are intersected in turn.
+    middle direction meets the undeformed surface, or the plane at the height ``level`` (mm) above
+    it; the planes of two cells are intersected in turn.
     On a curved surface, lines that graze these planes are traced as rays. (The mean direction of
     the bin's light is not used: where a lamp straddles two bins, its halves would be looked up at
     places that do not match.)
@@ -202,8 +213,9 @@ def _place(light: BinnedLight, fixed: RayScene, at: ShadingPoints, k: mi.UInt32)
         normal, offset = plane_of(cells, there, exists)
         facing = dr.dot(normal, towards)
         exists &= facing > MIN_COSINE
-        way = (dr.dot(normal, point) - offset) / dr.maximum(facing, MIN_COSINE)
-        there, found = cell_at(cells, point - towards * way + at.shift, exists)
+        way = (dr.dot(normal, point) - offset - level) / dr.maximum(facing, MIN_COSINE)
+        foot = point - towards * way - normal * level
+        there, found = cell_at(cells, foot + at.shift, exists)
         exists &= found
     if dr.hint(fixed.smooth, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
         if at.active & at.raised & ~exists:

@@ -2,10 +2,10 @@
 
 The light that arrives at the sensing surface varies slowly from place to place. In a contact, only
 the tilt of the surface and its shadows vary within a tenth of a millimetre. Photons are therefore
-traced once per design, without contacts, and tallied where they land: each surface cell and
-direction bin (see `DirectionBins`) keeps the flux through a plane *across the light* (a photon's
-power over its cosine of incidence) and the mean direction. `shading` looks it up for visible
-points. The cost of an image then does not depend on the number of photons.
+traced once per design, without contacts, and tallied where they land (see `tally`): each surface
+cell and direction bin (see `DirectionBins`) keeps the flux through a plane *across the light* and
+the mean direction. `shading` looks it up for visible points. The cost of an image then does not
+depend on the number of photons.
 """
 
 from __future__ import annotations
@@ -15,36 +15,9 @@ from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
-import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
-from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.radiance_cache.beams import Beams, collect_beams
-from optisense.optics.radiance_cache.direction_bins import (
-    DIFFUSE_BINS,
-    FINEST_BINS,
-    DirectionBins,
-    bin_centres,
-    direction_bin,
-    dither,
-    landing_bits,
-)
-from optisense.optics.radiance_cache.irradiance import irradiance_table
-from optisense.optics.radiance_cache.noise import noise_of_worst_places, relative_noise
-from optisense.optics.radiance_cache.power_rounding import PowerRounding
-from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, smooth
-from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at
-from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
-from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
-
-FloatArray = NDArray[np.floating]
-
-MIN_COSINE = 0.02
-"""Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
-grazing photon does not become a bright beam."""
-EMPTY_BIN_SHARE = 1e-7
-"""Share of all the light below which a direction bin counts as empty."""
+from optisense.optics.radiance_cache.beams import Beams
+from optisense.optics.scene.surface_cells import SurfaceCells
 
 
 class Tables(NamedTuple):
@@ -61,6 +34,8 @@ class RadianceCache:
 
     Attributes:
         cells: the surface cells.
+        planes: number of planes that hold light: 1 for the surface, 2 with the raised plane above
+            it (see `raised_plane`), whose entries follow those of the surface.
         bins: number of direction bins that hold light.
         groups: number of light groups.
         moments: four floats per entry: the flux density across the light (mW/mm^2) times the
@@ -82,6 +57,7 @@ class RadianceCache:
     """
 
     cells: SurfaceCells
+    planes: int
     bins: int
     groups: int
     moments: mi.Float
@@ -107,6 +83,7 @@ class RadianceCache:
         """Return the light by direction bins."""
         return BinnedLight(
             cells=self.cells,
+            planes=self.planes,
             tables=Tables(self.moments, self.heights, self.colours),
             above=self.above_surface,
             centres=self.centres,
@@ -123,13 +100,14 @@ class BinnedLight:
     """The part of a radiance cache that points on and near indenters read.
 
     Attributes:
-        cells, centres, irradiance, groups, coloured, narrow_lobes: as in `RadianceCache`.
+        cells, planes, centres, irradiance, groups, coloured, narrow_lobes: as in `RadianceCache`.
         tables: the light on the surface.
         above: the light half-way up the flux layer, if there is one.
         bins: number of direction bins, as an opaque array.
     """
 
     cells: SurfaceCells
+    planes: int
     tables: Tables
     above: Tables | None
     centres: mi.Float
@@ -138,258 +116,3 @@ class BinnedLight:
     groups: int
     coloured: bool
     narrow_lobes: bool
-
-
-class CacheTally:
-    """Sums of photons per cell, direction bin and light group, over photon passes."""
-
-    def __init__(
-        self,
-        kernels: Kernels,
-        groups: int,
-        coloured: bool,
-        roughness: float | None,
-        flux_layer: FluxLayer | None = None,
-        directions: DirectionBins = DIFFUSE_BINS,
-    ) -> None:
-        """Prepare empty tables.
-
-        Args:
-            kernels: the cells and their smoothing.
-            groups: number of light groups.
-            coloured: whether powers are kept per colour channel.
-            roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
-            flux_layer: the layer in which the light above the surface is tallied; None for no
-            layer.
-            directions: the direction bins.
-        """
-        self.directions = directions
-        self.flux_layer = flux_layer
-        self.roughness = roughness
-        self.kernels = kernels
-        self.cells = cells = kernels.cells
-        self.groups = groups
-        self.coloured = coloured
-        self.passes = 0
-        self.photons = 0
-        entries = cells.cells * directions.count * groups * 4
-        self.landed = self._tables(entries)
-        self.above_surface = None if flux_layer is None else self._tables(entries)
-        # Power of the photons of even and of odd number; their difference gives the noise. A cell
-        # receives more photons than single precision adds exactly.
-        self.halves = dr.zeros(mi.Float64, 2 * cells.cells * groups)
-
-    def _tables(self, entries: int) -> Tables:
-        moments = dr.zeros(mi.Float, entries)
-        colours = dr.zeros(mi.Float, entries if self.coloured else 4)
-        return Tables(moments, dr.zeros(mi.Float, entries // 4), colours)
-
-    def add(self, photons: PhotonMap) -> None:
-        """Add the photons of a pass. All passes must have the same number of photons."""
-        cell, found, bits, scalar = self._tally(photons, self.landed, None)
-        row = cell + ((bits >> HALF_SHIFT) & 1) * dr.opaque(mi.UInt32, self.cells.cells)
-        dr.scatter_add(
-            self.halves, mi.Float64(scalar), row * self.groups + (bits & GROUP_MASK), found
-        )
-        if self.above_surface is not None and photons.passing is not None:
-            self._tally(photons.passing, self.above_surface, self.flux_layer)
-        self.passes += 1
-        self.photons += photons.emitted
-        dr.eval(self.landed, self.halves, self.above_surface)
-
-    def _tally(
-        self, photons: PhotonMap, tables: Tables, flux_layer: FluxLayer | None
-    ) -> tuple[mi.UInt32, mi.Bool, mi.UInt32, mi.Float]:
-        """Add photons to tables.
-
-        Args:
-            photons: the photons that landed, or that crossed the flux layer.
-            tables: the sums that are added to.
-            flux_layer: the layer that the photons crossed; None if they landed.
-
-        Returns:
-            The cell of each photon, whether it lies in one, its bits and its power in whole quanta.
-        """
-        index = dr.arange(mi.UInt32, photons.count)
-        place = dr.gather(mi.Vector4f, photons.place, index)
-        travel = dr.gather(mi.Vector4f, photons.travel, index)
-        bits = dr.reinterpret_array(mi.UInt32, place.w)
-        point = mi.Point3f(place.x, place.y, place.z)
-        if flux_layer is None:
-            cell, found = cell_at(self.cells, point, mi.Bool(True))
-            across = dr.rcp(dr.maximum(travel.w, MIN_COSINE))
-        else:
-            cell, _, found = layer_cell_at(flux_layer, point, mi.Bool(True))
-            across = dr.rcp(dr.maximum(travel.w, 1e-6))
-        direction = mi.Vector3f(travel.x, travel.y, travel.z)
-        count = dr.opaque(mi.UInt32, self.directions.count)
-        random = landing_bits(place, direction)
-        beside = dither(random, self.directions)
-        in_quanta = PowerRounding.of(photons.emitted_power, random)
-        bin_ = direction_bin(self.cells, self.directions, -direction, *beside)
-        entry = (cell * count + bin_) * self.groups + (bits & GROUP_MASK)
-        power = mi.Vector4f(0)
-        if self.coloured:
-            power = dr.gather(mi.Vector4f, photons.power, index)
-            scalar = (power.x + power.y + power.z) * (1 / 3)
-        else:
-            scalar = dr.gather(mi.Float, photons.power, index)
-        kept = across * in_quanta.kept(scalar * across)
-        flux = scalar * kept
-        if self.coloured:
-            for k in range(3):
-                value = in_quanta(power[k] * kept)
-                dr.scatter_add(tables.colours, value, entry * 4 + k, found)
-        for k in range(3):
-            dr.scatter_add(tables.moments, in_quanta(-direction[k] * flux), entry * 4 + k, found)
-        dr.scatter_add(tables.moments, in_quanta(flux), entry * 4 + 3, found)
-        height = dr.dot(direction, bin_axis(self.cells, 2))
-        dr.scatter_add(tables.heights, in_quanta(dr.square(height) * flux), entry, found)
-        return cell, found, bits, in_quanta(scalar)
-
-    def noise(self) -> float:
-        """Return the relative RMS noise of the smoothed irradiance (1 = 100 %).
-
-        The noise is estimated from the difference between two halves of the photons. It is the RMS
-        over all cells in or near the camera's view and all light groups, relative to each group's
-        mean; infinite without photons.
-        """
-        if self.passes < 1:
-            return float("inf")
-        near = self.kernels.near
-        return relative_noise(*(values[near] for values in self._light_and_spread()))
-
-    def worst_noise(self) -> float:
-        """Return the relative RMS noise (1 = 100 %) that the noisiest 5 % of the area have at
-        least.
-
-        The area is that in or near the camera's view, and the noise of each place is relative to
-        the light there. Light groups have equal weights, each relative to its own mean. The result
-        is infinite without photons.
-        """
-        if self.passes < 1:
-            return float("inf")
-        kernel = self._smoothing().kernel.matrix
-        near, areas = self.kernels.near, self.cells.areas
-        return noise_of_worst_places(*self._light_and_spread(), near, areas, kernel)
-
-    def _light_and_spread(self) -> tuple[FloatArray, FloatArray]:
-        """Return the smoothed irradiance (cells, groups), mW/mm^2, and its squared standard
-        deviation.
-        """
-        kernel = self._smoothing()
-        means = [kernel.kernel.matrix @ landed for landed in self._landed()]
-        if kernel.correction is not None:
-            means = [kernel.correction @ light for light in means]
-        # Half the difference of two halves has the same standard deviation as their mean.
-        return (means[0] + means[1]) / 2, ((means[0] - means[1]) / 2) ** 2
-
-    def _corrected(
-        self,
-        tables: Tables,
-        kernel: csr_matrix,
-        correction: csr_matrix,
-        used: NDArray[np.integer],
-    ) -> Tables:
-        """Return the smoothed light of the bins ``used``, with the blur of each bin undone.
-
-        Matrix products take half the time of `smooth` here, as the correction fills most of the
-        many bins.
-        """
-        cells, count = self.cells.cells, self.directions.count
-        # Elsewhere the correction is the identity; a copy of a table takes as long as a product.
-        near = np.flatnonzero(self.kernels.near)
-        once = (kernel / self.passes).astype(np.float32)
-        twice = correction[near].astype(np.float32)
-
-        def summed(table: mi.Float) -> mi.Float:
-            whole = np.asarray(table).reshape(cells, count, -1)
-            chosen = whole if len(used) == count else whole[:, used]
-            light = once @ chosen.reshape(cells, -1)
-            light[near] = twice @ light
-            return floats(light)
-
-        moments, heights = summed(tables.moments), summed(tables.heights)
-        return Tables(moments, heights, summed(tables.colours) if self.coloured else moments)
-
-    def _smoothing(self) -> Smoothing:
-        return self.kernels.smoothing(self.photons, self.directions.corrected)
-
-    def _landed(self) -> FloatArray:
-        """Return the power (2, cells, groups), mW, of the photons of even and odd number on each
-        cell.
-        """
-        halves = np.asarray(self.halves, dtype=np.float64) * (2 / self.passes)
-        return halves.reshape(2, -1, self.groups)
-
-    def smoothed(self) -> RadianceCache:
-        """Return the radiance cache of the photons so far; only bins that hold light are kept."""
-        count = self.directions.count
-        total = dr.zeros(mi.Float, count)
-        lanes = dr.arange(mi.UInt32, self.cells.cells * count * self.groups)
-        value = dr.gather(mi.Float, self.landed.moments, lanes * 4 + 3)
-        if self.above_surface is not None:
-            value += dr.gather(mi.Float, self.above_surface.moments, lanes * 4 + 3)
-        dr.scatter_add(total, value, (lanes // self.groups) % dr.opaque(mi.UInt32, count))
-        power = np.array(total)
-        used = np.flatnonzero(power > EMPTY_BIN_SHARE * power.sum())
-        used = used if len(used) else np.zeros(1, dtype=np.int64)
-        bins = indices(used)
-        kernel = self._smoothing()
-        factors: FloatArray = np.ones((self.cells.cells, self.groups))
-        if kernel.correction is None:
-            landed = self._landed().mean(axis=0)
-            factors = self.kernels.sharpening(landed, self.photons)
-        rest = (
-            bins,
-            dr.opaque(mi.UInt32, count),
-            self.groups,
-            floats(factors / self.passes),
-        )
-
-        def smoothed(tables: Tables) -> Tables:
-            if kernel.correction is not None:
-                return self._corrected(tables, kernel.kernel.matrix, kernel.correction, used)
-            given, kinds = [tables.moments, tables.heights], [mi.Vector4f, mi.Float]
-            if self.coloured:
-                given.append(tables.colours)
-                kinds.append(mi.Vector4f)
-            sums = smooth(kernel.kernel, self.cells.cells, given, kinds, *rest)
-            dr.eval(sums)  # together; otherwise the loop would run again for each array
-            flat = [dr.ravel(each) for each in sums]
-            return Tables(flat[0], flat[1], flat[2] if self.coloured else flat[0])
-
-        moments, heights, colours = smoothed(self.landed)
-        above_surface = None if self.above_surface is None else smoothed(self.above_surface)
-        table = irradiance_table(
-            moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
-        )
-        dr.eval(moments, heights, colours, table, above_surface)
-        return RadianceCache(
-            cells=self.cells,
-            bins=len(used),
-            groups=self.groups,
-            moments=moments,
-            heights=heights,
-            colours=colours,
-            coloured=self.coloured,
-            roughness=self.roughness,
-            narrow_lobes=self.directions.across >= FINEST_BINS.across,
-            centres=bin_centres(self.cells, self.directions, used),
-            irradiance=table,
-            beams=collect_beams(
-                moments,
-                heights,
-                colours,
-                self.coloured,
-                used,
-                self.directions.across,
-                self.directions.across,
-                self.cells.cells * self.groups,
-                self.groups,
-            ),
-            photons=self.photons,
-            noise=self.noise(),
-            worst_noise=self.worst_noise(),
-            above_surface=above_surface,
-        )

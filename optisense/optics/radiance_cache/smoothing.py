@@ -259,42 +259,51 @@ def _pairs_within(
 @dr.syntax
 def smooth(
     kernel: WeightedSums,
-    cells: int,
+    size: tuple[int, int],
     tables: list[mi.Float],
     kinds: list[Any],
     bins: mi.UInt32,
     stride: mi.UInt32,
     groups: int,
     factors: mi.Float,
-) -> list[Any]:
-    """Return kernel-weighted sums over neighbouring cells of the chosen bins.
+) -> list[list[Any]]:
+    """Return kernel-weighted sums over neighbouring cells of the chosen bins, for each plane.
 
     Args:
         kernel: the weights.
-        cells: number of cells.
+        size: number of planes, and of cells in each (see `RadianceCache.planes`).
         tables: the tables that are smoothed; the first holds the moments of a radiance cache.
         kinds: the type of an entry of each table: `mi.Float` or a vector.
         bins: the numbers of the chosen bins.
         stride: number of bins per cell in the tables.
         groups: number of light groups.
-        factors: (cells times groups) factors by which the sums are multiplied.
+        factors: (planes times cells times groups) factors by which the sums are multiplied.
     """
+    planes, cells = size
     lane = dr.arange(mi.UInt32, cells * dr.width(bins) * groups)
     used = dr.opaque(mi.UInt32, dr.width(bins))  # one kernel for any number of bins
     group = lane % groups
     rest = lane // groups
     slot = dr.gather(mi.UInt32, bins, rest % used) * groups + group
     cell = rest // used
+    plane = dr.opaque(mi.UInt32, cells) * (stride * groups)
     j = dr.gather(mi.UInt32, kernel.start, cell)
     end = dr.gather(mi.UInt32, kernel.start, cell + 1)
-    totals = [kind(0) for kind in kinds]
+    totals = [[kind(0) for kind in kinds] for _ in range(planes)]
     while j < end:
         other = dr.gather(mi.UInt32, kernel.cell, j) * (stride * groups) + slot
-        # Most bins are empty: the fourth float of their first table is 0.
-        if dr.gather(mi.Float, tables[0], other * 4 + 3) != 0:
-            weight = dr.gather(mi.Float, kernel.weight, j)
-            for i in range(len(kinds)):
-                totals[i] += weight * dr.gather(kinds[i], tables[i], other)
+        weight = dr.gather(mi.Float, kernel.weight, j)
+        for p in range(planes):
+            # Most bins are empty: the fourth float of their first table is 0.
+            first = dr.gather(kinds[0], tables[0], other)
+            if first.w != 0:
+                totals[p][0] += weight * first
+                for i in range(1, len(kinds)):
+                    totals[p][i] += weight * dr.gather(kinds[i], tables[i], other)
+            other += plane
         j += 1
-    factor = dr.gather(mi.Float, factors, cell * groups + group)
-    return [total * factor for total in totals]
+    for p in range(planes):
+        row = cell + dr.opaque(mi.UInt32, p * cells)
+        factor = dr.gather(mi.Float, factors, row * groups + group)
+        totals[p] = [total * factor for total in totals[p]]
+    return totals

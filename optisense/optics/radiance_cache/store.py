@@ -15,13 +15,12 @@ from scipy.spatial import cKDTree
 from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.backend.stages import Stage, StageCallback
-from optisense.optics.radiance_cache.cache import CacheTally, RadianceCache
-from optisense.optics.radiance_cache.direction_bins import DirectionBins
+from optisense.optics.radiance_cache.cache import RadianceCache
+from optisense.optics.radiance_cache.direction_bins import COARSE_BINS, DirectionBins
+from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
-from optisense.optics.scene.emitters import EmitterTable
-from optisense.optics.scene.ray_scene import Piece, RayScene
-from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.radiance_cache.tally import CacheTally
 from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.transport.emission_guide import EmissionGuide, learn_guide, uniform_guide
 from optisense.optics.transport.photons import (
@@ -76,50 +75,12 @@ class _Running:
     per_light: int
 
 
-@dataclass(frozen=True)
-class LitScene:
-    """A sensor without contacts, ready for photon tracing.
-
-    Attributes:
-        scene: its surfaces.
-        opaque: its opaque pieces.
-        table: its lights.
-        coloured: whether surfaces are coloured.
-        roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
-        pilot: the scene that pilot photons are traced in; ``scene`` if None. The first landings of
-            photons do not depend on the coating. With the same coating in every pilot pass, images
-            do not depend on the coating that the sensor had when its guide was learned.
-        pilot_coloured: whether the surfaces of ``pilot`` are coloured.
-    """
-
-    scene: RayScene
-    opaque: list[Piece]
-    table: EmitterTable
-    coloured: bool
-    roughness: float | None = None
-    pilot: RayScene | None = None
-    pilot_coloured: bool = False
-
-    @classmethod
-    def of(cls, scenes: SensorScenes) -> LitScene:
-        """Return the sensor of these scenes."""
-        return cls(
-            scenes.full,
-            scenes.opaque,
-            scenes.emitter_table,
-            scenes.coloured,
-            scenes.roughness,
-            scenes.pilot,
-            scenes.pilot_coloured,
-        )
-
-
 class CacheStore:
     """Tracer of photon passes that keeps the tallies and the radiance caches computed from them."""
 
     cell_size = CELL_SIZE
-    tells_curved = True
-    """Whether curved surfaces get direction bins of their own."""
+    thorough = True
+    """Whether curved surfaces get direction bins of their own, and flat ones a raised plane."""
     uses_pilot = True
     """Whether the pilot photons also estimate the distribution of the light: where it grazes,
     indenters are then lit by the flux layer above the surface, and where it varies, kernels are
@@ -161,12 +122,21 @@ class CacheStore:
     @property
     def _directions(self) -> DirectionBins:
         """The direction bins that the coating needs."""
-        return DirectionBins.for_coating(self._lit.roughness, self._curved and not self._grazes)
+        shape = self._curved and not self._grazes, self._raises
+        return DirectionBins.for_coating(self._lit.roughness, *shape)
 
     @cached_property
     def _curved(self) -> bool:
-        """Whether surfaces are curved and `tells_curved` gives them direction bins of their own."""
-        return self.tells_curved and any(piece.normals is not None for piece in self._lit.opaque)
+        """Whether surfaces are curved and `thorough` gives them direction bins of their own."""
+        return self.thorough and any(piece.normals is not None for piece in self._lit.opaque)
+
+    @property
+    def _raises(self) -> bool:
+        """Whether coarse bins have a raised plane: over flat surfaces, unless cells would be
+        larger, or light grazes and the volume flux takes the place of the raised plane.
+        """
+        flat = self.thorough and not self._curved and not self._grazes
+        return flat and 2 * self._tally_bytes(COARSE_BINS, self.cell_size) < MAX_TALLY_BYTES
 
     @property
     def _flux_layer(self) -> FluxLayer | None:
@@ -234,18 +204,21 @@ class CacheStore:
     def cells(self) -> SurfaceCells:
         """The cells over all opaque surfaces of the sensor."""
         if self._cells is None:
-            points, triangles = self._opaque_mesh
-            a, b, c = (points[triangles[:, k]] for k in range(3))
-            area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
-            directions = self._directions
-            entry = directions.count * self._lit.table.groups * (36 if self._lit.coloured else 20)
+            most = MAX_FINE_TALLY_BYTES if self._directions.fine else MAX_TALLY_BYTES
+            least = float(np.sqrt(self._tally_bytes(self._directions, 1.0) / most))
             if self._grazes:
-                entry *= 2
-            most = MAX_FINE_TALLY_BYTES if directions.fine else MAX_TALLY_BYTES
-            least = float(np.sqrt(1.3 * area * entry / most))
+                least *= np.sqrt(2)
             scale = self.cell_size / CELL_SIZE
-            self._cells = build_cells(points, triangles, max(self.cell_size, scale * least))
+            self._cells = build_cells(*self._opaque_mesh, max(self.cell_size, scale * least))
         return self._cells
+
+    def _tally_bytes(self, directions: DirectionBins, size: float) -> float:
+        """Return the memory (bytes) that a plane's tally takes with cells of this side (mm)."""
+        points, triangles = self._opaque_mesh
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+        entry = directions.count * self._lit.table.groups
+        return 1.3 * area / size**2 * entry * (36 if self._lit.coloured else 20)
 
     @property
     def kernels(self) -> Kernels:
@@ -329,6 +302,7 @@ class CacheStore:
                     self._lit.roughness,
                     self._flux_layer,
                     self._directions,
+                    2 if self._raises and not self._directions.fine else 1,
                 ),
                 per_light,
             )
