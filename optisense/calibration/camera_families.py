@@ -118,8 +118,8 @@ def shading(design: SensorDesign) -> list[FitQuantity]:
         )
     ]  # fmt: skip
     outwards = FitQuantity(
-        "camera.shading.power", "power with which it grows outwards", "", power, 1.0, 8.0,
-        SHADING_RANGE, True, home="camera.shading",
+        "camera.shading.power", "exponent of the dimming by the distance from the middle", "",
+        power, 1.0, 8.0, SHADING_RANGE, True, home="camera.shading",
     )  # fmt: skip
     return [*found, outwards]
 

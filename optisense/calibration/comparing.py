@@ -6,11 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from optisense.calibration.contact_placing import FIT_WIDTH, placed, scaled_contact
 from optisense.calibration.model_pictures import ModelPictures, model_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.reading_both_ways import realism_and_readings
 from optisense.calibration.realism import Realism
-from optisense.calibration.seen_contacts import SeenContact, doubts, seen_contacts
+from optisense.calibration.seen_contacts import (
+    SeenContact,
+    check_shape,
+    doubts,
+    seen_contacts,
+)
 from optisense.errors import CalibrationError
 from optisense.quality import PICTURE_PHOTONS
 
@@ -78,8 +84,8 @@ def compare(
         photographs: photographs of the real sensor.
         photons: number of photons.
         seed: seed of the light.
-        refine: whether labelled contacts are searched near their labels too; hand labels are off by
-            pixels.
+        refine: whether contacts are placed where the model's responses are closest to the
+            photographs', also labelled ones; hand labels are off by pixels.
         progress: function that is called with the number of rendered pictures.
 
     Raises:
@@ -87,6 +93,13 @@ def compare(
         OptiSenseError: the design can't be rendered.
     """
     kept, seen, notes = usable(photographs, refine=refine)
+    if refine:
+        check_shape(kept, model)
+        small = kept.scaled(FIT_WIDTH)
+        factor = small.size[0] / kept.size[0]
+        found = [scaled_contact(place, factor) for place in seen]
+        found = placed(model, small, found, photons=photons, seed=seed)
+        seen = [scaled_contact(place, 1.0 / factor) for place in found]
     pictures = model_pictures(model, kept, seen, photons=photons, seed=seed, progress=progress)
     figures = realism_and_readings(model, kept, seen, pictures)
     return Comparison(kept, tuple(seen), pictures, figures, tuple(notes))

@@ -9,6 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.calibration.contact_placing import (
+    FIT_WIDTH,
+    moved_contact,
+    placed,
+    scaled_contact,
+)
 from optisense.calibration.gauss_newton import LayeredFit, Solution
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
@@ -25,11 +31,6 @@ if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
 
 FloatArray = NDArray[np.float64]
-
-FIT_WIDTH = 160
-"""Width of the pictures of the fit, in pixels: a quarter of the pixels of those that are compared
-in the end, and enough for the smooth responses of balls.
-"""
 
 DIFFERENCE = 0.35
 """Step of the difference quotients of numbers that need a rendering, in plausible ranges; it is
@@ -79,7 +80,7 @@ class FitRounds:
         self._small = photographs.scaled(FIT_WIDTH)
         factor = self._small.size[0] / photographs.size[0]
         self._factor = factor
-        self._seen = [_scaled(place, factor) for place in seen]
+        self._seen = [scaled_contact(place, factor) for place in seen]
         count = len(photographs.presses)
         self.held_out = settings.indices_held_out(photographs)
         self._used = [index for index in range(count) if index not in self.held_out]
@@ -121,7 +122,7 @@ class FitRounds:
                 found = found.with_changes(found.steps - steps)
             solution, steps = found, found.steps
             for index, moved in zip(self._used, solution.contacts, strict=True):
-                self._seen[index] = _moved(self._seen[index], moved)
+                self._seen[index] = moved_contact(self._seen[index], moved)
         assert solution is not None
         return solution
 
@@ -169,18 +170,14 @@ class FitRounds:
             self.report_step("placing what was held out")
             small = self._small.subset(self.held_out)
             self._model.set_design(fitted)
-            for _ in range(2):
-                seen = [self._seen[index] for index in self.held_out]
-                layers = layered_pictures(
-                    self._model, small, seen, self._settings.photons, self._settings.seed,
-                    kept=self._kept,
-                )  # fmt: skip
-                none: FloatArray = np.zeros(0)
-                fit = LayeredFit(small, seen, layers, [], exposure, none, {})
-                found = fit.solve(none, np.zeros((len(seen), 3)))
-                for index, moved in zip(self.held_out, found.contacts, strict=True):
-                    self._seen[index] = _moved(self._seen[index], moved)
-        return [_scaled(place, 1.0 / self._factor) for place in self._seen]
+            found = placed(
+                self._model, small, [self._seen[index] for index in self.held_out],
+                photons=self._settings.photons, seed=self._settings.seed, exposure=exposure,
+                kept=self._kept,
+            )  # fmt: skip
+            for index, place in zip(self.held_out, found, strict=True):
+                self._seen[index] = place
+        return [scaled_contact(place, 1.0 / self._factor) for place in self._seen]
 
     def doubts(self, solution: Solution) -> list[str]:
         """Return notes on presses that the fit explains far worse than the others."""
@@ -267,14 +264,3 @@ class FitRounds:
             )  # fmt: skip
             found[number] = [((one - two) / size).astype(np.float32) for one, two in pairs]
         return found
-
-
-def _scaled(place: SeenContact, factor: float) -> SeenContact:
-    column, row = place.centre
-    return SeenContact((column * factor, row * factor), place.radius * factor)
-
-
-def _moved(place: SeenContact, amount: FloatArray) -> SeenContact:
-    column, row, wider = (float(value) for value in amount)
-    grown = place.radius * math.exp(min(max(wider, -0.5), 0.5))
-    return SeenContact((place.centre[0] + column, place.centre[1] + row), grown)

@@ -100,9 +100,10 @@ def doubts(photographs: Photographs) -> list[str]:
                 f"picture shows {seen.radius:.0f}"
             )
     if 2 * twice > len(photographs.presses):
-        found.append(
+        found.insert(
+            0,
             "the background: it seems to show a contact, as most photographs show two; take one "
-            "with nothing pressed in"
+            "with nothing pressed in",
         )
     return found
 

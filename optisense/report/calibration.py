@@ -27,9 +27,9 @@ FIGURES = {
 
 READINGS = {
     "radius": "ball read by the model's reader, times",
-    "degrees": "normals read by it off, degrees",
+    "degrees": "error of the normals that it reads, degrees",
     "radius_back": "ball read by the photographs' reader in the model, times",
-    "degrees_back": "normals read by it off, degrees",
+    "degrees_back": "error of the normals that it reads there, degrees",
 }
 """Figures of readings whose medians the page shows, with their labels."""
 

@@ -1,0 +1,95 @@
+"""Places of the contacts in photographs, corrected by the pictures of a model.
+
+A contact that is found in a photograph alone is off by a few pixels, which changes the response as
+much as a good model's errors do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.calibration.gauss_newton import LayeredFit
+from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
+from optisense.calibration.layered_pictures import layered_pictures
+from optisense.calibration.model_pictures import matched_exposure
+from optisense.calibration.photographs import Photographs
+from optisense.calibration.seen_contacts import SeenContact
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+FloatArray = NDArray[np.float64]
+
+FIT_WIDTH = 160
+"""Width of the pictures of a fit, in pixels: a quarter of the pixels of those that are compared in
+the end, and enough for the smooth responses of balls.
+"""
+
+PLACINGS = 2
+"""Number of renderings by which contacts are placed; a third one moves them by less than a tenth of
+a pixel.
+"""
+
+WIDEST_CHANGE = 0.5
+"""Largest change of the logarithm of a contact's radius at once."""
+
+
+def placed(
+    model: OpticalModel,
+    photographs: Photographs,
+    seen: Sequence[SeenContact],
+    *,
+    photons: int,
+    seed: int,
+    exposure: float | None = None,
+    kept: KeptRenderings = KEPT_NOWHERE,
+) -> list[SeenContact]:
+    """Return the contacts where the model's responses are closest to the photographs'.
+
+    Args:
+        model: model of the sensor.
+        photographs: photographs, at the size of a fit.
+        seen: contacts in them.
+        photons: number of photons of the light.
+        seed: seed of the light.
+        exposure: factor on the radiance; the one that brings the background closest if None.
+        kept: store of renderings.
+
+    Raises:
+        CalibrationError: a contact is not on the model's skin.
+        OptiSenseError: the model can't be rendered.
+    """
+    found = list(seen)
+    none: FloatArray = np.zeros(0)
+    for _ in range(PLACINGS):
+        layers = layered_pictures(model, photographs, found, photons, seed, kept=kept)
+        if exposure is None:
+            total = layers.background.sum(axis=0)
+            exposure = matched_exposure(total, layers.chain, photographs.background)
+        fit = LayeredFit(photographs, found, layers, [], exposure, none, {})
+        solution = fit.solve(none, np.zeros((len(found), 3)))
+        found = [
+            moved_contact(place, amount)
+            for place, amount in zip(found, solution.contacts, strict=True)
+        ]
+    return found
+
+
+def scaled_contact(place: SeenContact, factor: float) -> SeenContact:
+    """Return a contact in a picture whose width is multiplied by a factor."""
+    column, row = place.centre
+    return SeenContact((column * factor, row * factor), place.radius * factor)
+
+
+def moved_contact(place: SeenContact, amount: FloatArray) -> SeenContact:
+    """Return a contact after a change (3,) of column and row, pixels, and of the logarithm of its
+    radius.
+    """
+    column, row, wider = (float(value) for value in amount)
+    grown = place.radius * math.exp(min(max(wider, -WIDEST_CHANGE), WIDEST_CHANGE))
+    return SeenContact((place.centre[0] + column, place.centre[1] + row), grown)
