@@ -111,7 +111,7 @@ def footprint(
         raise ContactError(
             DOES_NOT_REACH,
             where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*spot.point),
-            hint="press deeper, or check the indenter's shape",
+            hint="press deeper, or check the indenter's shape: it may have a hole there",
         )
     columns, rows = np.flatnonzero(inside.any(axis=0)), np.flatnonzero(inside.any(axis=1))
     spans = [

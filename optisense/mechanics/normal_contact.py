@@ -60,14 +60,14 @@ def solve_normal_contact(
     if deepest <= 0.0:
         nothing = np.zeros_like(overlap)
         return NormalContact(nothing, nothing)
-    pressure = np.where(overlap > 0.0, overlap, 0.0) if start is None else start.copy()
-    displacement = response.normal(pressure)
-    if start is None:  # scaled to the minimum of the energy
-        scale = float((pressure * overlap).sum() / (pressure * displacement).sum())
-        pressure, displacement = scale * pressure, scale * displacement
+    pressure = np.zeros_like(overlap) if start is None else start.copy()
+    displacement = response.normal(pressure) if start is not None else pressure
     way = np.zeros_like(overlap)
     before, goes_on = 1.0, False
     for iteration in range(1, MAX_ITERATIONS + 1):
+        if not pressure.any():  # no start, or one so large that a step took all of it
+            pressure, displacement = _first(response, overlap)
+            goes_on = False
         gap = displacement - overlap
         touching = pressure > 0.0
         residual = np.where(touching, gap, 0.0)
@@ -99,6 +99,16 @@ def solve_normal_contact(
         f"mm of gap or overlap remain, where {tolerance * deepest:.2g} mm would do",
         hint="press less deep, or check the indenter's shape for spikes",
     )
+
+
+def _first(response: GridResponse, overlap: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a pressure in proportion to the overlap, scaled to the minimum of the energy, and its
+    displacement.
+    """
+    pressure = np.maximum(overlap, 0.0)
+    displacement = response.normal(pressure)
+    scale = float((pressure * overlap).sum() / (pressure * displacement).sum())
+    return scale * pressure, scale * displacement
 
 
 def contact_area(pressure: FloatArray, pitch: float) -> float:

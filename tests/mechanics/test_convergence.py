@@ -9,6 +9,7 @@ from optisense.errors import ContactError
 from optisense.geometry import Contact, Plane, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
 from optisense.mechanics import Elasticity, Gel, normal_contact, pressed_skin, tangential_contact
+from optisense.mechanics.displacement_field import grid_response
 
 TOP = TriangleMesh.grid((25.25, 20.75)).flipped()
 BLOCK = TriangleMesh.box((-12.625, -10.375, -4.25), (12.625, 10.375, 0.0))
@@ -54,6 +55,16 @@ def test_what_does_not_settle_is_told_with_its_residual(
     assert float(re.search(message, str(told.value))[1]) > 0.0
     monkeypatch.undo()
     assert np.isfinite(press(**contact).contacts[0].force)
+
+
+@pytest.mark.parametrize("size", [0.0, 100.0])
+def test_a_pressure_is_found_from_a_start_that_is_nothing_or_far_too_large(size):
+    found = press().contacts[0]
+    spot, elasticity = found.place, Elasticity(0.435, 0.49)
+    response = grid_response(spot.overlap.shape, spot.pitch, spot.thickness, elasticity)
+    start = size * np.ones_like(found.pressure)
+    again = normal_contact.solve_normal_contact(response, spot.overlap, start)
+    assert again.pressure == pytest.approx(found.pressure, abs=1e-3 * found.pressure.max())
 
 
 def test_a_plate_over_the_whole_gel_settles_as_well_as_its_pressure_is_solved():
