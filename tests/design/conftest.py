@@ -37,7 +37,14 @@ OTHER_KINDS = {
         "p2": -0.01,
         "k3": 1,
     },
-    "shading": {"kind": "radial", "corrected": 0.3, "falloff": 0.4, "power": 3},
+    "shading": {
+        "kind": "radial",
+        "corrected": 0.3,
+        "falloff": 0.4,
+        "red_falloff": 0.5,
+        "blue_falloff": 0.3,
+        "power": 3,
+    },
     "blur": {"kind": "gaussian", "width": 0.8},
     "tone_curve": {"kind": "gamma", "gamma": 1.9},
 }  # fmt: skip
