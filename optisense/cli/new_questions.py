@@ -33,6 +33,7 @@ from optisense.sensors.from_meshes import guessing
 from optisense.sensors.from_meshes.building import USUAL_MATERIAL
 from optisense.sensors.from_meshes.directions import SIDES
 from optisense.sensors.from_meshes.files import largest_dimension, likely_units
+from optisense.sensors.from_meshes.fingertips import is_round
 from optisense.sensors.from_meshes.guessing import CadBody, Use
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
 from optisense.sensors.from_meshes.recipe_lights import LightChoice
@@ -81,7 +82,8 @@ def ask_recipe(source: Path, units: Units | None) -> Recipe:
     if not any(part.role is Role.SENSING_SURFACE for part in parts.values()):
         parts, outward = _ask_skin(parts, meshes, gel, outward)
     coating = _ask_known("coating", "Coating", "diffuse-grey")
-    usual = guessing.usual_lights_and_camera(parts, meshes, gel, outward)
+    dome = is_round(meshes[gel], outward)
+    usual = guessing.usual_lights_and_camera(parts, meshes, gel, outward, dome)
     lights = _ask_lights(found, uses, parts, meshes, gel, outward, usual[0])
     camera = _ask_camera(found, uses, parts, usual[1])
     recipe = Recipe.model_validate(

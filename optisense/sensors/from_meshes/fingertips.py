@@ -38,7 +38,7 @@ LEAST_RING = 4.0
 """Smallest radius (mm) of a ring of lights that leaves room for a camera within it."""
 
 LED_PITCH = 4.5
-"""Distance (mm) along the ring between lights; a 3528 package is 3.5 mm long."""
+"""Distance (mm) between lights in a guessed row or ring; a 3528 package is 3.5 mm long."""
 
 GAP_BETWEEN_COLOURS = 0.25
 """Share of a colour's third of the ring that stays empty between two colours."""

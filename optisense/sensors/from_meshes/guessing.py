@@ -26,7 +26,7 @@ from optisense.sensors.from_meshes.files import (
     largest_dimension,
     likely_units,
 )
-from optisense.sensors.from_meshes.fingertips import is_round, lights_and_camera
+from optisense.sensors.from_meshes.fingertips import LED_PITCH, is_round, lights_and_camera
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
 from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow, LightsOver
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
@@ -58,9 +58,6 @@ WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
 
 LIGHT, CAMERA = "smd-3528", "pi-v2"
 """Default light and camera of the library."""
-
-LED_PITCH = 4.5
-"""Distance between guessed LEDs, mm; a 3528 is 3.5 mm long."""
 
 
 @dataclass(frozen=True)
@@ -219,16 +216,16 @@ def recipe_of(
             "say what each is in a recipe",
         )
     outward = guess_outward(meshes, carrier)
+    dome = is_round(meshes[carrier], outward)
     if skin is None:
         name = _fresh("skin", set(parts))
-        tangent = is_round(meshes[carrier], outward)
-        parts = insert_skin(parts, name, carrier, outward, tangent)
+        parts = insert_skin(parts, name, carrier, outward, dome)
     lights: dict[str, LightChoice] = {}
     references = [each for each in found if each.use == "lights"]
     for each in references:
         lights[each.name] = lights_over(each, meshes[each.name], meshes[carrier])
     lens = next((each for each in found if each.use == "camera"), None)
-    usual_lights, camera = usual_lights_and_camera(parts, meshes, carrier, outward)
+    usual_lights, camera = usual_lights_and_camera(parts, meshes, carrier, outward, dome)
     if lens is not None:
         camera = CameraChoice(model=CAMERA, at=lens.shape)
     recipe = Recipe(
@@ -292,6 +289,7 @@ def usual_lights_and_camera(
     meshes: Mapping[str, TriangleMesh],
     carrier: str,
     outward: str,
+    dome: bool,
 ) -> tuple[dict[str, LightChoice], CameraChoice]:
     """Return lights and a camera for a sensor whose files contain none.
 
@@ -303,9 +301,10 @@ def usual_lights_and_camera(
         meshes: meshes of at least these parts, mm.
         carrier: name of the part that carries the coating.
         outward: side on which the sensor is touched.
+        dome: whether the carrier is round (`is_round`).
     """
     supports = [name for name, part in parts.items() if part.role is Role.SUPPORT]
-    if is_round(meshes[carrier], outward):
+    if dome:
         solid = {name: meshes[name] for name, part in parts.items() if part.faces_of is None}
         gels = [name for name, part in parts.items() if part.role is Role.ELASTOMER]
         clear = [carrier, *(name for name in [*gels, *supports] if name != carrier)]
