@@ -32,7 +32,7 @@ from optisense.mechanics import CONFORMING
 
 FOLDER = Path(__file__).parent
 CACHE = FOLDER / ".cache"
-SENSORS = ("gelsight-mini", "gelsight-svelte", "gelbelt", "gelsight360")
+SENSORS = ("gelsight-mini-ideal", "gelsight-svelte", "gelbelt", "gelsight360")
 COATINGS = {"diffuse": 0.0, "metallic": 0.6}
 """Specularity of each coating."""
 RESOLUTION = (160, 120)

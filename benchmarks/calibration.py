@@ -26,7 +26,7 @@ from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import place_on_skin
 from optisense.design import SensorDesign
 
-NAMES = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+NAMES = ("gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
 SEED = 21
 """Seed of the hidden numbers, the noise and the dust."""
 HIDDEN = 1.0

@@ -14,7 +14,7 @@ from optisense.optics import OpticalModel
 
 FloatArray = NDArray[np.float32]
 
-DESIGN = "gelsight-mini"
+DESIGN = "gelsight-mini-ideal"
 RADIUS, DEPTH = 1.5, 0.8
 """Radius and depth (mm) of the ball in the OptiSense paper."""
 RESOLUTION = (320, 240)

@@ -69,7 +69,7 @@ class Case(NamedTuple):
 
 CASES = {
     "cylinder": Case(
-        "gelsight-mini-cylindrical",
+        "gelsight-mini-ideal-cylindrical",
         {"lights.*.shift.z": (0.0, 6.0), "coating.specularity": (0.0, 0.4)},
         "reading",
         "cma-es",
@@ -88,7 +88,7 @@ CASES = {
         ("coverage>=0.98",),
     ),
     "coatings": Case(
-        "gelsight-mini", {"coating.specularity": (0.0, 0.8, 41)}, "rgb2normal", "grid", None
+        "gelsight-mini-ideal", {"coating.specularity": (0.0, 0.8, 41)}, "rgb2normal", "grid", None
     ),
 }
 """Searches by name."""
@@ -146,7 +146,7 @@ def searched(name: str, coarse: bool) -> dict[str, Any]:
 
 def powers() -> dict[str, Any]:
     """Processor time of trials over powers of lights, from layers and by renderings."""
-    space = SearchSpace({"lights.*.flux": (1.0, 10.0)}).bind(optisense.load("gelsight-mini"))
+    space = SearchSpace({"lights.*.flux": (1.0, 10.0)}).bind(optisense.load("gelsight-mini-ideal"))
     usual = DesignEvaluator(space, ["rgb2normal"], {"photons": "normal"})
     relit = RelitEvaluator(usual)
     random = np.random.default_rng(0)

@@ -1,6 +1,6 @@
 """Time that a front end waits for the engine: first picture, drafts, relighting.
 
-    python benchmarks/engine.py [--design gelsight-mini] [--drafts 10]
+    python benchmarks/engine.py [--design gelsight-mini-ideal] [--drafts 10]
 
 Wall time is what a user waits; processor time is that of the engine alone, which another load on
 the machine changes less.
@@ -57,7 +57,7 @@ class Engine:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--design", default="gelsight-mini")
+    parser.add_argument("--design", default="gelsight-mini-ideal")
     parser.add_argument("--drafts", type=int, default=10)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

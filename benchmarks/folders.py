@@ -77,7 +77,7 @@ class Bench:
         """The words of a search of three trials."""
         mine = self.here / "mine.py"
         mine.write_text(OBJECTIVE)
-        return ["search", "gelsight-mini", "--vary", "coating.specularity=0:1", "--budget", 3,
+        return ["search", "gelsight-mini-ideal", "--vary", "coating.specularity=0:1", "--budget", 3,
                 "--method", "random", "-b", f"{mine}:score", "--rule", f"{mine}:fine",
                 "--out", self.here / "study", *more]  # fmt: skip
 
@@ -116,7 +116,7 @@ def two_new_searches(bench: Bench) -> bool:
 def two_datasets(bench: Bench) -> bool:
     """Two datasets of other seeds begin in one folder at once."""
     out = bench.here / "dataset"
-    sensors = ("gelsight-mini", "gelsight-mini")
+    sensors = ("gelsight-mini-ideal", "gelsight-mini-ideal")
     small = ["--count", 1, "--photons", 20000, "--resolution", "32x24"]
     processes = [
         bench.start("dataset", sensor, "--out", out, "--seed", seed, *small)
@@ -177,7 +177,7 @@ def killed(words: Callable[[Bench], list[object]], bench: Bench) -> bool:
 
 def new_killed(bench: Bench) -> bool:
     """`new` is killed at a random moment and given again."""
-    return killed(lambda bench: ["new", "gelsight-mini", bench.here / "design"], bench)
+    return killed(lambda bench: ["new", "gelsight-mini-ideal", bench.here / "design"], bench)
 
 
 def search_killed(bench: Bench) -> bool:

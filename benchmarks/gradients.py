@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FOLDER = Path(__file__).parent
-SENSORS = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+SENSORS = ("gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
 OBJECTIVES = ("aoap", "2to3pw")
 DIRECTIONS = 10
 STEPS = (0.02, 0.01)

@@ -99,11 +99,11 @@ class PatchCase:
 
 
 CASES = [
-    *(PatchCase("gelsight-mini", s, referee=Referee.PATH) for s in (0.0, 0.3, 0.6, 1.0)),
-    *(PatchCase("gelsight-mini", s) for s in (0.0, 0.3, 0.6, 0.8, 1.0)),
-    *(PatchCase("gelsight-mini", s, place=0) for s in (0.0, 0.3, 0.6, 1.0)),
-    *(PatchCase("gelsight-mini-cylindrical", s, depth=0.3) for s in (0.0, 0.3, 0.6, 1.0)),
-    *(PatchCase("gelsight-mini-spherical", s) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal", s, referee=Referee.PATH) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal", s) for s in (0.0, 0.3, 0.6, 0.8, 1.0)),
+    *(PatchCase("gelsight-mini-ideal", s, place=0) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal-cylindrical", s, depth=0.3) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal-spherical", s) for s in (0.0, 0.3, 0.6, 1.0)),
     *(PatchCase("gelbelt", s) for s in (0.0, 0.3, 0.6, 1.0)),
     *(PatchCase("gelbelt", s, place=0) for s in (0.0, 0.6)),
     *(PatchCase("gelsight-svelte", s) for s in (0.0, 0.3, 0.6, 1.0)),

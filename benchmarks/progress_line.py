@@ -4,8 +4,8 @@ Runs a command in a pseudo-terminal, looks at the screen twice a second, and tel
 progress line is, which stages it names, how good its time left is, how long it stands still, and
 how long the command takes to end after Ctrl-C:
 
-    python -m benchmarks.progress_line -- evaluate gelsight-mini --seeds 3
-    python -m benchmarks.progress_line --interrupt 20 -- tolerance gelsight-mini
+    python -m benchmarks.progress_line -- evaluate gelsight-mini-ideal --seeds 3
+    python -m benchmarks.progress_line --interrupt 20 -- tolerance gelsight-mini-ideal
 
 Needs pyte, a terminal in Python (``pip install "optisense[bench]"``). POSIX only.
 """

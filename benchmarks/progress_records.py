@@ -46,19 +46,33 @@ OFTEN = 0.1
 
 FEW = ["--set", "photons=1000000"]
 COMMANDS = {
-    "render": ["render", "gelsight-mini", "--contact", "sphere:1.5@0,0:0.8", "--out", "OUT"],
+    "render": ["render", "gelsight-mini-ideal", "--contact", "sphere:1.5@0,0:0.8", "--out", "OUT"],
     "render, 20 million photons": [
-        *["render", "gelsight-mini", "--contact", "sphere:1.5@0,0:0.8", "--photons", "20000000"],
+        *[
+            "render",
+            "gelsight-mini-ideal",
+            "--contact",
+            "sphere:1.5@0,0:0.8",
+            "--photons",
+            "20000000",
+        ],
         *["--out", "OUT"],
     ],
-    "evaluate": ["evaluate", "gelsight-mini"],
-    "evaluate, 5 seeds": ["evaluate", "gelsight-mini", "--seeds", "5", *FEW],
-    "dataset, 20 samples": ["dataset", "gelsight-mini", "--count", "20", "--out", "OUT"],
-    "dataset, 60 samples": ["dataset", "gelsight-mini", "--count", "60", "--out", "OUT"],
-    "dataset, 700 samples": ["dataset", "gelsight-mini", "--count", "700", "--out", "OUT"],
-    "task misalignment": ["task", "misalignment", "gelsight-mini", "--samples", "60"],
+    "evaluate": ["evaluate", "gelsight-mini-ideal"],
+    "evaluate, 5 seeds": ["evaluate", "gelsight-mini-ideal", "--seeds", "5", *FEW],
+    "dataset, 20 samples": ["dataset", "gelsight-mini-ideal", "--count", "20", "--out", "OUT"],
+    "dataset, 60 samples": ["dataset", "gelsight-mini-ideal", "--count", "60", "--out", "OUT"],
+    "dataset, 700 samples": ["dataset", "gelsight-mini-ideal", "--count", "700", "--out", "OUT"],
+    "task misalignment": ["task", "misalignment", "gelsight-mini-ideal", "--samples", "60"],
     "search by coating": [
-        *["search", "gelsight-mini", "--vary", "coating.specularity=0.1:0.5", "--budget", "9"],
+        *[
+            "search",
+            "gelsight-mini-ideal",
+            "--vary",
+            "coating.specularity=0.1:0.5",
+            "--budget",
+            "9",
+        ],
         *["--objective", "rgb2normal", *FEW, "--out", "OUT"],
     ],
     "search by rays": [
@@ -66,7 +80,7 @@ COMMANDS = {
         *["--objective", "aoap", "--out", "OUT"],
     ],
     "light-colours": [
-        *["search", "gelsight-mini", "--vary", "lights.*.colour=R,G,B", "--method"],
+        *["search", "gelsight-mini-ideal", "--vary", "lights.*.colour=R,G,B", "--method"],
         *["light-colours", "--objective", "rgb2normal", *FEW, "--out", "OUT"],
     ],
     "tolerance": [

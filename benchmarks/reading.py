@@ -27,8 +27,8 @@ from optisense.tasks import ReconstructionSettings, reconstruct
 
 FOLDER = Path(__file__).parent
 SENSORS = (
-    "gelsight-mini",
-    "gelsight-mini-cylindrical",
+    "gelsight-mini-ideal",
+    "gelsight-mini-ideal-cylindrical",
     "gelbelt",
     "gelsight-svelte",
     "gelsight360",

@@ -82,7 +82,7 @@ def main() -> None:
     parser.add_argument("--most", type=int, default=8, help="photographs that are looked at")
     options = parser.parse_args()
     photos = read_photographs(options.photos, options.diameter).scaled(WIDTH)
-    model = ots.OpticalModel(ots.load("gelsight-mini"))
+    model = ots.OpticalModel(ots.load("gelsight-mini-ideal"))
     height, width = photos.background.shape[:2]
     rest = model.render((), (width, height), photons=PHOTONS)
     exposure = rest.auto_exposure()

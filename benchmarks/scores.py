@@ -29,7 +29,7 @@ from optisense.objectives.scoring import run_objective
 from optisense.optics import OpticalModel
 
 FOLDER = Path(__file__).parent
-DESIGN = "gelsight-mini"
+DESIGN = "gelsight-mini-ideal"
 SEEDS = 20
 """Number of seeds; 20 give a standard deviation to a sixth of its value."""
 TIMED_SEEDS = 5

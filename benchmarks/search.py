@@ -99,7 +99,7 @@ def coatings() -> dict[str, Any]:
     """A grid of 11 coatings of GelSight Mini by RGB2Normal."""
     began, spent = time.perf_counter(), time.process_time() + _children()
     plan = Plan(space=SearchSpace(COATINGS), goals=["rgb2normal"], method="grid")
-    study = Study.create(None, optisense.load("gelsight-mini"), plan)
+    study = Study.create(None, optisense.load("gelsight-mini-ideal"), plan)
     result = run_study(study, workers=COATING_WORKERS)
     seconds = time.perf_counter() - began
     spent = time.process_time() + _children() - spent

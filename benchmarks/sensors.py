@@ -21,7 +21,7 @@ from optisense.geometry import Contact, Sphere
 from optisense.mechanics import CONFORMING
 from optisense.optics import TactileImage
 
-NAMES = ("digit", "gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+NAMES = ("digit", "gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
 RESOLUTION = (320, 240)
 WANTED_NOISE = 0.03
 """Relative noise of the light in the contact."""

@@ -64,7 +64,7 @@ def times(model: ots.OpticalModel, contacts: list[Contact], kept: bool) -> dict[
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("design", nargs="?", default="gelsight-mini")
+    parser.add_argument("design", nargs="?", default="gelsight-mini-ideal")
     model = ots.OpticalModel(ots.load(parser.parse_args().design))
     print("| contacts | photons | elastic (CPU s) | conforming (CPU s) | ratio | ratio of wall |")
     print("|---|---|---|---|---|---|")

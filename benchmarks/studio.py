@@ -100,7 +100,7 @@ def main() -> None:
     slow = f"at {SLOW / 1e6:.0f} M/s"
     print(f"{'':42s} {'wall':>9s} {'processor':>9s} {'':10s}   target {slow:>10s}")
     opened = "Mini opened and the engine warm"
-    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     measured(opened, 1, "", lambda _: answered(warm_up(scene)), pid)
     bpy.ops.optisense.add_contact()
     measured("click to first picture", 1, "3 s", lambda _: bpy.ops.optisense.simulate(), pid)
@@ -175,7 +175,7 @@ def main() -> None:
         while session.engine().waiting:
             time.sleep(session._tick() or 0.0)
 
-    for name in ("gelsight-svelte", "digit", "gelsight-mini"):
+    for name in ("gelsight-svelte", "digit", "gelsight-mini-ideal"):
         bpy.ops.optisense.new(sensor=name)
         measured(f"first draft of {name}, opened", 1, "0.5 s", first_draft, pid)
     scene = bpy.context.scene

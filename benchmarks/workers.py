@@ -59,7 +59,7 @@ class Clocked:
 
 def workers() -> dict[str, Any]:
     """Both kinds of objectives."""
-    mini, svelte = optisense.load("gelsight-mini"), optisense.load("gelsight-svelte")
+    mini, svelte = optisense.load("gelsight-mini-ideal"), optisense.load("gelsight-svelte")
     cases: dict[str, Any] = {
         "chief_rays": (svelte, SearchSpace(BLEND), "aoap", {}, 1.8),
         "rendered": (mini, SearchSpace(SHINE), "rgb2normal", LIGHT, 1.6),

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SHAPES = {
-    "flat": "gelsight-mini",
-    "cylinder": "gelsight-mini-cylindrical",
-    "sphere": "gelsight-mini-spherical",
+    "flat": "gelsight-mini-ideal",
+    "cylinder": "gelsight-mini-ideal-cylindrical",
+    "sphere": "gelsight-mini-ideal-spherical",
 }
 OBJECTIVES = {"rgb2normal": "RGB2Normal", "normdiff": "NormDiff"}
 
@@ -186,8 +186,8 @@ WHY_FLAT = (
 
 
 FITTED_NOTE = (
-    "With the light and camera of a real unit, the built-in `gelsight-mini-fitted`, 2 and 6 hold, "
-    "1 cannot be told, and the others do not hold; [the page on calibration]"
+    "With the light and camera of a real unit, the built-in `gelsight-mini` and its bent forms, "
+    "2 and 6 hold, 1 cannot be told, and the others do not hold; [the page on calibration]"
     "(calibration.md#a-real-gelsight-mini) has its scores."
 )
 

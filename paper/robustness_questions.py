@@ -59,7 +59,7 @@ def _mini_units(dimensions: Dimensions, settings: Values, seed: int) -> list[Uni
     settings = {**settings, "photons": settings["mini_photons"]}
     return [
         _score(
-            sensor("gelsight-mini-cylindrical", {"coating.specularity": float(value)}, **own),
+            sensor("gelsight-mini-ideal-cylindrical", {"coating.specularity": float(value)}, **own),
             settings,
             seed,
             f"specularity {value}",
@@ -204,7 +204,7 @@ def _difference(one: Record, other: Record, name: str) -> float | None:
 
 QUESTIONS = (
     Question(
-        "gelsight-mini-cylindrical",
+        "gelsight-mini-ideal-cylindrical",
         {
             f"mini {name}": f"On the cylindrical Mini a specularity of {LOW} is better than {HIGH} "
             f"by {title}."

@@ -22,7 +22,7 @@ from paper.unit import Unit
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PAPER = {"gelsight-mini": 6.0, "gelbelt": 8.9, "gelsight360": 8.7, "gelsight-svelte": None}
+PAPER = {"gelsight-mini-ideal": 6.0, "gelbelt": 8.9, "gelsight360": 8.7, "gelsight-svelte": None}
 """Seconds an image."""
 
 KINDS = {"new_light": "new light", "light_kept": "light kept"}

@@ -1,4 +1,4 @@
-"""Fit the built-in `gelsight-mini-fitted` anew: python scripts/fitted_mini.py fit PHOTOS [FITTED]
+"""Fit the built-in `gelsight-mini` anew: python scripts/fitted_mini.py fit PHOTOS [FITTED]
 
 or show it beside the photographs: python scripts/fitted_mini.py show PHOTOS
 
@@ -23,7 +23,7 @@ import optisense as ots
 from optisense.calibration import CalibrationSettings, calibrate, compare, read_photographs
 from optisense.calibration.families import chosen_families
 from optisense.design import SensorDesign, Status, get_value
-from optisense.sensors.gelsight_mini_fitted import FITTED_NUMBERS, unfitted_design
+from optisense.sensors.gelsight_mini import FITTED_NUMBERS, unfitted_design
 
 UNIT = "one GelSight Mini, calibration pictures of GelSLAM (commit e0ea7de, MIT)"
 """Whose photographs they are, for the source of each number."""
@@ -92,7 +92,7 @@ def show(photographs: str) -> None:
     names = [press.name for press in read.presses]
     some = read.subset([names.index(name) for name in SHOWN])
     columns = [("photographs", [some.background, *(press.picture for press in some.presses)])]
-    for name in ("gelsight-mini", "gelsight-mini-fitted"):
+    for name in ("gelsight-mini-ideal", "gelsight-mini"):
         found = compare(ots.OpticalModel(ots.load(name)), some, photons=PHOTONS)
         pictures = [found.pictures.background, *found.pictures.presses]
         columns.append((name, [np.clip(np.round(p), 0, 255).astype(np.uint8) for p in pictures]))

@@ -70,7 +70,7 @@ def _save(figure: Figure, name: str) -> None:
 def main() -> None:
     """All of them."""
     OUT.mkdir(parents=True, exist_ok=True)
-    evaluation = Evaluation(ots.OpticalModel(ots.load("gelsight-mini")))
+    evaluation = Evaluation(ots.OpticalModel(ots.load("gelsight-mini-ideal")))
     straight_and_bent(evaluation)
     for name in ("normdiff", "reading"):
         _save(ots.evaluate(evaluation, name).figure(), f"score-{name}")

@@ -109,7 +109,9 @@ def svelte() -> None:
 
 def coatings() -> None:
     """One contact of GelSight Mini under each reading of a specularity."""
-    model = OpticalModel(set_value(sensors.gelsight_mini(), "coating.specularity", SPECULARITY))
+    model = OpticalModel(
+        set_value(sensors.gelsight_mini_ideal(), "coating.specularity", SPECULARITY)
+    )
     panels = {}
     for scattering in get_args(Scattering):
         model.update("coating.scattering", scattering)

@@ -82,7 +82,7 @@ def _save(figure: Figure, name: str) -> None:
 
 
 if __name__ == "__main__":
-    mini = ots.OpticalModel(ots.load("gelsight-mini"))
+    mini = ots.OpticalModel(ots.load("gelsight-mini-ideal"))
     for draw in (dataset, misalignment, reconstruction):
         if len(sys.argv) == 1 or draw.__name__ in sys.argv[1:]:
             draw(mini)

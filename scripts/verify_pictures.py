@@ -26,7 +26,7 @@ PHOTONS = 2_000_000
 
 def objects() -> None:
     """The twelve objects, lit from the side, and below each what a GelSight Mini sees of it."""
-    model = ots.OpticalModel(ots.load("gelsight-mini"))
+    model = ots.OpticalModel(ots.load("gelsight-mini-ideal"))
     figure = Figure(figsize=(12, 8.6), layout="constrained")
     grid = figure.subplots(4, 6)
     side = np.arange(-5.2, 5.2, PITCH)

@@ -25,7 +25,7 @@ from optisense.search.study.applied import design_of
 from optisense.sensors import save_design
 
 EVENTS = {"open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "sqlite3.connect"}
-MINI = ots.load("gelsight-mini")
+MINI = ots.load("gelsight-mini-ideal")
 SPACE = SearchSpace({"coating.specularity": (0.0, 1.0)})
 HERE = Path(sys.argv[2])
 

@@ -22,7 +22,7 @@ def test_import_loads_neither_the_renderer_nor_numpy() -> None:
 
 def test_loading_a_design_does_not_load_the_renderer() -> None:
     code = (
-        "import sys, optisense as o; o.load('gelsight-mini');"
+        "import sys, optisense as o; o.load('gelsight-mini-ideal');"
         "print([m for m in ('mitsuba', 'drjit') if m in sys.modules])"
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

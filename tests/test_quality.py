@@ -37,7 +37,7 @@ def test_all_else_is_refused(given: str | float) -> None:
 
 
 def test_an_image_takes_a_level() -> None:
-    model = ots.OpticalModel(ots.load("gelsight-mini"))
+    model = ots.OpticalModel(ots.load("gelsight-mini-ideal"))
     image = model.render(resolution=(40, 30), photons="draft")
     assert image.settings["photons_asked"] == PHOTONS["draft"]
     with pytest.raises(RenderError, match="'great'"):
@@ -53,8 +53,8 @@ def test_settings_take_a_level() -> None:
 def test_commands_take_a_level(tmp_path: Path) -> None:
     out = tmp_path / "touch"
     size = ("--resolution", "40x30", "--out", str(out))
-    done = CliRunner().invoke(app, ["render", "gelsight-mini", "--photons", "draft", *size])
+    done = CliRunner().invoke(app, ["render", "gelsight-mini-ideal", "--photons", "draft", *size])
     assert done.exit_code == 0, done.output
-    wrong = CliRunner().invoke(app, ["render", "gelsight-mini", "--photons", "great", *size])
+    wrong = CliRunner().invoke(app, ["render", "gelsight-mini-ideal", "--photons", "great", *size])
     assert wrong.exit_code == 2
     assert "draft|normal|fine" in wrong.output.replace("\n", "")

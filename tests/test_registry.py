@@ -30,7 +30,7 @@ class Pea(IndenterKind):
 
 
 def wide_mini():
-    return ots.set_value(ots.load("gelsight-mini"), "camera.fov", 55.0)
+    return ots.set_value(ots.load("gelsight-mini-ideal"), "camera.fov", 55.0)
 
 
 class Middle(Method):

@@ -48,7 +48,7 @@ def test_a_cell_is_no_formula() -> None:
 @pytest.fixture
 def evil(tmp_path: Path) -> Path:
     """A design whose name, descriptions and sources are hostile."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     folder = tmp_path / "evil"
     ots.save_design(design, folder)
     file = folder / "design.yaml"

@@ -208,7 +208,7 @@ def test_a_tenth_of_a_command_tells_its_total_within_a_quarter(file: Path) -> No
 
 
 def test_what_a_score_usually_takes_grows_with_its_work() -> None:
-    mini, large = load("gelsight-mini"), load("gelbelt")
+    mini, large = load("gelsight-mini-ideal"), load("gelbelt")
     few, many = Settings(photons=1_000_000), Settings(photons=5_000_000)
     one, more = (usual_score(mini, ["rgb2normal"], each) for each in (few, many))
     assert more.light > 3.0 * one.light

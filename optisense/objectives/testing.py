@@ -38,7 +38,7 @@ def gelsight_mini() -> OpticalModel:
     from optisense.optics import OpticalModel
     from optisense.sensors import load
 
-    return OpticalModel(load("gelsight-mini"))
+    return OpticalModel(load("gelsight-mini-ideal"))
 
 
 @lru_cache(maxsize=4)
@@ -55,7 +55,7 @@ def unlit_evaluation() -> Evaluation:
     from optisense.optics import OpticalModel
     from optisense.sensors import load
 
-    design = load("gelsight-mini")
+    design = load("gelsight-mini-ideal")
     for name in design.lights:
         design = set_value(design, f"lights.{name}.flux", 1e-12)
     settings = Settings(resolution=(40, 30), ray_resolution=(40, 30), photons=10_000)
@@ -80,7 +80,7 @@ def odd_evaluation(path: str, value: float) -> Evaluation:
     from optisense.optics import OpticalModel
     from optisense.sensors import load
 
-    design = set_value(load("gelsight-mini"), path, value)
+    design = set_value(load("gelsight-mini-ideal"), path, value)
     settings = Settings(resolution=(40, 30), ray_resolution=(80, 60), photons=10_000)
     return Evaluation(OpticalModel(design), settings)
 

@@ -54,8 +54,8 @@ class RealComparison:
     """Real picture, the model's picture of the same press, and measures of both.
 
     Attributes:
-        real, model: pictures (h, w, 3), uint8; the model's exposure gives it the real median
-            brightness.
+        real, model: pictures (h, w, 3), uint8; the model has the exposure at which its picture is
+            closest to the real one.
         difference: root mean square difference of pixels, levels of 255.
         own_spread: root mean square deviation of the real picture's pixels from their mean, for
             comparison, levels.
@@ -121,6 +121,7 @@ def compare_with_real(
         KeyboardInterrupt: Ctrl-C ended the rendering.
         OptiSenseError: the model can't be rendered.
     """
+    from optisense.calibration.model_pictures import levels_of, matched_exposure
     from optisense.errors import RenderError
     from optisense.picture_files import read_picture
 
@@ -136,12 +137,12 @@ def compare_with_real(
     )
     if image.interrupted:
         raise KeyboardInterrupt
-    seen = np.asarray(image.radiance, dtype=np.float64)
-    linear = decode(real)
-    if not np.median(seen) > 0.0:  # too few photons for a picture
+    if not np.median(image.radiance) > 0.0:  # too few photons for a picture
         return None
-    exposure = float(np.median(linear) / np.median(seen))
-    drawn = image.picture(exposure)
+    chain = image.chain.without_noise()
+    exposure = matched_exposure(image.radiance, chain, real)
+    drawn = np.round(levels_of(image.radiance, chain, exposure)).clip(0, 255).astype(np.uint8)
+    linear, seen = decode(real), decode(drawn)
     rows, columns = np.mgrid[:height, :width] + 0.5
     radius = math.sqrt(image.contact_mask.sum() / math.pi)
     away = np.hypot(columns - column, rows - row) > AROUND * radius

@@ -59,7 +59,7 @@ def gelsight_mini() -> SensorDesign:
     """Return the design that the studies start from."""
     from optisense.sensors import load
 
-    return load("gelsight-mini")
+    return load("gelsight-mini-ideal")
 
 
 def general_spaces() -> dict[str, dict[str, object]]:

@@ -8,7 +8,11 @@ from optisense.sensors.gelsight_mini import (
     gelsight_mini_cylindrical,
     gelsight_mini_spherical,
 )
-from optisense.sensors.gelsight_mini_fitted import gelsight_mini_fitted
+from optisense.sensors.gelsight_mini_ideal import (
+    gelsight_mini_ideal,
+    gelsight_mini_ideal_cylindrical,
+    gelsight_mini_ideal_spherical,
+)
 from optisense.sensors.gelsight_svelte import gelsight_svelte
 from optisense.sensors.registry import SENSORS, build, check, load, save_design
 
@@ -21,7 +25,9 @@ __all__ = [
     "gelsight360",
     "gelsight_mini",
     "gelsight_mini_cylindrical",
-    "gelsight_mini_fitted",
+    "gelsight_mini_ideal",
+    "gelsight_mini_ideal_cylindrical",
+    "gelsight_mini_ideal_spherical",
     "gelsight_mini_spherical",
     "gelsight_svelte",
     "load",

@@ -94,6 +94,7 @@ def describe_changes(
     builder: Callable[..., SensorDesign],
     given: Mapping[str, Any],
     said: tuple[str, ...] = (),
+    own_defaults: Mapping[str, Any] | None = None,
 ) -> None:
     """Add to a design's description which arguments differ from the builder's defaults.
 
@@ -104,8 +105,10 @@ def describe_changes(
         builder: function that built it.
         given: its arguments, by name.
         said: names of arguments that the description mentions already.
+        own_defaults: defaults that replace the builder's.
     """
     defaults = {name: p.default for name, p in inspect.signature(builder).parameters.items()}
+    defaults |= own_defaults or {}
     changed = [
         f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
         for name, value in given.items()

@@ -22,7 +22,13 @@ SENSORS: Registry[Callable[[], SensorDesign]] = Registry(
         "gelsight360": "optisense.sensors.gelsight360:gelsight360",
         "gelsight-mini": "optisense.sensors.gelsight_mini:gelsight_mini",
         "gelsight-mini-cylindrical": "optisense.sensors.gelsight_mini:gelsight_mini_cylindrical",
-        "gelsight-mini-fitted": ("optisense.sensors.gelsight_mini_fitted:gelsight_mini_fitted"),
+        "gelsight-mini-ideal": "optisense.sensors.gelsight_mini_ideal:gelsight_mini_ideal",
+        "gelsight-mini-ideal-cylindrical": (
+            "optisense.sensors.gelsight_mini_ideal:gelsight_mini_ideal_cylindrical"
+        ),
+        "gelsight-mini-ideal-spherical": (
+            "optisense.sensors.gelsight_mini_ideal:gelsight_mini_ideal_spherical"
+        ),
         "gelsight-mini-spherical": "optisense.sensors.gelsight_mini:gelsight_mini_spherical",
         "gelsight-svelte": "optisense.sensors.gelsight_svelte:gelsight_svelte",
     },

@@ -31,7 +31,7 @@ from optisense.report.tolerance import render_tolerance
 from optisense.report.verification import render_verification
 from optisense.search import ToleranceDistribution, search
 from optisense.search.tolerance.analysis import tolerance
-from optisense.sensors import gelsight_mini
+from optisense.sensors import gelsight_mini_ideal
 from optisense.tasks import Verification, VerificationSettings
 from optisense.tasks.press_readings import PressPictures
 from optisense.tasks.verification import SensorView
@@ -41,7 +41,7 @@ EVIL = "</script></table><script>window.ran = 1</script><img src=x onerror='wind
 
 
 def evil_design() -> SensorDesign:
-    design = gelsight_mini().copy()
+    design = gelsight_mini_ideal().copy()
     design.name = design.description = EVIL
     design.provenance["camera.fov"] = Provenance(status="assumed", source=EVIL)
     return design

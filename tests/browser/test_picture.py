@@ -13,7 +13,7 @@ from optisense.design.responses.gamma_curve import GammaCurve
 from optisense.geometry import Contact, Sphere
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
-from optisense.sensors import gelsight_mini
+from optisense.sensors import gelsight_mini_ideal
 
 from .conftest import Open
 from .visit import Visit
@@ -27,7 +27,7 @@ READ = """() => {
 
 @pytest.fixture(scope="module")
 def design() -> SensorDesign:
-    return gelsight_mini()
+    return gelsight_mini_ideal()
 
 
 @pytest.fixture(scope="module")

@@ -36,7 +36,7 @@ def red(design: SensorDesign) -> float:
 
 @pytest.fixture(scope="module")
 def result() -> SearchResult:
-    return search(ots.load("gelsight-mini"), SPACE, [red], method="random", budget=25, seed=2)
+    return search(ots.load("gelsight-mini-ideal"), SPACE, [red], method="random", budget=25, seed=2)
 
 
 @pytest.fixture
@@ -144,7 +144,7 @@ class Running:
     def __init__(self, folder: Path) -> None:
         self.may = threading.Semaphore(0)
         self.stop = False
-        mini = ots.load("gelsight-mini")
+        mini = ots.load("gelsight-mini-ideal")
         self._thread = threading.Thread(
             target=lambda: search(
                 mini, SPACE, [self.waiting], method="random", budget=40, seed=1, out=folder

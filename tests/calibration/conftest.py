@@ -25,7 +25,7 @@ SIZE = (160, 120)
 @pytest.fixture(scope="session")
 def mini() -> OpticalModel:
     """A GelSight Mini with a flat gel."""
-    return ots.OpticalModel(ots.load("gelsight-mini"))
+    return ots.OpticalModel(ots.load("gelsight-mini-ideal"))
 
 
 @pytest.fixture(scope="session")

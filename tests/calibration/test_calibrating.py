@@ -74,7 +74,7 @@ def hidden_steps(chosen: list) -> np.ndarray:  # type: ignore[type-arg]
 def test_hidden_numbers_are_found_within_their_uncertainties(
     photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
 ) -> None:
-    chosen = quantities_of(ots.load("gelsight-mini"), CHEAP)
+    chosen = quantities_of(ots.load("gelsight-mini-ideal"), CHEAP)
     exposure = 250.0
     still = np.zeros((len(seen), 3))
     start = np.zeros(len(chosen))
@@ -105,7 +105,7 @@ def test_a_number_leaves_its_limit_where_the_photographs_ask_for_it(
     photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
 ) -> None:
     """Beyond a limit a number has no derivative, so that a fit would stay there."""
-    chosen = quantities_of(ots.load("gelsight-mini"), ["shading"])
+    chosen = quantities_of(ots.load("gelsight-mini-ideal"), ["shading"])
     still, start = np.zeros((len(seen), 3)), np.zeros(len(chosen))
     truth, stuck = start.copy(), start.copy()
     truth[0], stuck[0] = (0.6 - 0.2) / chosen[0].spread, chosen[0].limits()[1]
@@ -147,7 +147,7 @@ def test_what_a_change_of_contact_does_is_known_without_rendering(
 
 
 def test_fitted_numbers_become_a_design() -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     chosen = quantities_of(design, [*CHEAP, "view", "place"], [("coating.specularity", 0.0, 0.4)])
     steps = np.linspace(-0.5, 0.5, len(chosen))
     made = designed(design, chosen, steps)
@@ -175,24 +175,24 @@ def test_what_makes_no_sense_is_refused(
     families: list[str], asked: list[tuple[str, float, float]], words: str
 ) -> None:
     with pytest.raises(CalibrationError, match=words):
-        quantities_of(ots.load("gelsight-mini"), families, asked)
+        quantities_of(ots.load("gelsight-mini-ideal"), families, asked)
 
 
 def test_too_few_photographs_are_refused_before_the_work(photographs: Photographs) -> None:
     with pytest.raises(CalibrationError, match="1 press can't tell"):
-        calibrate(ots.load("gelsight-mini"), photographs.subset([0]))
+        calibrate(ots.load("gelsight-mini-ideal"), photographs.subset([0]))
     others = CalibrationSettings(held_out=("press-01.png", "press-02.png"))
     with pytest.raises(CalibrationError, match="1 press can't tell"):
-        calibrate(ots.load("gelsight-mini"), photographs, others)
+        calibrate(ots.load("gelsight-mini-ideal"), photographs, others)
     misspelt = CalibrationSettings(held_out=("press-1.png",))
     with pytest.raises(CalibrationError, match=r"no press 'press-1\.png'") as raised:
-        calibrate(ots.load("gelsight-mini"), photographs, misspelt)
+        calibrate(ots.load("gelsight-mini-ideal"), photographs, misspelt)
     assert "press-01.png" in (raised.value.hint or "")
 
 
 def test_a_design_is_fitted_and_marked(photographs: Photographs, tmp_path: Path) -> None:
     save_photographs(tmp_path / "photos", photographs)
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     start = set_value(design, "lights.red.flux", 0.5 * design.lights["red"].flux)
     ots.save_design(start, tmp_path / "start")
     run = CliRunner().invoke(

@@ -178,7 +178,7 @@ def test_the_command_writes_a_page_and_prints_figures(
     save_photographs(folder, photographs.subset([0]))
     run = CliRunner().invoke(
         app,
-        ["compare", "gelsight-mini", str(folder), "--photons", "60000", "--json"]
+        ["compare", "gelsight-mini-ideal", str(folder), "--photons", "60000", "--json"]
         + ["--out", str(tmp_path / "page.html")],
     )
     assert run.exit_code == 0, run.output
@@ -195,7 +195,7 @@ def test_the_command_says_what_is_wrong(photographs: Photographs, tmp_path: Path
     assert run.exit_code == 2
     assert "another shape" in run.output
     (tmp_path / "background.png").unlink()
-    run = CliRunner().invoke(app, ["compare", "gelsight-mini", str(tmp_path)])
+    run = CliRunner().invoke(app, ["compare", "gelsight-mini-ideal", str(tmp_path)])
     assert run.exit_code == 2
     assert "there is no background.png" in run.output
 

@@ -9,7 +9,7 @@ import optisense as ots
 from optisense.calibration.families import FAMILIES, USUAL
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.design import SensorDesign, get_value
-from optisense.sensors import check, gelsight_mini
+from optisense.sensors import check, gelsight_mini_ideal
 
 BODY = [name for name in FAMILIES if name not in USUAL]
 
@@ -21,7 +21,9 @@ def changed(design: SensorDesign, family: str, word: str, value: float) -> Senso
     return designed(design, [each], np.array([step / each.spread]))
 
 
-@pytest.mark.parametrize("name", ["gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte"])
+@pytest.mark.parametrize(
+    "name", ["gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte"]
+)
 def test_every_family_leaves_a_sensor_that_can_be_simulated(name: str) -> None:
     design = ots.load(name)
     before = design.model_dump()
@@ -38,7 +40,7 @@ def test_every_family_leaves_a_sensor_that_can_be_simulated(name: str) -> None:
 
 
 def test_lights_move_along_the_axis_of_the_camera_and_tilt_towards_the_skin() -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     moved = changed(design, "lights", "place of the red", 0.5).lights["red"].lights
     for one, other in zip(design.lights["red"].lights, moved, strict=True):
         assert np.subtract(other.position, one.position) == pytest.approx([0.0, 0.0, 0.5])
@@ -48,19 +50,19 @@ def test_lights_move_along_the_axis_of_the_camera_and_tilt_towards_the_skin() ->
 
 
 def test_rows_of_lights_become_longer_about_their_middle() -> None:
-    design = gelsight_mini(leds_per_group=3)
+    design = gelsight_mini_ideal(leds_per_group=3)
     made = changed(design, "rows", "row of green", 12.0).lights["green"].lights
     assert [light.position[1] for light in made] == pytest.approx([-6.0, 0.0, 6.0])
     for one, other in zip(design.lights["green"].lights, made, strict=True):
         assert one.position[::2] == pytest.approx(other.position[::2])
         assert one.direction == other.direction
-    assert quantities_of(gelsight_mini(leds_per_group=1), ["rows"]) == []
+    assert quantities_of(gelsight_mini_ideal(leds_per_group=1), ["rows"]) == []
     rings = quantities_of(ots.load("gelsight360"), ["rows"])
     assert "length of the row of base lights" not in [each.words for each in rings]
 
 
 def test_edges_are_those_towards_the_sides_of_the_picture() -> None:
-    made = changed(gelsight_mini(), "edges", "roughness", 0.4)
+    made = changed(gelsight_mini_ideal(), "edges", "roughness", 0.4)
     for name in ("guide", "tray"):
         faces = made.parts[name].faces
         assert faces is not None
@@ -69,17 +71,17 @@ def test_edges_are_those_towards_the_sides_of_the_picture() -> None:
 
 
 def test_a_thicker_gel_keeps_its_base() -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     made = changed(design, "gel", "thickness", 4.5)
     gel = made.deformed_meshes()["gel"].bounds
     assert gel[:, 2] == pytest.approx([-4.25, 0.25])
     assert made.deformed_meshes()["skin"].bounds[:, 2] == pytest.approx([0.25, 0.25])
-    bent = quantities_of(ots.load("gelsight-mini-spherical"), ["gel"])
+    bent = quantities_of(ots.load("gelsight-mini-ideal-spherical"), ["gel"])
     assert [each.words for each in bent] == ["Poisson ratio of the gel"]
 
 
 def test_emission_and_coating_change_by_factors() -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     wide = changed(design, "emission", "width", 0.5)
     emitter = wide.lights["blue"].emitter
     assert emitter is not None

@@ -29,7 +29,7 @@ to the picture's right and top, mm."""
 
 def seen_from(change: tuple[float, float, float]) -> ots.OpticalModel:
     """A model of GelSight Mini with another view."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     chosen = quantities_of(design, ["view", "place"])
     steps = np.array([off / each.spread for off, each in zip(change, chosen, strict=True)])
     return ots.OpticalModel(designed(design, chosen, steps))
@@ -91,7 +91,7 @@ def test_a_hidden_view_is_found() -> None:
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
     photographs = photograph_model(real, balls, resolution=SIZE, photons=PHOTONS, seed=7, noise=1.0)
     settings = CalibrationSettings(families=("powers", "view", "place"), rounds=1, photons=PHOTONS)
-    found = calibrate(ots.load("gelsight-mini"), photographs, settings)
+    found = calibrate(ots.load("gelsight-mini-ideal"), photographs, settings)
     field, right, up = found.numbers[-3:]
     assert np.log(field.after / field.before) == pytest.approx(HIDDEN[0], abs=0.012)
     assert right.after == pytest.approx(HIDDEN[1], abs=0.12)

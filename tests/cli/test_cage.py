@@ -23,14 +23,14 @@ def run(*words: object) -> tuple[int, str]:
 @pytest.fixture
 def mini(tmp_path: Path) -> Path:
     folder = tmp_path / "mini"
-    sensors.save_design(sensors.gelsight_mini(), folder)
+    sensors.save_design(sensors.gelsight_mini_ideal(), folder)
     return folder
 
 
 def test_moving_a_row_makes_the_papers_cylinder(mini: Path) -> None:
     assert run("move", mini, "skin", "--point", "1,*,2=0,0,6", "--out", mini)[0] == 0
     bent = optisense.load(mini).deformed_meshes()["skin"].vertices
-    expected = sensors.gelsight_mini_cylindrical().deformed_meshes()["skin"].vertices
+    expected = sensors.gelsight_mini_ideal_cylindrical().deformed_meshes()["skin"].vertices
     np.testing.assert_allclose(bent, expected, atol=1e-12)
 
 

@@ -45,7 +45,7 @@ def test_mirrors_that_the_camera_looks_past_are_told(
 def test_mirrors_that_are_used_are_told_with_their_shares() -> None:
     text, odd = checked("gelsight-svelte")
     assert "100 % by 'M1' and 'M2'" in text and odd == []
-    assert " by " not in checked("gelsight-mini")[0].split("camera")[-1]
+    assert " by " not in checked("gelsight-mini-ideal")[0].split("camera")[-1]
 
 
 def test_a_machine_that_can_not_trace_rays_checks_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:

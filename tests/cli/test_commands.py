@@ -71,7 +71,7 @@ def test_a_command_does_not_wait_for_the_others() -> None:
 @pytest.mark.parametrize(
     ("arguments", "needless"),
     [
-        (["check", "gelsight-mini"], {"drjit", "mitsuba", "scipy.optimize", "jinja2"}),
+        (["check", "gelsight-mini-ideal"], {"drjit", "mitsuba", "scipy.optimize", "jinja2"}),
         (
             # Beside a GelSight Mini's picture the report presses a ball, as a real one was pressed.
             ["render", "gelbelt", "--resolution=40x30", "--photons=20000", "--out=here"],
@@ -115,7 +115,7 @@ def test_a_new_design_passes_the_check(name: str, tmp_path: Path) -> None:
 
 def test_new_keeps_off_folders_with_something_in_them(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
-    code, text = run("new", "gelsight-mini", str(tmp_path))
+    code, text = run("new", "gelsight-mini-ideal", str(tmp_path))
     assert code != 0
     assert "not empty" in text
     assert [path.name for path in tmp_path.iterdir()] == ["notes.txt"]
@@ -124,12 +124,12 @@ def test_new_keeps_off_folders_with_something_in_them(tmp_path: Path) -> None:
 def test_a_misspelt_sensor_gets_the_near_match(tmp_path: Path) -> None:
     code, text = run("new", "gelsight-minni", str(tmp_path / "new"))
     assert code == 2
-    assert "gelsight-mini" in text
+    assert "gelsight-mini-ideal" in text
     assert not (tmp_path / "new").exists()
 
 
 def test_a_misspelt_field_is_told_with_file_and_line(tmp_path: Path) -> None:
-    run("new", "gelsight-mini", str(tmp_path / "mine"))
+    run("new", "gelsight-mini-ideal", str(tmp_path / "mine"))
     file = tmp_path / "mine" / "design.yaml"
     lines = file.read_text().splitlines()
     place = next(i for i, line in enumerate(lines) if line.strip().startswith("fov:"))
@@ -151,20 +151,20 @@ def test_a_misspelt_field_is_told_with_file_and_line(tmp_path: Path) -> None:
     ],
 )
 def test_a_contact_that_does_not_fit_is_bad_input(contact: str, complaint: str) -> None:
-    code, text = run("check", "gelsight-mini", "--contact", contact)
+    code, text = run("check", "gelsight-mini-ideal", "--contact", contact)
     assert code == 2
     assert complaint in text
 
 
 def test_contacts_that_the_skin_can_not_take_are_bad_input() -> None:
     contacts = ("--contact", "sphere:1.5@0,0:0.5", "--contact", "sphere:1.5@1,0:0.5")
-    code, text = run("check", "gelsight-mini", *contacts)
+    code, text = run("check", "gelsight-mini-ideal", *contacts)
     assert code == 2
     assert "two contacts overlap" in text
 
 
 def test_a_contact_that_fits_passes() -> None:
-    code, text = run("check", "gelsight-mini", "--contact", "sphere:1.5@2,1:0.8")
+    code, text = run("check", "gelsight-mini-ideal", "--contact", "sphere:1.5@2,1:0.8")
     assert code == 0, text
     assert "1 contact fits" in text
 

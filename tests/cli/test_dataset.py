@@ -27,16 +27,16 @@ def run(*arguments: str) -> tuple[int, str]:
 def test_a_dataset_is_made_and_continued(tmp_path: Path) -> None:
     folder = tmp_path / "not" / "yet"
     options = (*SMALL, "--indenter", "sphere:2", "--indenter", "cylinder:1,3", "--depth", "0.5")
-    code, text = run("gelsight-mini", "--out", str(folder), "--count", "2", *options)
+    code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "2", *options)
     assert code == 0, text
     assert "2 samples" in text
-    code, text = run("gelsight-mini", "--out", str(folder), "--count", "3", *options)
+    code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "3", *options)
     assert code == 0, text
     made = Dataset.load(folder)
     assert [labels["index"] for labels in made.labels] == [0, 1, 2]
     assert {labels["depth"] for labels in made.labels} == {0.5}
     assert made[2].image.shape == (36, 48, 3)
-    code, text = run("gelsight-mini", "--out", str(folder), "--count", "3", *SMALL)
+    code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "3", *SMALL)
     assert code == 2
     assert "settings.contacts.indenters was" in text
 
@@ -58,21 +58,21 @@ def test_a_dataset_is_made_and_continued(tmp_path: Path) -> None:
     ids=" ".join,
 )
 def test_bad_input_exits_with_2(arguments: tuple[str, ...], tmp_path: Path) -> None:
-    code, text = run("gelsight-mini", "--out", str(tmp_path / "d"), *arguments)
+    code, text = run("gelsight-mini-ideal", "--out", str(tmp_path / "d"), *arguments)
     assert code == 2, text
     assert len(text) > 20
 
 
 def test_where_no_contact_can_be_made_the_reason_is_told(tmp_path: Path) -> None:
     code, text = run(
-        "gelsight-mini", "--out", str(tmp_path / "d"), "--depth", "9", "-n", "2", *SMALL
+        "gelsight-mini-ideal", "--out", str(tmp_path / "d"), "--depth", "9", "-n", "2", *SMALL
     )
     assert code == 1
     assert "2 contacts could not be made: a contact is 9 mm deep, but the gel there is" in text
     assert "failures.csv" in text
 
 
-COMMAND = ("dataset", "gelsight-mini", *SMALL)
+COMMAND = ("dataset", "gelsight-mini-ideal", *SMALL)
 
 STRUCK = """
 import os, sys
@@ -99,7 +99,7 @@ app(command)
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A dataset made in one go."""
     folder = tmp_path_factory.mktemp("whole")
-    assert run("gelsight-mini", *SMALL, "--out", str(folder), "--count", "4")[0] == 0
+    assert run("gelsight-mini-ideal", *SMALL, "--out", str(folder), "--count", "4")[0] == 0
     return folder
 
 

@@ -26,7 +26,7 @@ def scores(evaluation):
 '''
 
 
-def evaluate(*arguments: str, design: str = "gelsight-mini") -> tuple[int, str, str]:
+def evaluate(*arguments: str, design: str = "gelsight-mini-ideal") -> tuple[int, str, str]:
     """Exit code, standard output, standard error."""
     result = CliRunner().invoke(app, ["evaluate", design, *arguments])
     assert "Traceback" not in result.output
@@ -50,7 +50,7 @@ def test_only_the_promised_files_are_written(folder: Path) -> None:
 
 def test_the_json_file_has_all_parts_and_the_spread(folder: Path) -> None:
     content = json.loads((folder / "scores.json").read_text())
-    assert content["design"] == "gelsight-mini"
+    assert content["design"] == "gelsight-mini-ideal"
     assert content["settings"]["seed"] == 5
     assert content["settings"]["resolution"] == [120, 90]
     assert list(content["scores"]) == ["rgb2normal", "normdiff", "aoap", "2to3pw"]
@@ -143,7 +143,7 @@ def test_settings_are_read_as_numbers_are_written() -> None:
 def test_an_unknown_sensor_exits_with_2() -> None:
     code, _, errors = evaluate("-b", "aoap", design="gelsight-minni")
     assert code == 2
-    assert "gelsight-mini" in errors
+    assert "gelsight-mini-ideal" in errors
 
 
 def test_an_output_folder_that_is_a_file_is_an_error_before_the_work(tmp_path: Path) -> None:
@@ -165,7 +165,7 @@ def pressed(evaluation):
     return 1.0
 
 registry._register(registry.Objective("pressed", pressed, "Pressed"))
-app(["evaluate", "gelsight-mini", "-b", "aoap", "-b", "pressed", "-b", "2to3pw",
+app(["evaluate", "gelsight-mini-ideal", "-b", "aoap", "-b", "pressed", "-b", "2to3pw",
      "--resolution", "40x30", "--out", sys.argv[1]])
 """
 

@@ -26,10 +26,10 @@ def run(*arguments: str) -> tuple[int, str]:
 
 def test_all_that_a_workshop_needs(tmp_path: Path) -> None:
     out = tmp_path / "new" / "workshop"
-    code, text = run("gelsight-mini", "--out", str(out), "--format", "stl", "-f", "3MF")
+    code, text = run("gelsight-mini-ideal", "--out", str(out), "--format", "stl", "-f", "3MF")
     assert code == 0, text
     assert {file.name for file in out.iterdir()} == {
-        "skin.stl", "gel.stl", "tray.stl", "guide.stl", "gelsight-mini.3mf",
+        "skin.stl", "gel.stl", "tray.stl", "guide.stl", "gelsight-mini-ideal.3mf",
         "tray-drawing.svg", "tray-cut.dxf", "guide-drawing.svg", "guide-cut.dxf",
         "pick-and-place.csv", "bill-of-materials.csv", "bill-of-materials.md",
         *(f"board-{board}{end}" for board in (1, 2, 3)
@@ -42,9 +42,11 @@ def test_all_that_a_workshop_needs(tmp_path: Path) -> None:
 
 
 def test_a_model_for_robot_simulators(tmp_path: Path) -> None:
-    code, text = run("gelsight-mini", "--for", "URDF", "--density", "gel=0.97", "-o", str(tmp_path))
+    code, text = run(
+        "gelsight-mini-ideal", "--for", "URDF", "--density", "gel=0.97", "-o", str(tmp_path)
+    )
     assert code == 0, text
-    assert {path.name for path in tmp_path.iterdir()} == {"gelsight-mini.urdf", "meshes"}
+    assert {path.name for path in tmp_path.iterdir()} == {"gelsight-mini-ideal.urdf", "meshes"}
     assert {path.stem for path in (tmp_path / "meshes").iterdir()} == {
         "skin", "gel", "tray", "guide", "gel-hull", "tray-hull", "guide-hull",
     }  # fmt: skip
@@ -58,14 +60,14 @@ def test_the_command_offers_what_can_be_written() -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("gelsight-mini", "--format", "dxf"), "none of stl, obj, 3mf, step"),
-        (("gelsight-minni",), "gelsight-mini"),
-        (("gelsight-mini", "--for", "gazebo"), "none of mujoco, urdf"),
-        (("gelsight-mini", "--for", "urdf", "--moulds"), "for the workshop"),
-        (("gelsight-mini", "--mass", "20"), "add --for"),
-        (("gelsight-mini", "--for", "urdf", "--density", "gel"), "housing=1.24"),
-        (("gelsight-mini", "--for", "urdf", "--density", "gell=1"), "gel, tray, guide"),
-        (("gelsight-mini", "--for", "urdf", "--mass", "-1"), "above 0"),
+        (("gelsight-mini-ideal", "--format", "dxf"), "none of stl, obj, 3mf, step"),
+        (("gelsight-minni",), "gelsight-mini-ideal"),
+        (("gelsight-mini-ideal", "--for", "gazebo"), "none of mujoco, urdf"),
+        (("gelsight-mini-ideal", "--for", "urdf", "--moulds"), "for the workshop"),
+        (("gelsight-mini-ideal", "--mass", "20"), "add --for"),
+        (("gelsight-mini-ideal", "--for", "urdf", "--density", "gel"), "housing=1.24"),
+        (("gelsight-mini-ideal", "--for", "urdf", "--density", "gell=1"), "gel, tray, guide"),
+        (("gelsight-mini-ideal", "--for", "urdf", "--mass", "-1"), "above 0"),
     ],
 )
 def test_bad_input_writes_nothing(
@@ -79,7 +81,7 @@ def test_bad_input_writes_nothing(
 
 def test_step_without_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "OCP.STEPCAFControl", None)
-    code, text = run("gelsight-mini", "--format", "step", "--out", str(tmp_path / "new"))
+    code, text = run("gelsight-mini-ideal", "--format", "step", "--out", str(tmp_path / "new"))
     assert code == 1
     assert "optisense[step]" in text
     assert not (tmp_path / "new").exists()
@@ -87,7 +89,7 @@ def test_step_without_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 
 def test_an_output_folder_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    code, text = run("gelsight-mini", "--out", str(tmp_path / "file"))
+    code, text = run("gelsight-mini-ideal", "--out", str(tmp_path / "file"))
     assert code == 1
     assert "file" in text
 
@@ -100,10 +102,12 @@ def test_folders_may_have_names_that_are_not_utf_8(tmp_path: Path) -> None:
         folder.mkdir()
     except OSError:
         pytest.skip("the file system takes only UTF-8")
-    code, text = run("gelsight-mini", "--out", str(folder / "made"), "--format", "step")
+    code, text = run("gelsight-mini-ideal", "--out", str(folder / "made"), "--format", "step")
     assert code == 0, text
-    assert {body.name for body in read_step(folder / "made" / "gelsight-mini.step")} >= {"gel"}
+    assert {body.name for body in read_step(folder / "made" / "gelsight-mini-ideal.step")} >= {
+        "gel"
+    }
     options = ["--photons", "20000", "--resolution", "40x30", "--out", str(folder / "picture")]
-    result = CliRunner().invoke(app, ["render", "gelsight-mini", *options])
+    result = CliRunner().invoke(app, ["render", "gelsight-mini-ideal", *options])
     assert result.exit_code == 0, result.output
     assert (folder / "picture" / "radiance.exr").read_bytes()[:4] == b"\x76\x2f\x31\x01"

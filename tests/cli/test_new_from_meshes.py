@@ -153,7 +153,7 @@ class TestQuestions:
     def test_answers_are_kept_when_the_files_are_unfit(self, tmp_path: Path) -> None:
         cad = tmp_path / "cad"
         cad.mkdir()
-        optisense.load("gelsight-mini").meshes["skin"].save_obj(cad / "gel.obj")  # not closed
+        optisense.load("gelsight-mini-ideal").meshes["skin"].save_obj(cad / "gel.obj")  # not closed
         code, text = new("--from-meshes", cad, tmp_path / "pad", answers="\n" * 60)
         assert code == 2 and "not closed" in text and "part gel" in text
         assert "Your answers are kept" in text
@@ -191,9 +191,9 @@ class TestRefused:
     @pytest.mark.parametrize(
         "words",
         [
-            ("gelsight-mini",),
-            ("gelsight-mini", "a", "--yes"),
-            ("gelsight-mini", "a", "--units", "m"),
+            ("gelsight-mini-ideal",),
+            ("gelsight-mini-ideal", "a", "--yes"),
+            ("gelsight-mini-ideal", "a", "--units", "m"),
             ("a", "b", "--from-meshes", CAD),
             ("a", "--from-meshes", CAD, "--units", "feet"),
         ],

@@ -156,7 +156,7 @@ def test_the_bar_of_a_tolerance_counts_the_sensors_that_its_page_tells_of() -> N
 
     told: list[tuple[str, int, int]] = []
     found = tolerance(
-        load("gelsight-mini"),
+        load("gelsight-mini-ideal"),
         flux,
         {"lights.red.flux": 0.1, "lights.blue.flux": 0.1},
         sensors=30,

@@ -32,7 +32,7 @@ FILES = {
 }
 
 
-def render(*arguments: str, design: str = "gelsight-mini") -> tuple[int, str]:
+def render(*arguments: str, design: str = "gelsight-mini-ideal") -> tuple[int, str]:
     result = CliRunner().invoke(app, ["render", design, *arguments])
     assert "Traceback" not in result.output
     return result.exit_code, result.output
@@ -89,7 +89,7 @@ def test_the_ball_is_in_the_middle_of_the_picture(folder: Path) -> None:
 def test_run_json_says_how_it_was_made(folder: Path) -> None:
     run = json.loads((folder / "run.json").read_text())
     assert run["seed"] == 7
-    assert run["design"] == "gelsight-mini"
+    assert run["design"] == "gelsight-mini-ideal"
     assert run["contacts"] == ["sphere:1.5@0,0:0.8"]
 
 
@@ -172,7 +172,8 @@ def render(self, *arguments, progress, **options):
     return plain(self, *arguments, progress=press_once, **options)
 
 OpticalModel.render = render
-app(["render", "gelsight-mini", "--resolution", "40x30", "--seconds", "200", "--out", sys.argv[1]])
+options = ["--resolution", "40x30", "--seconds", "200", "--out", sys.argv[1]]
+app(["render", "gelsight-mini-ideal", *options])
 """
     result = child(script, tmp_path / "out")
     assert result.returncode == 130, result.stderr
@@ -196,7 +197,7 @@ def save(self, *arguments):
     plain(self, *arguments)
 
 TactileImage.save = save
-app(["render", "gelsight-mini", "--resolution", "40x30", "--photons", "20000",
+app(["render", "gelsight-mini-ideal", "--resolution", "40x30", "--photons", "20000",
      "--out", sys.argv[1]])
 """
     result = child(script, tmp_path / "out")

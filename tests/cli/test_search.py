@@ -45,8 +45,9 @@ def mine(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def study(mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study of eleven coatings."""
     folder = tmp_path_factory.mktemp("studies") / "study"
-    result = run("gelsight-mini", "--vary", "coating.specularity=0:1:11", "-b", f"{mine}:near",
-                 "--method", "grid", "--rule", f"{mine}:dull", "--out", folder)  # fmt: skip
+    result = run("gelsight-mini-ideal", "--vary", "coating.specularity=0:1:11",
+                 "-b", f"{mine}:near", "--method", "grid",
+                 "--rule", f"{mine}:dull", "--out", folder)  # fmt: skip
     assert result.exit_code == 0, result.output
     assert "best: trial 4, near 0 (start -0.09)" in result.output
     assert "coating.specularity = 0.3" in result.output
@@ -63,8 +64,8 @@ def test_a_rule_that_is_not_there_is_told_before_the_first_trial(
     mine: Path, tmp_path: Path
 ) -> None:
     for rule, said in ((tmp_path / "no.py:f", "no file"), (f"{mine}:none", "no function 'none'")):
-        result = run("gelsight-mini", "--vary", "coating.specularity=0:1", "-b", f"{mine}:near",
-                     "--rule", rule, "--out", tmp_path / "study")  # fmt: skip
+        result = run("gelsight-mini-ideal", "--vary", "coating.specularity=0:1",
+                     "-b", f"{mine}:near", "--rule", rule, "--out", tmp_path / "study")  # fmt: skip
         assert result.exit_code == 2
         assert said in result.output and "trials" not in result.output
         assert not (tmp_path / "study").exists()
@@ -112,8 +113,9 @@ def test_json(study: Path) -> None:
 
 
 def test_a_start_that_is_not_beaten(mine: Path, tmp_path: Path) -> None:
-    result = run("gelsight-mini", "--vary", "coating.specularity=0.7:1:2", "-b", f"{mine}:near",
-                 "--method", "grid", "--out", tmp_path / "study", "--variant", "llvm")  # fmt: skip
+    result = run("gelsight-mini-ideal", "--vary", "coating.specularity=0.7:1:2",
+                 "-b", f"{mine}:near", "--method", "grid",
+                 "--out", tmp_path / "study", "--variant", "llvm")  # fmt: skip
     assert result.exit_code == 0, result.output
     assert "best: trial 0" in result.output
     assert "no trial is better than the start" in result.output
@@ -132,13 +134,15 @@ def test_resume_takes_no_other_settings(study: Path, mine: Path) -> None:
         assert result.exit_code == 2, words
         assert said in result.output
     same = run(
-        "gelsight-mini", "--resume", "--out", study, "--method", "grid", "-b", f"{mine}:near"
+        "gelsight-mini-ideal", "--resume", "--out", study, "--method", "grid", "-b", f"{mine}:near"
     )
     assert same.exit_code == 0, same.output
 
 
 def test_an_edited_design_is_refused(study: Path, tmp_path: Path) -> None:
-    ots.save_design(ots.set_value(ots.load("gelsight-mini"), "lights.red.flux", 12.0), tmp_path)
+    ots.save_design(
+        ots.set_value(ots.load("gelsight-mini-ideal"), "lights.red.flux", 12.0), tmp_path
+    )
     result = run(tmp_path, "--resume", "--out", study)
     assert result.exit_code == 2
     assert "-> 12" in result.output
@@ -155,7 +159,7 @@ def test_a_study_that_was_edited_is_refused_with_the_difference(
     ots.save_design(edited, design)
     result = run("--resume", "--out", copy)
     assert result.exit_code == 2
-    flux = ots.load("gelsight-mini").lights["red"].flux
+    flux = ots.load("gelsight-mini-ideal").lights["red"].flux
     assert f"lights.red.flux: {flux:g} -> 12" in result.output
     assert "mesh of part 'gel': vertices moved" in result.output
     assert len(result.output.splitlines()) < 8  # no more than what was edited
@@ -173,21 +177,21 @@ def test_a_study_that_was_edited_is_refused_with_the_difference(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["gelsight-mini"], "name a folder for the study"),
+        (["gelsight-mini-ideal"], "name a folder for the study"),
         (["--out", "x"], "name the design to start from"),
-        (["gelsight-mini", "--out", "x"], "must be given at least once"),
-        (["gelsight-mini", "--out", "x", "--vary", "a=0:1"], "must be given at least once"),
-        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.speculaity=0:1"],
+        (["gelsight-mini-ideal", "--out", "x"], "must be given at least once"),
+        (["gelsight-mini-ideal", "--out", "x", "--vary", "a=0:1"], "must be given at least once"),
+        (["gelsight-mini-ideal", "--out", "x", "-b", "aoap", "--vary", "coating.speculaity=0:1"],
          "Did you mean 'specularity'"),
-        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=1:0"],
+        (["gelsight-mini-ideal", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=1:0"],
          "reversed"),
-        (["gelsight-mini", "--out", "x", "-b", "aopa", "--vary", "coating.specularity=0:1"],
+        (["gelsight-mini-ideal", "--out", "x", "-b", "aopa", "--vary", "coating.specularity=0:1"],
          "Did you mean 'aoap'"),
-        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
+        (["gelsight-mini-ideal", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
           "--method", "gird"], "Did you mean 'grid'"),
-        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
+        (["gelsight-mini-ideal", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
           "--option", "sigmas=1"], "Did you mean 'sigma'"),
-        (["gelsight-mini", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
+        (["gelsight-mini-ideal", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
           "--cluster", "here"], "is not the address"),
         (["--resume", "--out", "x"], "no study here"),
     ],
@@ -204,17 +208,17 @@ def test_bad_input_is_told_and_leaves_nothing(
 
 
 def test_a_search_that_can_not_succeed_is_hinted_at(tmp_path: Path) -> None:
-    words = ("gelsight-mini", "--vary", "coating.specularity=0:1", "--budget", "1")
+    words = ("gelsight-mini-ideal", "--vary", "coating.specularity=0:1", "--budget", "1")
     found = run(*words, "--out", tmp_path / "rays", "-b", "aoap")
     assert found.exit_code == 0, found.output
     assert "all trials will score alike" in " ".join(found.output.split())
-    found = run("gelsight-mini", "--vary", "camera.fov=50:60", "--budget", "1",
+    found = run("gelsight-mini-ideal", "--vary", "camera.fov=50:60", "--budget", "1",
                 "--out", tmp_path / "view", "-b", "aoap")  # fmt: skip
     assert found.exit_code == 0 and "score alike" not in found.output
 
 
 def test_an_objective_that_always_fails(mine: Path, tmp_path: Path) -> None:
-    result = run("gelsight-mini", "--vary", "coating.specularity=0:1", "-b", f"{mine}:shy",
+    result = run("gelsight-mini-ideal", "--vary", "coating.specularity=0:1", "-b", f"{mine}:shy",
                  "--out", tmp_path / "study", "--budget", 500)  # fmt: skip
     assert result.exit_code == 2
     assert "trials so far have failed" in result.output
@@ -224,7 +228,7 @@ def test_an_objective_that_always_fails(mine: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_ctrl_c_keeps_what_is_finished(mine: Path, tmp_path: Path) -> None:
     """Pressed during the first trial after the start: that trial still counts."""
-    command = ["search", "gelsight-mini", "--vary", "coating.specularity=0.1:1", "-b",
+    command = ["search", "gelsight-mini-ideal", "--vary", "coating.specularity=0.1:1", "-b",
                f"{mine}:near", "--out", str(tmp_path / "study"), "--budget", "30"]  # fmt: skip
     child = subprocess.run(
         [sys.executable, "-m", "optisense.cli", *command],

@@ -174,12 +174,16 @@ def ended(program: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     ("number", "words", "module"),
     [
-        (signal.SIGINT, ["check", "gelsight-mini"], "optisense.cli.app"),
-        (signal.SIGTERM, ["check", "gelsight-mini"], "optisense.cli.app"),
+        (signal.SIGINT, ["check", "gelsight-mini-ideal"], "optisense.cli.app"),
+        (signal.SIGTERM, ["check", "gelsight-mini-ideal"], "optisense.cli.app"),
         (signal.SIGINT, ["library", "list"], "optisense.cli.library"),
-        (signal.SIGTERM, ["export", "gelsight-mini", "--out", "/nowhere"], "optisense.cli.export"),
-        (signal.SIGINT, ["check", "gelsight-mini"], "numpy._core.multiarray"),
-        (signal.SIGTERM, ["ledger", "gelsight-mini"], "drjit.ast"),
+        (
+            signal.SIGTERM,
+            ["export", "gelsight-mini-ideal", "--out", "/nowhere"],
+            "optisense.cli.export",
+        ),
+        (signal.SIGINT, ["check", "gelsight-mini-ideal"], "numpy._core.multiarray"),
+        (signal.SIGTERM, ["ledger", "gelsight-mini-ideal"], "drjit.ast"),
     ],
 )
 def test_a_signal_while_python_imports_ends_the_command_in_a_word(
@@ -191,7 +195,7 @@ def test_a_signal_while_python_imports_ends_the_command_in_a_word(
 
 
 def test_sigterm_amid_an_import_is_not_lost_where_ctrl_c_is_ignored() -> None:
-    number, words = int(signal.SIGTERM), ["ledger", "gelsight-mini"]
+    number, words = int(signal.SIGTERM), ["ledger", "gelsight-mini-ideal"]
     program = IMPORTING.format(module="drjit.ast", number=number, words=words)
     child = ended(in_the_background(program))
     assert child.stderr == "interrupted\n"

@@ -99,14 +99,14 @@ def test_installs_and_starts_the_blender_on_the_path(
 ) -> None:
     fake_blender(tmp_path)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    result = run("gelsight-mini")
+    result = run("gelsight-mini-ideal")
     assert result.exit_code == 0, result.output
     log = (tmp_path / "log").read_text()
     assert "--command extension install-file -r user_default --enable" in log
-    assert "-m optisense.cli engine open=gelsight-mini" in log
+    assert "-m optisense.cli engine open=gelsight-mini-ideal" in log
     (tmp_path / "log").unlink()
     assert run("--no-start").exit_code == 0
-    assert "open=gelsight-mini" not in (tmp_path / "log").read_text()
+    assert "open=gelsight-mini-ideal" not in (tmp_path / "log").read_text()
 
 
 def test_an_old_blender_a_broken_one_and_no_blender_are_told(tmp_path: Path) -> None:
@@ -125,5 +125,5 @@ def test_an_old_blender_a_broken_one_and_no_blender_are_told(tmp_path: Path) -> 
 def test_an_unknown_design_is_told_before_blender_starts(tmp_path: Path) -> None:
     program = fake_blender(tmp_path)
     result = run("gelsight-mimi", "--blender", str(program))
-    assert result.exit_code == 2 and "gelsight-mini" in result.output
+    assert result.exit_code == 2 and "gelsight-mini-ideal" in result.output
     assert not (tmp_path / "log").exists()

@@ -23,7 +23,7 @@ def run(*arguments: str) -> tuple[int, str]:
 
 def test_misalignment_prints_writes_and_continues(tmp_path: Path) -> None:
     folder = tmp_path / "not" / "yet"
-    command = ("misalignment", "gelsight-mini", *SMALL, "--range", "5", "--out", str(folder))
+    command = ("misalignment", "gelsight-mini-ideal", *SMALL, "--range", "5", "--out", str(folder))
     code, text = run(*command, "-n", "10")
     assert code == 0, text
     assert "degrees" in text
@@ -48,7 +48,9 @@ def test_misalignment_prints_writes_and_continues(tmp_path: Path) -> None:
 
 def test_snr_runs_both_tasks(tmp_path: Path) -> None:
     options = ("--samples", "10", "--photons", "60000", "--neighbours", "3", "--resolution")
-    code, text = run("snr", "gelsight-mini", *options, "48x36", "--out", str(tmp_path), "--json")
+    code, text = run(
+        "snr", "gelsight-mini-ideal", *options, "48x36", "--out", str(tmp_path), "--json"
+    )
     assert code == 0, text
     tasks = json.loads(text)["tasks"]
     assert [task["task"] for task in tasks] == ["misalignment", "cylinder-radius"]
@@ -63,7 +65,7 @@ def test_reconstruction_of_given_objects(tmp_path: Path) -> None:
     ball = "sphere:3@0,0:0.5"
     options = ("--presses", "4", "--resolution", "64x48", "--photons", "60000", "--method", "table")
     arguments = ("--object", ball, *options, "--out", str(tmp_path))
-    code, text = run("reconstruction", "gelsight-mini", *arguments)
+    code, text = run("reconstruction", "gelsight-mini-ideal", *arguments)
     assert code == 0, text
     values = json.loads((tmp_path / "result.json").read_text())
     assert list(values["objects"]) == [ball]
@@ -77,20 +79,20 @@ def test_reconstruction_of_given_objects(tmp_path: Path) -> None:
     "arguments",
     [
         ("misalignment", "no-such-sensor"),
-        ("misalignment", "gelsight-mini", "-n", "3"),
-        ("misalignment", "gelsight-mini", "--range", "40"),
-        ("misalignment", "gelsight-mini", "--crop", "2"),
-        ("misalignment", "gelsight-mini", "-n", "20", "--neighbours", "20"),
-        ("misalignment", "gelsight-mini", "--resolution", "tall"),
-        ("misalignment", "gelsight-mini", "--estimator", "guess"),
-        ("cylinder-radius", "gelsight-mini", "--radius", "6:1"),
-        ("cylinder-radius", "gelsight-mini", "--radius", "thin"),
-        ("cylinder-radius", "gelsight-mini", "--depth", "9"),
-        ("snr", "gelsight-mini", "--camera-noise", "-1"),
-        ("reconstruction", "gelsight-mini", "--method", "guess"),
-        ("reconstruction", "gelsight-mini", "--depth", "0.2:9"),
-        ("reconstruction", "gelsight-mini", "--object", "ball:3"),
-        ("reconstruction", "gelsight-mini", "--object", "sphere:3@90,0:0.5"),
+        ("misalignment", "gelsight-mini-ideal", "-n", "3"),
+        ("misalignment", "gelsight-mini-ideal", "--range", "40"),
+        ("misalignment", "gelsight-mini-ideal", "--crop", "2"),
+        ("misalignment", "gelsight-mini-ideal", "-n", "20", "--neighbours", "20"),
+        ("misalignment", "gelsight-mini-ideal", "--resolution", "tall"),
+        ("misalignment", "gelsight-mini-ideal", "--estimator", "guess"),
+        ("cylinder-radius", "gelsight-mini-ideal", "--radius", "6:1"),
+        ("cylinder-radius", "gelsight-mini-ideal", "--radius", "thin"),
+        ("cylinder-radius", "gelsight-mini-ideal", "--depth", "9"),
+        ("snr", "gelsight-mini-ideal", "--camera-noise", "-1"),
+        ("reconstruction", "gelsight-mini-ideal", "--method", "guess"),
+        ("reconstruction", "gelsight-mini-ideal", "--depth", "0.2:9"),
+        ("reconstruction", "gelsight-mini-ideal", "--object", "ball:3"),
+        ("reconstruction", "gelsight-mini-ideal", "--object", "sphere:3@90,0:0.5"),
     ],
     ids=" ".join,
 )
@@ -104,6 +106,6 @@ def test_bad_input_exits_with_2(arguments: tuple[str, ...], tmp_path: Path) -> N
 
 def test_an_output_folder_that_is_a_file_is_told(tmp_path: Path) -> None:
     (tmp_path / "o").write_text("mine")
-    code, text = run("misalignment", "gelsight-mini", "--out", str(tmp_path / "o"))
+    code, text = run("misalignment", "gelsight-mini-ideal", "--out", str(tmp_path / "o"))
     assert code == 1
     assert "is a file" in text

@@ -33,7 +33,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A search that ends with a brighter red light, and renders nothing."""
     folder = tmp_path_factory.mktemp("study") / "study"
     vary = {"lights.red.flux": (1.0, 9.0)}
-    search(load("gelsight-mini"), vary, brighter, method="random", budget=4, out=folder)
+    search(load("gelsight-mini-ideal"), vary, brighter, method="random", budget=4, out=folder)
     return folder
 
 
@@ -55,7 +55,7 @@ def test_a_study_is_compared_with_its_start(study: Path, tmp_path: Path) -> None
 
 
 def test_two_designs_are_compared() -> None:
-    code, text, told = run("gelsight-mini", "gelsight-mini", *TINY, "--json")
+    code, text, told = run("gelsight-mini-ideal", "gelsight-mini-ideal", *TINY, "--json")
     assert code == 0, told
     values = json.loads(text)
     assert values["normals"]["change"] == 0.0
@@ -63,7 +63,7 @@ def test_two_designs_are_compared() -> None:
 
 
 def test_one_design_alone_is_refused() -> None:
-    code, _, told = run("gelsight-mini")
+    code, _, told = run("gelsight-mini-ideal")
     assert code == 2
     assert "name a second design" in told
 
@@ -73,7 +73,7 @@ def test_a_study_without_finished_trials_is_refused(tmp_path: Path) -> None:
 
     space = SearchSpace({"lights.red.flux": Continuous(1.0, 9.0)})
     plan = Plan(space, [brighter], method="random", budget=4)
-    Study.create(tmp_path / "new", load("gelsight-mini"), plan).close()
+    Study.create(tmp_path / "new", load("gelsight-mini-ideal"), plan).close()
     code, _, told = run(str(tmp_path / "new"), "--quick")
     assert code == 2
     assert "no trial" in told
@@ -81,7 +81,7 @@ def test_a_study_without_finished_trials_is_refused(tmp_path: Path) -> None:
 
 def test_a_study_whose_best_is_its_start_is_refused(study: Path, tmp_path: Path) -> None:
     vary = {"lights.red.flux": (1.0, 2.0)}
-    bright = set_value(load("gelsight-mini"), "lights.red.flux", 2.0)
+    bright = set_value(load("gelsight-mini-ideal"), "lights.red.flux", 2.0)
     search(bright, vary, brighter, method="random", budget=2, out=tmp_path / "vain")
     code, _, told = run(str(tmp_path / "vain"), "--quick")
     assert code == 2
@@ -94,9 +94,9 @@ def test_a_study_whose_best_is_its_start_is_refused(study: Path, tmp_path: Path)
 def test_a_design_without_a_view_is_told_by_its_name(tmp_path: Path) -> None:
     from optisense.design import save_design
 
-    away = set_value(load("gelsight-mini"), "camera.direction", [0.0, 0.0, -1.0])
+    away = set_value(load("gelsight-mini-ideal"), "camera.direction", [0.0, 0.0, -1.0])
     save_design(away, tmp_path / "away")
-    code, _, told = run("gelsight-mini", str(tmp_path / "away"), *TINY)
+    code, _, told = run("gelsight-mini-ideal", str(tmp_path / "away"), *TINY)
     assert code == 2
     assert "of the sensing surface" in told or "no picture" in told
 

@@ -105,9 +105,9 @@ def ran(*words: object) -> tuple[int, str]:
 
 
 def search_words(mine: Path, out: Path, *more: object) -> list[object]:
-    return ["search", "gelsight-mini", "--vary", "coating.specularity=0:1", "-b", f"{mine}:score",
-            "--rule", f"{mine}:fine", "--budget", 3, "--method", "random", "--out", out,
-            *more]  # fmt: skip
+    return ["search", "gelsight-mini-ideal", "--vary", "coating.specularity=0:1",
+            "-b", f"{mine}:score", "--rule", f"{mine}:fine", "--budget", 3, "--method", "random",
+            "--out", out, *more]  # fmt: skip
 
 
 @pytest.mark.slow
@@ -164,7 +164,7 @@ def test_of_two_datasets_in_one_folder_one_wins_whole(tmp_path: Path) -> None:
     small = ["--count", 1, "--photons", 20000, "--resolution", "32x24"]
     processes = [
         started("dataset", sensor, "--out", out, "--seed", seed, *small)
-        for sensor, seed in (("gelsight-mini", 1), ("gelsight-mini", 2))
+        for sensor, seed in (("gelsight-mini-ideal", 1), ("gelsight-mini-ideal", 2))
     ]
     results = [ended(process) for process in processes]
     codes = [code for code, _ in results]
@@ -174,7 +174,7 @@ def test_of_two_datasets_in_one_folder_one_wins_whole(tmp_path: Path) -> None:
     made = json.loads((out / "dataset.json").read_text())
     assert made["settings"]["seed"] == 1 + codes.index(0)
     assert made["design_name"] == ots.load(out / "design").name
-    again = ran("dataset", "gelsight-mini", "--out", out,
+    again = ran("dataset", "gelsight-mini-ideal", "--out", out,
                 "--seed", 1 + codes.index(0), *small)  # fmt: skip
     assert again[0] == 0, again[1]
 
@@ -183,13 +183,13 @@ def test_of_two_datasets_in_one_folder_one_wins_whole(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ["new", "gelsight-mini"],
-        ["render", "gelsight-mini", "--photons", 1000, "--out"],
-        ["dataset", "gelsight-mini", "--count", 1, "--out"],
-        ["export", "gelsight-mini", "--out"],
-        ["task", "cylinder-radius", "gelsight-mini", "--out"],
-        ["tolerance", "gelsight-mini", "--out"],
-        ["evaluate", "gelsight-mini", "--out"],
+        ["new", "gelsight-mini-ideal"],
+        ["render", "gelsight-mini-ideal", "--photons", 1000, "--out"],
+        ["dataset", "gelsight-mini-ideal", "--count", 1, "--out"],
+        ["export", "gelsight-mini-ideal", "--out"],
+        ["task", "cylinder-radius", "gelsight-mini-ideal", "--out"],
+        ["tolerance", "gelsight-mini-ideal", "--out"],
+        ["evaluate", "gelsight-mini-ideal", "--out"],
     ],
     ids=lambda words: words[0],
 )
@@ -252,7 +252,7 @@ def study(tmp_path: Path) -> Path:
 
     space = SearchSpace({"coating.specularity": (0.0, 1.0)})
     out = tmp_path / "study"
-    search(ots.load("gelsight-mini"), space, brightness, budget=4, out=out).study.close()
+    search(ots.load("gelsight-mini-ideal"), space, brightness, budget=4, out=out).study.close()
     return out
 
 
@@ -329,9 +329,9 @@ def small_disk(place: Path, size: str) -> Iterator[Path]:
 @pytest.mark.parametrize(
     "words",
     [
-        ["new", "gelsight-mini"],
-        ["export", "gelsight-mini", "--out"],
-        ["render", "gelsight-mini", "--photons", 1000, "--resolution", "64x48", "--out"],
+        ["new", "gelsight-mini-ideal"],
+        ["export", "gelsight-mini-ideal", "--out"],
+        ["render", "gelsight-mini-ideal", "--photons", 1000, "--resolution", "64x48", "--out"],
     ],
     ids=lambda words: words[0],
 )
@@ -346,7 +346,10 @@ def test_a_full_disk_leaves_nothing_half(words: list[object], tmp_path: Path) ->
 @pytest.mark.slow
 def test_a_read_only_folder_is_told_before_the_work(tmp_path: Path) -> None:
     with read_only(tmp_path):
-        for words in (["export", "gelsight-mini", "--out"], ["dataset", "gelsight-mini", "--out"]):
+        for words in (
+            ["export", "gelsight-mini-ideal", "--out"],
+            ["dataset", "gelsight-mini-ideal", "--out"],
+        ):
             code, said = ran(*words, tmp_path / "out")
             assert code == 1, said
             assert "can't be written" in said and "tracing" not in said
@@ -355,7 +358,7 @@ def test_a_read_only_folder_is_told_before_the_work(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_full_disk_is_told_as_it_is(tmp_path: Path) -> None:
     """On a file system of 2 MB: first too small for a study, then for all of its trials."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     space = SearchSpace({"coating.specularity": (0.0, 1.0)})
 
     def brightness(design: ots.SensorDesign) -> float:

@@ -26,7 +26,7 @@ from optisense.errors import DesignError
 
 @pytest.fixture(scope="module")
 def mini() -> SensorDesign:
-    return sensors.gelsight_mini()
+    return sensors.gelsight_mini_ideal()
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,10 @@ def shape(design: SensorDesign, part: str) -> np.ndarray:
 
 class TestChecks:
     def test_built_in_bends_are_fine(self) -> None:
-        for build in (sensors.gelsight_mini_cylindrical, sensors.gelsight_mini_spherical):
+        for build in (
+            sensors.gelsight_mini_ideal_cylindrical,
+            sensors.gelsight_mini_ideal_spherical,
+        ):
             assert cage_problems(build()) == []
 
     def test_the_whole_range_of_sveltes_mirror_is_fine(self, svelte: SensorDesign) -> None:
@@ -143,7 +146,7 @@ class TestEditing:
 
     def test_the_row_of_the_papers_cylinder(self, mini: SensorDesign) -> None:
         moved = move_points(mini, "skin", {"1,*,2": (0.0, 0.0, 6.0)})
-        expected = shape(sensors.gelsight_mini_cylindrical(), "skin")
+        expected = shape(sensors.gelsight_mini_ideal_cylindrical(), "skin")
         np.testing.assert_allclose(shape(moved, "skin"), expected, atol=1e-12)
 
     def test_refining_and_settling_keep_the_shape(self, svelte: SensorDesign) -> None:
@@ -155,7 +158,7 @@ class TestEditing:
             np.testing.assert_allclose(shape(changed, "M1"), shape(svelte, "M1"), atol=1e-10)
 
     def test_a_range_reaches_both_ends(self, mini: SensorDesign) -> None:
-        bent = sensors.gelsight_mini_cylindrical()
+        bent = sensors.gelsight_mini_ideal_cylindrical()
         rest = mini.cages["skin"].current_points()
         ranged = set_range(bent, "skin", c_min=rest)
         for blend, expected in ((0.0, mini), (1.0, bent)):

@@ -14,7 +14,7 @@ from optisense.geometry import TriangleMesh
 
 @pytest.fixture(scope="module")
 def mini() -> SensorDesign:
-    return sensors.gelsight_mini()
+    return sensors.gelsight_mini_ideal()
 
 
 def errors(design: SensorDesign) -> list[Diagnostic]:

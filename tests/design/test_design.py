@@ -96,7 +96,7 @@ def test_changes_in_place_are_checked(design: SensorDesign) -> None:
         design.coating.specularity = 2.0
 
 
-@pytest.mark.parametrize("given", ["gelsight-mini", Path("my-sensor"), None])
+@pytest.mark.parametrize("given", ["gelsight-mini-ideal", Path("my-sensor"), None])
 def test_a_name_in_place_of_a_design_says_how_to_load_it(given: Any) -> None:
     for use in (
         ots.OpticalModel,

@@ -72,7 +72,7 @@ def test_a_kind_of_an_installed_package_is_in_files_and_its_table_has_its_closed
 import json
 from optisense import sensors
 from optisense.design import load_design, save_design
-design = sensors.load("builtin:gelsight-mini")
+design = sensors.load("builtin:gelsight-mini-ideal")
 group = next(iter(design.lights.values()))
 group.emitter = {{"kind": "cosine-power", "power": 4.0}}
 save_design(design, {str(tmp_path / "sensor")!r})
@@ -88,7 +88,7 @@ print(json.dumps([type(lamp).__module__, lamp.power, lamp.half_angle(), lamp.in_
 def test_without_the_package_the_design_is_refused_with_the_kinds_that_are_known(
     tmp_path: Path,
 ) -> None:
-    design = sensors.load("builtin:gelsight-mini")
+    design = sensors.load("builtin:gelsight-mini-ideal")
     next(iter(design.lights.values())).emitter = SpotEmitter(beam=10.0, cutoff=20.0)
     save_design(design, tmp_path / "sensor")
     file = tmp_path / "sensor" / "design.yaml"
@@ -163,7 +163,7 @@ def test_a_narrow_beam_is_not_lost_between_angles() -> None:
 
 
 def test_an_intensity_below_zero_is_a_problem_of_the_design() -> None:
-    design = sensors.load("builtin:gelsight-mini")
+    design = sensors.load("builtin:gelsight-mini-ideal")
     name = next(iter(design.lights))
     group = LightGroup.model_validate(
         {**design.lights[name].model_dump(), "emitter": Ring(sign=-1.0)}

@@ -27,7 +27,7 @@ FISHEYE = KannalaBrandt(k1=-0.013, k2=0.0021, k3=-0.0007, k4=0.0001)
 
 def mini(**changes: Any) -> SensorDesign:
     """GelSight Mini with other values of its camera."""
-    design = ots.load("builtin:gelsight-mini")
+    design = ots.load("builtin:gelsight-mini-ideal")
     camera = design.camera.model_dump(mode="json") | changes
     return ots.set_value(design, "camera", camera)
 

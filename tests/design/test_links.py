@@ -15,7 +15,7 @@ from optisense.errors import DesignError, OptiSenseError, OutputError
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    save_design(ots.load("gelsight-mini"), tmp_path / "design")
+    save_design(ots.load("gelsight-mini-ideal"), tmp_path / "design")
     return tmp_path / "design"
 
 
@@ -46,10 +46,12 @@ def test_a_design_that_is_a_link_to_itself_is_told(tmp_path: Path) -> None:
     for name in (loop, loop / "design.yaml"):
         with pytest.raises(OptiSenseError):
             ots.load(name)
-    for words in (["new", "gelsight-mini", loop], ["render", "gelsight-mini", "--out", loop],
+    for words in (["new", "gelsight-mini-ideal", loop],
+                  ["render", "gelsight-mini-ideal", "--out", loop],
                   ["check", loop], ["apply", loop, "--out", tmp_path / "x"],
-                  ["search", "gelsight-mini", "--vary", "camera.fov=40:60", "-b", f"{loop}.py:f",
-                   "--rule", f"{loop}/a.py:f", "--out", tmp_path / "y"]):  # fmt: skip
+                  ["search", "gelsight-mini-ideal", "--vary", "camera.fov=40:60",
+                   "-b", f"{loop}.py:f", "--rule", f"{loop}/a.py:f",
+                   "--out", tmp_path / "y"]):  # fmt: skip
         result = CliRunner().invoke(app, [str(word) for word in words])
         assert result.exit_code in (1, 2), words
         assert "unexpected" not in result.output, result.output
@@ -61,5 +63,5 @@ def test_a_link_out_of_the_folder_is_not_written_through(folder: Path, tmp_path:
     (folder / "meshes").symlink_to(outside)
     before = {path: path.stat().st_mtime_ns for path in outside.iterdir()}
     with pytest.raises(OutputError, match="through a link"):
-        save_design(ots.load("gelsight-mini"), folder)
+        save_design(ots.load("gelsight-mini-ideal"), folder)
     assert {path: path.stat().st_mtime_ns for path in outside.iterdir()} == before

@@ -14,7 +14,7 @@ from optisense.errors import DesignError
 
 @pytest.fixture(scope="module")
 def mini() -> SensorDesign:
-    return sensors.gelsight_mini()
+    return sensors.gelsight_mini_ideal()
 
 
 @pytest.mark.parametrize("name", sensors.SENSORS.names())
@@ -77,4 +77,4 @@ def test_a_gel_that_absorbs_all_light_is_a_warning(
 
 def test_one_number_for_three_is_refused_in_words() -> None:
     with pytest.raises(DesignError, match="should be a list of values"):
-        set_value(sensors.gelsight_mini(), "materials.acrylic.absorption", -1)
+        set_value(sensors.gelsight_mini_ideal(), "materials.acrylic.absorption", -1)

@@ -79,7 +79,7 @@ class Measured(Material):
 
 def test_the_file_of_a_material_goes_where_its_design_goes(tmp_path: Path) -> None:
     (tmp_path / "white.txt").write_text("0.9 0.8 0.7")
-    design = sensors.load("builtin:gelsight-mini")
+    design = sensors.load("builtin:gelsight-mini-ideal")
     design.materials["white"] = Measured(table="white.txt").located(tmp_path)
     before = fingerprint(design)
     save_design(design, tmp_path / "saved")
@@ -106,7 +106,7 @@ def test_each_role_takes_the_kinds_that_say_so() -> None:
 
 
 def test_a_part_of_a_kind_that_does_not_suit_it_is_refused() -> None:
-    data = sensors.load("builtin:gelsight-mini").model_dump(mode="json")
+    data = sensors.load("builtin:gelsight-mini-ideal").model_dump(mode="json")
     gel = next(name for name, part in data["parts"].items() if part["role"] == "elastomer")
     data["materials"]["grey"] = {"kind": "test-plastic", "colour": [0.5, 0.5, 0.5]}
     data["parts"][gel]["material"] = "grey"
@@ -182,7 +182,7 @@ def energy(surface: Reflection) -> float:
 
 
 def test_the_usual_reading_is_in_no_file_and_changes_no_design(tmp_path: Path) -> None:
-    design = sensors.load("builtin:gelsight-mini")
+    design = sensors.load("builtin:gelsight-mini-ideal")
     usual = fingerprint(design)
     assert "scattering" not in design.model_dump(mode="json")["coating"]
     assert get_value(design, "coating.scattering") == "blend"
@@ -210,7 +210,7 @@ def test_an_index_in_a_medium_is_relative_to_it() -> None:
 def test_a_coating_of_another_kind_is_in_files_and_the_usual_one_need_not_be_named(
     tmp_path: Path,
 ) -> None:
-    design = sensors.load("builtin:gelsight-mini")
+    design = sensors.load("builtin:gelsight-mini-ideal")
     save_design(design, tmp_path / "usual")
     assert "kind: flake" not in (tmp_path / "usual" / "design.yaml").read_text()
     assert isinstance(load_design(tmp_path / "usual").coating, Coating)

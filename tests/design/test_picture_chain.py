@@ -36,7 +36,7 @@ def field(*levels: float) -> Any:
 
 def soft(pixels: float) -> SoftFocus:
     """A blur of a standard deviation in pixels."""
-    camera = ots.load("builtin:gelsight-mini").camera
+    camera = ots.load("builtin:gelsight-mini-ideal").camera
     return SoftFocus.of(GaussianBlur(width=pixels * camera.resolution[0] / WIDTH), camera)
 
 
@@ -206,7 +206,7 @@ def test_tone_curves_are_what_they_are_called() -> None:
     ],
 )
 def test_a_tone_curve_must_rise_from_0_to_1(points: Any, says: str) -> None:
-    design = ots.load("builtin:gelsight-mini")
+    design = ots.load("builtin:gelsight-mini-ideal")
     camera = design.camera.model_dump(mode="json") | {
         "tone_curve": {"kind": "points", "points": points}
     }
@@ -225,7 +225,7 @@ def test_a_tone_curve_must_rise_from_0_to_1(points: Any, says: str) -> None:
     ],
 )
 def test_numbers_that_no_camera_has_are_refused(value: dict[str, Any], says: str) -> None:
-    design = ots.load("builtin:gelsight-mini")
+    design = ots.load("builtin:gelsight-mini-ideal")
     with pytest.raises(DesignError, match=says):
         ots.set_value(design, "camera", design.camera.model_dump(mode="json") | value)
 
@@ -233,7 +233,7 @@ def test_numbers_that_no_camera_has_are_refused(value: dict[str, Any], says: str
 def test_a_camera_with_all_of_it_is_saved_and_read_and_its_numbers_can_be_set(
     tmp_path: Any,
 ) -> None:
-    design = ots.load("builtin:gelsight-mini")
+    design = ots.load("builtin:gelsight-mini-ideal")
     imaging: dict[str, Any] = {
         "distortion": {"kind": "brown-conrady", "k1": -0.1},
         "shading": {"kind": "table", "gain": [[1.0, 1.2], [1.3, 1.1]], "corrected": 0.5},

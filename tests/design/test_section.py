@@ -54,7 +54,7 @@ def test_a_plane_beside_a_mesh_cuts_nothing() -> None:
 
 
 def test_gelsight_mini_is_cut_along_its_longer_side() -> None:
-    design = load("gelsight-mini")
+    design = load("gelsight-mini-ideal")
     found = section(design)
     assert np.abs(found.across @ [1, 0, 0]) == pytest.approx(1.0)
     assert found.along @ design.camera.axes()[2] == pytest.approx(1.0)
@@ -101,7 +101,7 @@ def test_a_design_without_meshes_lists_its_parts(design: SensorDesign) -> None:
 
 def test_lights_behind_one_another_show_all_their_colours() -> None:
     # In a Mini the red row lies behind the blue one, and the green one stands by itself.
-    svg = section_svg(load("gelsight-mini"))
+    svg = section_svg(load("gelsight-mini-ideal"))
     drawn = list(ElementTree.fromstring(svg).iter())
     sectors = [
         e.attrib["fill"] for e in drawn if e.tag.endswith("path") and "A3.2" in e.attrib["d"]

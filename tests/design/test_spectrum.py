@@ -40,7 +40,7 @@ def test_only_dies_with_a_spectrum_spread() -> None:
 
 
 def test_a_red_led_lights_the_green_channel_of_its_layer() -> None:
-    plain = ots.load("gelsight-mini")
+    plain = ots.load("gelsight-mini-ideal")
     seen = ots.set_value(
         plain, "lights.red.spectrum", {"red": {"wavelength": 610, "half_width": 18}}
     )
@@ -64,4 +64,4 @@ def test_a_red_led_lights_the_green_channel_of_its_layer() -> None:
 )
 def test_what_no_led_has_is_refused(spectrum: object, message: str) -> None:
     with pytest.raises(DesignError, match=message):
-        ots.set_value(ots.load("gelsight-mini"), "lights.red.spectrum", spectrum)
+        ots.set_value(ots.load("gelsight-mini-ideal"), "lights.red.spectrum", spectrum)

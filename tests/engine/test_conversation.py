@@ -72,12 +72,12 @@ def test_junk_is_answered_and_survived(start: Callable[..., Any]) -> None:
     [
         ("simulat", {}, "Did you mean 'simulate'?"),
         ("simulate", {"desing": "gelbelt"}, "Did you mean 'design'?"),
-        ("simulate", {"design": "gelsight-mini", "photons": "many"}, None),
-        ("simulate", {"design": "gelsight-mini", "files": ["movie"]}, None),
-        ("simulate", {"design": "gelsight-mini", "photons": -1}, None),
+        ("simulate", {"design": "gelsight-mini-ideal", "photons": "many"}, None),
+        ("simulate", {"design": "gelsight-mini-ideal", "files": ["movie"]}, None),
+        ("simulate", {"design": "gelsight-mini-ideal", "photons": -1}, None),
         ("simulate", {"design": {}}, "Write a name"),
         ("cancel", {}, "Add it"),
-        ("simulate", {"design": "gelsight-mini", "name": "../x"}, "Use letters"),
+        ("simulate", {"design": "gelsight-mini-ideal", "name": "../x"}, "Use letters"),
     ],
 )
 def test_a_mistaken_request_is_refused_before_any_work(

@@ -43,11 +43,11 @@ def test_a_design_goes_out_and_comes_back_with_every_field(
 
 
 def test_shapes_are_what_cages_bend(engine: Any) -> None:
-    straight = engine.ask("open", design="gelsight-mini")
+    straight = engine.ask("open", design="gelsight-mini-ideal")
     cage = straight["data"]["cages"]["skin"]
     assert straight["shapes"] == {}
     points = [{**point, "x": point["x"] + 1.0} for point in cage["points"]]
-    moved = {"from": "gelsight-mini", "set": {"cages.skin.points": points}}
+    moved = {"from": "gelsight-mini-ideal", "set": {"cages.skin.points": points}}
     bent = engine.ask("open", design=moved)
     assert set(bent["shapes"]) == {"skin", "gel"}
     before, after = (
@@ -59,12 +59,12 @@ def test_shapes_are_what_cages_bend(engine: Any) -> None:
 
 
 def test_cage_weights_are_the_formula_that_is_documented(engine: Any) -> None:
-    data = engine.ask("open", design="gelsight-mini")
+    data = engine.ask("open", design="gelsight-mini-ideal")
     cage = data["data"]["cages"]["skin"]
     weights = np.load(
-        engine.ask("cage_weights", design="gelsight-mini", cage="skin")["weights"]["skin"]
+        engine.ask("cage_weights", design="gelsight-mini-ideal", cage="skin")["weights"]["skin"]
     )
-    vertices = ots.load("gelsight-mini").meshes["skin"].vertices
+    vertices = ots.load("gelsight-mini-ideal").meshes["skin"].vertices
     lower, upper = np.array(cage["box"])
     nx, ny, nz = cage["resolution"]
 
@@ -125,8 +125,8 @@ def test_values_that_make_no_sense_are_placed(
 ) -> None:
     folder = engine.folder / "sound"
     if not folder.exists():
-        engine.ask("save", design="gelsight-mini", to=str(folder))
-    data = engine.ask("open", design="gelsight-mini")["data"]
+        engine.ask("save", design="gelsight-mini-ideal", to=str(folder))
+    data = engine.ask("open", design="gelsight-mini-ideal")["data"]
     for section, inner in change.items():
         for key, value in inner.items():
             data[section][key] = data[section][key] | value if isinstance(value, dict) else value
@@ -141,28 +141,29 @@ def test_a_mesh_from_elsewhere_takes_a_parts_place(engine: Any, tmp_path: Path) 
     np.save(tmp_path / "v.npy", box.vertices.astype(np.float32))
     np.save(tmp_path / "f.npy", box.faces)
     given = {"vertices": str(tmp_path / "v.npy"), "faces": str(tmp_path / "f.npy")}
-    opened = engine.ask("open", design="gelsight-mini", meshes={"guide": given})
+    opened = engine.ask("open", design="gelsight-mini-ideal", meshes={"guide": given})
     assert len(np.load(opened["meshes"]["guide"]["vertices"])) == len(box.vertices)
     holed = tmp_path / "holed.obj"
     box.with_faces(box.faces[1:]).save_obj(holed)
-    error = engine.refused("open", design="gelsight-mini", meshes={"guide": str(holed)})
+    error = engine.refused("open", design="gelsight-mini-ideal", meshes={"guide": str(holed)})
     assert (error["kind"], error["part"]) == ("MeshError", "guide")
     told = engine.ask("mesh", file=str(holed), role="support")
     assert "open" in told["problem"]["message"] or "closed" in told["problem"]["message"]
     assert engine.ask("mesh", file=str(holed), role="mirror")["problem"] is None
     assert (
-        "gude" in engine.refused("open", design="gelsight-mini", meshes={"gude": given})["message"]
+        "gude"
+        in engine.refused("open", design="gelsight-mini-ideal", meshes={"gude": given})["message"]
     )
 
 
 def test_files_that_changed_are_read_again(engine: Any, tmp_path: Path) -> None:
     folder = tmp_path / "design"
-    engine.ask("save", design="gelsight-mini", to=str(folder))
-    assert engine.ask("open", design=str(folder))["data"]["name"] == "gelsight-mini"
+    engine.ask("save", design="gelsight-mini-ideal", to=str(folder))
+    assert engine.ask("open", design=str(folder))["data"]["name"] == "gelsight-mini-ideal"
     file = folder / "design.yaml"
-    file.write_text(file.read_text().replace("name: gelsight-mini", "name: another"))
+    file.write_text(file.read_text().replace("name: gelsight-mini-ideal", "name: another"))
     assert engine.ask("open", design=str(folder))["data"]["name"] == "another"
-    refused = engine.refused("save", design="gelsight-mini", to=str(folder), only_new=True)
+    refused = engine.refused("save", design="gelsight-mini-ideal", to=str(folder), only_new=True)
     assert refused["kind"] == "OutputError"
 
 
@@ -198,7 +199,7 @@ def test_the_library_is_listed_drawn_and_added_to(engine: Any) -> None:
 
 
 def test_files_for_the_workshop(engine: Any, tmp_path: Path) -> None:
-    given = {"design": "gelsight-mini", "to": str(tmp_path), "formats": ["stl"]}
+    given = {"design": "gelsight-mini-ideal", "to": str(tmp_path), "formats": ["stl"]}
     files = engine.ask("export", moulds=True, **given)["files"]
     assert any("mould" in file for file in files)
     assert {Path(file).name for file in files} >= {"gel.stl", "bill-of-materials.csv"}

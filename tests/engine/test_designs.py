@@ -20,12 +20,12 @@ from optisense.geometry import TriangleMesh
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    ots.save_design(ots.load("gelsight-mini"), tmp_path / "mini")
+    ots.save_design(ots.load("gelsight-mini-ideal"), tmp_path / "mini")
     return tmp_path / "mini"
 
 
 def given(folder: Path, **values: object) -> DesignReference:
-    data = ots.load("gelsight-mini").model_dump(mode="json")
+    data = ots.load("gelsight-mini-ideal").model_dump(mode="json")
     return DesignReference(data=data, folder=str(folder), set=values)
 
 
@@ -54,9 +54,9 @@ def test_a_mesh_file_that_changed_is_another_mesh(folder: Path) -> None:
 
 def test_values_set_by_a_path_leave_what_is_kept_alone() -> None:
     designs = Designs()
-    changed = designs.read(DesignReference(source="gelsight-mini", set={"camera.fov": 70.0}))
+    changed = designs.read(DesignReference(source="gelsight-mini-ideal", set={"camera.fov": 70.0}))
     assert changed.camera.fov == 70.0
-    assert designs.read("gelsight-mini").camera.fov != 70.0
+    assert designs.read("gelsight-mini-ideal").camera.fov != 70.0
 
 
 def test_places_of_errors_are_dotted_paths_for_folders_too(folder: Path) -> None:

@@ -17,7 +17,7 @@ PRESSES = {"a": (-4.0, 2.0), "b": (3.0, -2.0), "c": (0.5, 3.0)}
 def test_the_power_of_a_light_is_found_from_photographs(engine: Any, tmp_path: Path) -> None:
     photos = tmp_path / "photos"
     photos.mkdir()
-    real = {"from": "gelsight-mini", "set": {"lights.red.flux": FLUX}}
+    real = {"from": "gelsight-mini-ideal", "set": {"lights.red.flux": FLUX}}
     shots = {
         "background": [],
         **{name: [f"sphere:3@{x},{y}:0.6"] for name, (x, y) in PRESSES.items()},
@@ -34,7 +34,12 @@ def test_the_power_of_a_light_is_found_from_photographs(engine: Any, tmp_path: P
     families = [each["name"] for each in listed if each["usual"]]
     assert {"edges", "gel"} <= {each["name"] for each in listed if not each["usual"]}
     to = tmp_path / "fitted"
-    given = {"design": "gelsight-mini", "photos": str(photos), "rounds": 1, "photons": 100_000}
+    given = {
+        "design": "gelsight-mini-ideal",
+        "photos": str(photos),
+        "rounds": 1,
+        "photons": 100_000,
+    }
     keep = [each for each in families if each != "powers"]
     found = engine.ask("calibrate", to=str(to), keep=keep, **given)
     (red,) = [each for each in found["numbers"] if "red" in each["path"]]

@@ -52,7 +52,7 @@ def test_a_search_is_watched_to_its_end(engine: Any, tmp_path: Path, goal: str) 
     study = str(tmp_path / "study")
     number = engine.send(
         "search",
-        design="gelsight-mini",
+        design="gelsight-mini-ideal",
         study=study,
         vary=["coating.specularity=0:1:5"],
         objectives=[goal],
@@ -77,7 +77,7 @@ def test_a_search_is_watched_to_its_end(engine: Any, tmp_path: Path, goal: str) 
     assert load_design(tmp_path / "better").coating.specularity == 0.5
     taken = engine.refused(
         "search",
-        design="gelsight-mini",
+        design="gelsight-mini-ideal",
         study=study,
         vary=["coating.specularity=0:1:5"],
         objectives=["aoap"],
@@ -93,7 +93,7 @@ def test_the_best_so_far_comes_with_its_shapes(engine: Any, tmp_path: Path, goal
     )
     number = engine.send(
         "search",
-        design="gelsight-mini",
+        design="gelsight-mini-ideal",
         study=str(tmp_path / "study"),
         vary=["cages.skin.points[14].z=-1:1:3"],
         objectives=[f"{file}:bend"],
@@ -109,7 +109,7 @@ def test_the_best_so_far_comes_with_its_shapes(engine: Any, tmp_path: Path, goal
 
 def test_mistakes_are_told_before_anything_is_begun(engine: Any, tmp_path: Path) -> None:
     study = tmp_path / "study"
-    given = {"design": "gelsight-mini", "study": str(study), "objectives": ["aoap"]}
+    given = {"design": "gelsight-mini-ideal", "study": str(study), "objectives": ["aoap"]}
     wrong = engine.refused("search", vary=["coating.shine=0:1"], **given)
     assert wrong["kind"] in ("DesignError", "SearchError") and "shine" in wrong["message"]
     wrong = engine.refused("search", vary=["coating.specularity"], **given)
@@ -119,14 +119,14 @@ def test_mistakes_are_told_before_anything_is_begun(engine: Any, tmp_path: Path)
     assert not study.exists()
     assert engine.refused("watch", study=str(study))["kind"] == "SearchError"
     assert engine.refused("watch", study="relative")["where"] == "study"
-    rows = engine.ask("space", design="gelsight-mini", vary=["coating.specularity=0:1"])
+    rows = engine.ask("space", design="gelsight-mini-ideal", vary=["coating.specularity=0:1"])
     assert [(p["name"], p["lower"], p["upper"]) for p in rows["parameters"]] == [
         ("coating.specularity", 0, 1)
     ]
 
 
 def test_what_a_search_is_worth_is_told_before(engine: Any) -> None:
-    asked = {"design": "gelsight-mini", "objectives": ["aoap"]}
+    asked = {"design": "gelsight-mini-ideal", "objectives": ["aoap"]}
     bright = engine.ask("advise", vary=["coating.specularity=0:1"], budget=60, **asked)
     assert "score alike" in bright["advice"] and bright["fitting"] == ["rgb2normal", "normdiff"]
     view = engine.ask("advise", vary=["camera.fov=50:60"], **asked)
@@ -140,7 +140,7 @@ def test_a_search_in_which_everything_fails_says_why(engine: Any, tmp_path: Path
     file.write_text("def fails(evaluation):\n    raise ValueError('no luck')\n")
     error = engine.refused(
         "search",
-        design="gelsight-mini",
+        design="gelsight-mini-ideal",
         study=str(tmp_path / "study"),
         vary=["coating.specularity=0:1:9"],
         objectives=[f"{file}:fails"],
@@ -155,7 +155,7 @@ def test_a_search_that_is_stopped_before_it_has_begun_says_so(
     study = tmp_path / "study"
     number = engine.send(
         "search",
-        design="gelsight-mini",
+        design="gelsight-mini-ideal",
         study=str(study),
         vary=["coating.specularity=0:1"],
         objectives=[goal],
@@ -180,7 +180,7 @@ def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
     study = str(tmp_path / "study")
     number = engine.send(
         "search",
-        design="gelsight-mini",
+        design="gelsight-mini-ideal",
         study=study,
         vary=["coating.specularity=0:1:100"],
         objectives=[goal],
@@ -204,7 +204,7 @@ def test_what_a_search_does_before_and_after_its_trials_is_said(
 ) -> None:
     number = engine.send(
         "search",
-        design="gelsight-mini",
+        design="gelsight-mini-ideal",
         study=str(tmp_path / "study"),
         vary=["coating.specularity=0:1:2"],
         objectives=[goal],
@@ -225,7 +225,7 @@ def test_more_trials_than_at_first_are_counted_to_the_new_number(
 ) -> None:
     study = str(tmp_path / "study")
     fields = {"vary": ["coating.specularity=0:1"], "objectives": [goal], "method": "random"}
-    first = engine.send("search", design="gelsight-mini", study=study, budget=2, **fields)
+    first = engine.send("search", design="gelsight-mini-ideal", study=study, budget=2, **fields)
     assert engine.result(first)["done"] == 2
     again = engine.send("resume", study=study, budget=4)
     assert engine.result(again)["done"] == 4
@@ -248,7 +248,7 @@ def test_a_search_ends_with_the_engine_or_outlives_it(
     for go_on in (False, True):
         numbers[go_on] = client.send(
             "search",
-            design="gelsight-mini",
+            design="gelsight-mini-ideal",
             study=str(tmp_path / f"study-{go_on}"),
             vary=["coating.specularity=0:1:500"],
             objectives=[goal],

@@ -66,7 +66,7 @@ def read_contact(folder: Path) -> None:
 def _sensor() -> Any:
     from optisense.optics.ray_model import RayModel
 
-    return RayModel(ots.load("gelsight-mini"), "llvm")
+    return RayModel(ots.load("gelsight-mini-ideal"), "llvm")
 
 
 @st.composite

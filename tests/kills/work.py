@@ -79,7 +79,7 @@ def _search(method: str, objectives: tuple[str, ...], workers: int, *more: str) 
     second = "camera.position.y=-1:1" if method == "gradient" else "coating.specularity=0:1:5"
     cluster = "--cluster" in more
     return Work(
-        ("search", "gelsight-mini", "--method", method, "--seed", "7", *objectives, *more,
+        ("search", "gelsight-mini-ideal", "--method", method, "--seed", "7", *objectives, *more,
          "--vary", "camera.position.x=-1:3:4",
          "--vary", second,
          *(() if cluster else ("--workers", str(workers))), "--out", "@OUT"),
@@ -94,7 +94,7 @@ RAYS = ("-b", "aoap", "--set", "ray_resolution=[16,12]")
 
 WORK: dict[str, Work] = {
     "apply": Work(("apply", str(ASSETS / "study-v1"), "--out", "@OUT")),
-    "export": Work(("export", "gelsight-mini", "--out", "@OUT")),
+    "export": Work(("export", "gelsight-mini-ideal", "--out", "@OUT")),
     "grid": _search("grid", NEAR, 1, "--budget", "20"),
     "grid, 2 workers": _search("grid", NEAR, 2, "--budget", "20"),
     "grid, Dask": _search("grid", NEAR, 1, "--budget", "20", *CLUSTER),
@@ -106,13 +106,13 @@ WORK: dict[str, Work] = {
     "gradient": _search("gradient", RAYS, 1, "--budget", "12"),
     "gradient, 2 workers": _search("gradient", RAYS, 2, "--budget", "12"),
     "dataset": Work(
-        ("dataset", "gelsight-mini", "--count", "4", *SMALL, "--out", "@OUT"), share=0.7
+        ("dataset", "gelsight-mini-ideal", "--count", "4", *SMALL, "--out", "@OUT"), share=0.7
     ),
-    "render": Work(("render", "gelsight-mini", *SMALL, "--out", "@OUT")),
+    "render": Work(("render", "gelsight-mini-ideal", *SMALL, "--out", "@OUT")),
     "calibrate": Work(
         (
             "calibrate",
-            "gelsight-mini",
+            "gelsight-mini-ideal",
             "photographs",
             "--as-labelled",
             "--keep",
@@ -137,7 +137,7 @@ WORK: dict[str, Work] = {
 
 def photograph(folder: Path) -> None:
     """Make photographs of a sensor that is a little unlike the built-in one."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     design.lights["red"].flux *= 1.2
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
     model = ots.OpticalModel(design, "llvm")

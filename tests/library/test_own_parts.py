@@ -231,7 +231,7 @@ class TestDesignsOnOtherMachines:
     @pytest.fixture
     def design(self, own: Path, lamp: Path) -> SensorDesign:
         add_lamp(lamp)
-        design = sensors.build("gelsight-mini")
+        design = sensors.build("gelsight-mini-ideal")
         red = design.lights["red"].model_dump()
         design.lights["red"] = LightGroup.model_validate({**red, "model": "our-lamp"})
         return design
@@ -246,14 +246,14 @@ class TestDesignsOnOtherMachines:
         assert isinstance(emitter, IesEmitter) and emitter.file == "lights/our-lamp.ies"
         assert emitter.intensity_table().candela[0].tolist() == [9.0, 5.0, 0.0]
         assert opened.lights["green"].emitter is None
-        assert sensors.check(opened) == sensors.check(sensors.build("gelsight-mini"))
+        assert sensors.check(opened) == sensors.check(sensors.build("gelsight-mini-ideal"))
 
     def test_the_design_in_memory_is_left_as_it_was(
         self, design: SensorDesign, tmp_path: Path
     ) -> None:
         sensors.save_design(design, tmp_path / "sensor")
         assert design.lights["red"].emitter is None
-        plain = sensors.build("gelsight-mini")
+        plain = sensors.build("gelsight-mini-ideal")
         assert library.with_own_lights(plain) is plain
 
     def test_saving_the_opened_design_again_keeps_it_whole(

@@ -135,7 +135,7 @@ def test_a_camera_of_ones_own_is_added_and_used(own: Path, tmp_path: Path) -> No
         library.add_tuning(write(tmp_path, sections()), like="pi-v2", name="ours")
     with pytest.raises(LibraryError, match="no camera 'pi-v9'"):
         library.add_tuning(write(tmp_path, sections()), like="pi-v9", name="other")
-    design = library.with_imaging(ots.load("builtin:gelsight-mini"), "ours")
+    design = library.with_imaging(ots.load("builtin:gelsight-mini-ideal"), "ours")
     assert design.camera.noise is not None and design.camera.noise.full_well == 4096.0
     assert design.camera.fov == 52.157
     save_design(design, tmp_path / "design")
@@ -158,7 +158,7 @@ def test_cameras_of_the_library_come_with_what_their_makers_measured(name: str) 
     assert rows == pytest.approx(1.0, abs=2e-5)  # a matrix keeps white
     assert library.entry("camera", name).unsourced() == []
     grey = np.full((60, 80, 3), 0.4, dtype=np.float32)
-    design = library.with_imaging(ots.load("builtin:gelsight-mini"), name)
+    design = library.with_imaging(ots.load("builtin:gelsight-mini-ideal"), name)
     shown = design.camera.picture_chain().without_noise().respond(grey)
     assert shown[30, 40] == pytest.approx([0.4] * 3, rel=0.02)
 
@@ -173,7 +173,7 @@ def test_noise_slopes_of_the_library_are_those_of_the_files() -> None:
 
 
 def test_a_focus_distance_gives_the_depth_of_field_of_the_lens() -> None:
-    mini = ots.load("builtin:gelsight-mini")
+    mini = ots.load("builtin:gelsight-mini-ideal")
     design = library.with_imaging(mini, "pi-v2", focus_distance=19.4)
     blur: Any = design.camera.blur
     assert (blur.focal_length, blur.f_number, blur.focus_distance) == (3.04, 2.0, 19.4)

@@ -11,9 +11,9 @@ from optisense.optics.ray_model import RayModel
 from optisense.sensors import load
 
 SENSORS = (
-    "gelsight-mini",
-    "gelsight-mini-cylindrical",
-    "gelsight-mini-spherical",
+    "gelsight-mini-ideal",
+    "gelsight-mini-ideal-cylindrical",
+    "gelsight-mini-ideal-spherical",
     "gelbelt",
     "gelsight360",
     "gelsight-svelte",
@@ -28,7 +28,7 @@ def test_gels_of_real_sensors_are_held(name):
 
 def loose(gap):
     """The Mini with nothing but a plate behind its gel, at a distance in mm."""
-    design = load("gelsight-mini")
+    design = load("gelsight-mini-ideal")
     for name in design.parts_of(Role.SUPPORT):
         del design.parts[name], design.meshes[name]
     low, high = design.meshes["gel"].bounds

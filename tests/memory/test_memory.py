@@ -60,7 +60,7 @@ def test_what_one_model_has_freed_is_given_back_before_the_next(
 
     monkeypatch.setattr(memory.dr, "flush_malloc_cache", noted)
     for _ in range(2):
-        model = ots.OpticalModel(ots.load("gelsight-mini"), "llvm")
+        model = ots.OpticalModel(ots.load("gelsight-mini-ideal"), "llvm")
         model.render([], (24, 18), 3000)
     assert len(flushed) == 2
     assert flushed[1] > 50 * 2**20

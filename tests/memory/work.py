@@ -30,7 +30,7 @@ PHOTONS = 3000
 
 def images() -> Iterator[None]:
     """Pictures of one sensor with a ball that is another one each time."""
-    model = ots.OpticalModel(ots.load("gelsight-mini"), "llvm")
+    model = ots.OpticalModel(ots.load("gelsight-mini-ideal"), "llvm")
     number = 0
     while True:
         ball = ots.Sphere(1.0 + 0.001 * (number % 997))
@@ -44,7 +44,7 @@ def scores() -> Iterator[None]:
     """A score of a design that is another one each time."""
     number = 0
     while True:
-        design = ots.load("gelsight-mini")
+        design = ots.load("gelsight-mini-ideal")
         design.camera.position = (0.001 * (number % 997), *design.camera.position[1:])
         evaluate(design, "aoap")
         number += 1
@@ -70,7 +70,7 @@ def files() -> Iterator[None]:
     assets = Path(__file__).parents[1] / "assets"
     while True:
         with TemporaryDirectory() as folder:
-            ots.save_design(ots.load("gelsight-mini"), Path(folder, "design"))
+            ots.save_design(ots.load("gelsight-mini-ideal"), Path(folder, "design"))
             ots.check(ots.load(Path(folder, "design")))
         study = Study.open(assets / "study-v1")
         assert study.trials

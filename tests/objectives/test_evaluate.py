@@ -35,7 +35,7 @@ SMALL: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def model() -> OpticalModel:
-    return OpticalModel(load("gelsight-mini"), "llvm")
+    return OpticalModel(load("gelsight-mini-ideal"), "llvm")
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +98,9 @@ def test_pixels_that_are_not_read_make_no_difference(specularity: float, apart: 
     """RGB2Normal reads lines across the contacts. The rest of them, rendered roughly where nobody
     reads it, can change no more than the exposure, where highlights bind it.
     """
-    sensor = OpticalModel(set_value(load("gelsight-mini"), "coating.specularity", specularity))
+    sensor = OpticalModel(
+        set_value(load("gelsight-mini-ideal"), "coating.specularity", specularity)
+    )
     alone = evaluate(sensor, "rgb2normal", **SMALL)
     shared = evaluate(sensor, ["rgb2normal", "aoap", "normdiff"], **SMALL)["rgb2normal"]
     assert alone.value == pytest.approx(shared.value, abs=apart)
@@ -191,7 +193,9 @@ def test_one_objective_gives_a_score_and_several_a_dict(evaluation: Evaluation) 
 
 
 def test_a_design_can_be_scored_without_a_model() -> None:
-    score = evaluate(load("gelsight-mini"), "aoap", ray_resolution=(40, 30), coverage_weight=0.0)
+    score = evaluate(
+        load("gelsight-mini-ideal"), "aoap", ray_resolution=(40, 30), coverage_weight=0.0
+    )
     assert score.value == score.parts["mean_cosine"]
 
 
@@ -296,7 +300,7 @@ def test_presses_that_can_not_be_judged_have_a_reason(
 
 @pytest.mark.parametrize("name", ["aoap", "2to3pw"])
 def test_a_camera_that_looks_away_has_a_reason(name: str) -> None:
-    design = set_value(load("gelsight-mini"), "camera.direction", [0, 0, -1])
+    design = set_value(load("gelsight-mini-ideal"), "camera.direction", [0, 0, -1])
     score = evaluate(OpticalModel(design, "llvm"), name, ray_resolution=(20, 16))
     assert score.failure is not None
     assert "sees" in score.failure

@@ -29,7 +29,7 @@ QUICK: dict[str, Any] = {
 
 @pytest.fixture(scope="module")
 def mini() -> Evaluation:
-    return Evaluation(OpticalModel(ots.load("gelsight-mini")), Settings(**QUICK))
+    return Evaluation(OpticalModel(ots.load("gelsight-mini-ideal")), Settings(**QUICK))
 
 
 def flat(pitch: float, stretch: float, blur: float | None, across: int = 400) -> Any:
@@ -74,7 +74,7 @@ def test_a_blur_leaves_a_tenth_of_the_contrast_of_the_finest_lines() -> None:
 def test_a_lens_with_depth_of_field_is_less_sharp_than_a_pinhole(mini: Evaluation) -> None:
     from optisense import library
 
-    blurred = library.with_imaging(ots.load("gelsight-mini"), "pi-v2", focus_distance=24.0)
+    blurred = library.with_imaging(ots.load("gelsight-mini-ideal"), "pi-v2", focus_distance=24.0)
     found = evaluate(Evaluation(OpticalModel(blurred), Settings(**QUICK)), "sharpness")
     assert found.failure is None
     assert found.parts["blur"] > 0.0
@@ -108,7 +108,7 @@ def test_darkness_has_no_uniformity() -> None:
 
 
 def test_power_is_the_flux_of_all_lights(mini: Evaluation) -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     score = evaluate(mini, "power")
     each = {name: len(group.lights) * group.flux for name, group in design.lights.items()}
     assert score.value == pytest.approx(sum(each.values()))
@@ -129,7 +129,7 @@ def test_a_deeper_ball_throws_a_larger_shadow(mini: Evaluation) -> None:
 
 def test_the_shadow_is_that_of_the_lights_that_shine(mini: Evaluation) -> None:
     """Without red light no skin loses red, whether rendered so or relit."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     red = [name for name, group in design.lights.items() if group.channel_flux()[0] > 0.0]
     dark = design
     for name in red:

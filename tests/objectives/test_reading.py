@@ -202,16 +202,16 @@ def test_where_no_tilt_is_read_there_is_no_depth(nine: Callable[..., Presses]) -
 @pytest.fixture(scope="module")
 def relighting() -> Relighting:
     settings = Settings(resolution=(200, 150), photons=200_000, places=PLACES)
-    return Relighting(Evaluation(OpticalModel(ots.load("gelsight-mini")), settings))
+    return Relighting(Evaluation(OpticalModel(ots.load("gelsight-mini-ideal")), settings))
 
 
 def test_presses_under_other_lights_read_the_same_whether_cut_or_whole(
     relighting: Relighting,
 ) -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     for name in design.lights:
         design = set_value(design, f"lights.{name}.colour", (0.9, 0.3, 0.2))
-    one_colour, usual = design, ots.load("gelsight-mini")
+    one_colour, usual = design, ots.load("gelsight-mini-ideal")
     values = []
     for each in (usual, one_colour):
         whole = evaluate(relighting.lit(each), ["reading", "depth"])
@@ -224,7 +224,7 @@ def test_presses_under_other_lights_read_the_same_whether_cut_or_whole(
 
 
 def test_relit_presses_read_as_rendered_ones(relighting: Relighting) -> None:
-    usual = ots.load("gelsight-mini")
+    usual = ots.load("gelsight-mini-ideal")
     rendered = Evaluation(OpticalModel(usual), relighting.settings)
     direct = evaluate(rendered, "reading").value
     assert evaluate(relighting.lit(usual), "reading").value == pytest.approx(direct, rel=0.02)
@@ -232,7 +232,7 @@ def test_relit_presses_read_as_rendered_ones(relighting: Relighting) -> None:
 
 def test_the_exposure_is_that_of_the_untouched_skin() -> None:
     """A shiny coating saturates where other scores turn the exposure down."""
-    design = set_value(ots.load("gelsight-mini"), "coating.specularity", 0.8)
+    design = set_value(ots.load("gelsight-mini-ideal"), "coating.specularity", 0.8)
     settings = {"resolution": (160, 120), "photons": 200_000}
     sensor = OpticalModel(design)
     evaluation = Evaluation(sensor, Settings(**settings, places=PLACES))

@@ -30,13 +30,13 @@ SETTINGS = [
 
 @pytest.fixture(scope="module")
 def relighting() -> Relighting:
-    return Relighting(Evaluation(OpticalModel(ots.load("gelsight-mini")), SMALL))
+    return Relighting(Evaluation(OpticalModel(ots.load("gelsight-mini-ideal")), SMALL))
 
 
 def recoloured(seed: int, brightness: float = 1.0) -> SensorDesign:
     """A GelSight Mini whose groups have other colours and powers."""
     random = np.random.default_rng(seed)
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     for name in design.lights:
         design = set_value(design, f"lights.{name}.colour", tuple(random.random(3).tolist()))
         design = set_value(design, f"lights.{name}.flux", brightness * random.uniform(1.0, 9.0))
@@ -55,7 +55,7 @@ def test_presses_are_those_of_a_rendering_under_these_lights(relighting: Relight
 
 def test_presses_are_those_of_a_rendering_through_all_that_a_camera_does() -> None:
     """Shading and noise belong to places of the picture, and blur reaches into what is cut."""
-    design = library.with_imaging(ots.load("gelsight-mini"), "pi-v2", focus_distance=24.0)
+    design = library.with_imaging(ots.load("gelsight-mini-ideal"), "pi-v2", focus_distance=24.0)
     evaluation = Evaluation(OpticalModel(design), SMALL)
     relighting = Relighting(Evaluation(evaluation.model, SMALL))
     flux = relighting.flux_of(design)
@@ -133,7 +133,7 @@ def test_darkness_is_a_failure_and_not_a_score(relighting: Relighting) -> None:
 
 
 def test_other_light_groups_are_refused(relighting: Relighting) -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     del design.lights[next(iter(design.lights))]
     with pytest.raises(ObjectiveError, match="other light groups"):
         relighting.lit(design)

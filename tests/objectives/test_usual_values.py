@@ -8,7 +8,7 @@ import optisense as ots
 from optisense.objectives.registry import find, names
 
 BY_RAYS = ("aoap", "2to3pw", "coverage", "distortion")
-ENDS = ("gelsight-svelte", "gelsight360", "gelbelt", "gelsight-mini-spherical")
+ENDS = ("gelsight-svelte", "gelsight360", "gelbelt", "gelsight-mini-ideal-spherical")
 """The built-in sensors among which the poorest and the best of each objective are."""
 
 

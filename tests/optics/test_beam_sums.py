@@ -20,7 +20,7 @@ SIZE = {"resolution": (160, 120), "photons": 200_000}
 
 @pytest.fixture(scope="module")
 def mini() -> OpticalModel:
-    return OpticalModel(build("gelsight-mini"), "llvm")
+    return OpticalModel(build("gelsight-mini-ideal"), "llvm")
 
 
 def horizon(balls: list[tuple[float, ...]], own: bool = False) -> float:
@@ -83,7 +83,7 @@ def test_an_untouched_picture_has_no_grain(mini: OpticalModel) -> None:
 @pytest.mark.parametrize("fov", [50.0, 61.3])
 def test_no_camera_ray_slips_through_between_triangles(fov: float) -> None:
     """At these angles rays through the middle of a pixel meet the edges of triangles."""
-    design = build("gelsight-mini")
+    design = build("gelsight-mini-ideal")
     design.camera.fov = fov
     model = OpticalModel(design, "llvm")
     for contacts in ([], [BALL]):

@@ -26,7 +26,7 @@ def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> 
 
 
 def test_a_contact_may_fill_the_picture() -> None:
-    model = OpticalModel(build("gelsight-mini"), "llvm")
+    model = OpticalModel(build("gelsight-mini-ideal"), "llvm")
     plate = Contact(Plane(size=60.0), at=(0.0, 0.0), depth=0.5)
     image = model.render([plate], resolution=(32, 24), photons=100_000)
     assert image.contact_mask.all()
@@ -35,7 +35,7 @@ def test_a_contact_may_fill_the_picture() -> None:
 
 def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_show() -> None:
     """With metal in the coating: diffuse light has no grain (see test_beam_sums.py)."""
-    design = build("gelsight-mini")
+    design = build("gelsight-mini-ideal")
     design.coating.specularity = 0.5
     model = OpticalModel(design, "llvm")
 
@@ -56,7 +56,7 @@ def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_sh
 def test_the_skin_beside_a_contact_has_the_light_that_the_contact_reflects_to_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    model = OpticalModel(build("gelsight-mini"), "llvm")
+    model = OpticalModel(build("gelsight-mini-ideal"), "llvm")
     ball = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
     ring = np.zeros((120, 160), dtype=bool)
 
@@ -75,7 +75,7 @@ def test_the_skin_beside_a_contact_has_the_light_that_the_contact_reflects_to_it
 
 def test_pixels_of_a_metal_contact_are_hardly_noisier_than_its_photons() -> None:
     """At a specularity of 0.6: 1.2 % are of camera samples and their rays, 2.3 % of photons."""
-    design = build("gelsight-mini")
+    design = build("gelsight-mini-ideal")
     design.coating.specularity = 0.6
     model = OpticalModel(design, "llvm")
     ball = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)

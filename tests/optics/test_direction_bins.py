@@ -32,8 +32,8 @@ def test_narrower_lobes_get_finer_bins_and_curved_skins_corrected_ones() -> None
 @pytest.mark.parametrize(
     ("sensor", "bins"),
     [
-        ("gelsight-mini", COARSE_BINS),
-        ("gelsight-mini-spherical", CURVED_BINS),
+        ("gelsight-mini-ideal", COARSE_BINS),
+        ("gelsight-mini-ideal-spherical", CURVED_BINS),
         ("gelbelt", COARSE_BINS),  # curved, but its light grazes
     ],
 )
@@ -42,4 +42,4 @@ def test_sensors_get_the_bins_of_their_shape(sensor: str, bins: DirectionBins) -
 
 
 def test_drafts_of_curved_skins_keep_the_coarse_bins() -> None:
-    assert DraftModel(ots.load("gelsight-mini-spherical"))._store._directions == COARSE_BINS
+    assert DraftModel(ots.load("gelsight-mini-ideal-spherical"))._store._directions == COARSE_BINS

@@ -133,13 +133,13 @@ def test_a_camera_sees_each_channel_by_its_own_way() -> None:
 
 
 def test_equal_indices_for_all_channels_give_the_usual_picture() -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     for name, material in design.materials.items():
         assert isinstance(material, Dielectric)
         ior = material.ior
         design.materials[name] = Dielectric(ior=ior, dispersion=(ior, ior, ior + 1e-9))
     design.dispersion = True
-    usual = OpticalModel(ots.load("gelsight-mini")).render((), (64, 48), photons=1_000_000)
+    usual = OpticalModel(ots.load("gelsight-mini-ideal")).render((), (64, 48), photons=1_000_000)
     spread = OpticalModel(design)
     assert spread.scene.dispersive
     image = spread.render((), (64, 48), photons=3_000_000)
@@ -153,8 +153,8 @@ def test_equal_indices_for_all_channels_give_the_usual_picture() -> None:
 
 
 def test_an_index_for_each_channel_counts_only_where_the_design_asks() -> None:
-    assert not OpticalModel(ots.load("gelsight-mini")).scene.dispersive
-    asked = ots.set_value(ots.load("gelsight-mini"), "dispersion", True)
+    assert not OpticalModel(ots.load("gelsight-mini-ideal")).scene.dispersive
+    asked = ots.set_value(ots.load("gelsight-mini-ideal"), "dispersion", True)
     model = OpticalModel(asked)
     assert model.scene.dispersive
     model.update("dispersion", False)

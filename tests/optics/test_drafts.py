@@ -27,7 +27,7 @@ def blocks(radiance: np.ndarray) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def mini() -> SensorDesign:
-    return ots.load("gelsight-mini")
+    return ots.load("gelsight-mini-ideal")
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ SIZE = (64, 48)
 
 def mini(part: str, faces: dict[str, Any], **materials: Material) -> SensorDesign:
     """GelSight Mini with finished faces; its guide is a block from z = -9.25 to -5.25."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     for name, material in materials.items():
         design.materials[name] = material
     return ots.set_value(design, f"parts.{part}.faces", faces)
@@ -45,7 +45,7 @@ SIDE = 20.75 * 4.0
 
 
 def test_frost_divides_an_interface_and_nothing_else() -> None:
-    plain = assemble(ots.load("gelsight-mini")).pieces
+    plain = assemble(ots.load("gelsight-mini-ideal")).pieces
     pieces = assemble(mini("guide", {"edge": {**RIGHT, "roughness": 0.3}})).pieces
     (rough,) = [piece for piece in pieces if piece.name.endswith(":guide.edge")]
     assert area(rough) == pytest.approx(SIDE, rel=1e-6)
@@ -76,7 +76,7 @@ def test_paint_takes_the_place_of_an_interface() -> None:
     bare = [p for p in pieces if p.surface.kind is SurfaceKind.DIELECTRIC]
     plain = [
         p
-        for p in assemble(ots.load("gelsight-mini")).pieces
+        for p in assemble(ots.load("gelsight-mini-ideal")).pieces
         if p.surface.kind is SurfaceKind.DIELECTRIC
     ]
     assert sum(map(area, plain)) - sum(map(area, bare)) == pytest.approx(SIDE, rel=1e-6)
@@ -113,7 +113,7 @@ def test_frost_spreads_light_and_black_paint_takes_it() -> None:
     images = [
         OpticalModel(design).render(resolution=SIZE, photons=400_000).layers["red"][..., 0]
         for design in (
-            ots.load("gelsight-mini"),
+            ots.load("gelsight-mini-ideal"),
             mini("guide", {"edge": {**far, "roughness": 0.4}}),
             mini("guide", {"edge": {**far, "paint": "black"}}, black=BLACK),
         )

@@ -17,7 +17,7 @@ def test_ctrl_c_while_a_loop_is_recorded(step: str, monkeypatch: pytest.MonkeyPa
         raise KeyboardInterrupt
 
     monkeypatch.setattr(interact, step, pressed)
-    model = OpticalModel(load("gelsight-mini"), "llvm")
+    model = OpticalModel(load("gelsight-mini-ideal"), "llvm")
     with pytest.raises(KeyboardInterrupt):
         model.render(resolution=(40, 30), photons=10_000)
 

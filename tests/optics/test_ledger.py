@@ -30,7 +30,7 @@ PHOTONS = 200_000
 CLOSES = 1e-5
 """The sum of a group is 1 up to the rounding of single precision."""
 
-SENSORS = ("gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
+SENSORS = ("gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
 
 
 def ledger_of(design: ots.SensorDesign, photons: int = PHOTONS) -> LightLedger:
@@ -52,7 +52,7 @@ def test_it_closes_on_every_sensor(name: str) -> None:
 
 def test_what_escapes_is_divided_by_the_faces_of_each_part() -> None:
     """Most of the light of a row of lamps leaves the guide by the face that they shine at."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     found = ledger_of(design)
     for group in found.emitted:
         for part in ("guide", "tray", "gel"):
@@ -73,7 +73,7 @@ def test_what_escapes_is_divided_by_the_faces_of_each_part() -> None:
 
 def test_frosted_faces_tell_what_escapes_through_them() -> None:
     faces = {"edge": {"direction": (1, 0, 0), "within": 10, "roughness": 0.3}}
-    found = ledger_of(ots.set_value(ots.load("gelsight-mini"), "parts.guide.faces", faces))
+    found = ledger_of(ots.set_value(ots.load("gelsight-mini-ideal"), "parts.guide.faces", faces))
     assert found.faces()["guide.edge, +x"][1] > 0.2
     assert "guide, +x" not in found.faces()
 
@@ -97,10 +97,10 @@ def test_noise_is_the_spread_of_other_seeds() -> None:
 
 
 def test_each_medium_has_its_line() -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     design.materials["acrylic"] = Dielectric(ior=1.491, absorption=(0.02, 0.02, 0.02))
     design.materials["silicone-xp565"] = Dielectric(ior=1.41, absorption=(0.05, 0.05, 0.05))
-    found, clear = ledger_of(design), ledger_of(ots.load("gelsight-mini"))
+    found, clear = ledger_of(design), ledger_of(ots.load("gelsight-mini-ideal"))
     for group in found.emitted:
         lines = {w: found.share(group, w) for w in found.places() if w.startswith("absorbed in")}
         assert set(lines) <= {"absorbed in gel", "absorbed in tray", "absorbed in guide"}
@@ -127,7 +127,7 @@ def test_a_beam_through_an_absorbing_block_is_booked_by_beer_lambert() -> None:
 
 def test_rough_faces_and_paint_have_their_lines() -> None:
     right, far = ({"direction": way, "within": 10} for way in ((1, 0, 0), (0, 1, 0)))
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     design.materials["black"] = Absorber()
     faces = {"edge": {**right, "paint": "black"}, "end": {**far, "roughness": 0.4}}
     found = ledger_of(ots.set_value(design, "parts.guide.faces", faces))
@@ -138,7 +138,7 @@ def test_rough_faces_and_paint_have_their_lines() -> None:
 def test_the_command_prints_a_table_that_closes_and_writes_json(tmp_path) -> None:  # type: ignore[no-untyped-def]
     out = tmp_path / "ledger"
     done = CliRunner().invoke(
-        app, ["ledger", "gelsight-mini", "--photons", "20000", "--out", str(out)]
+        app, ["ledger", "gelsight-mini-ideal", "--photons", "20000", "--out", str(out)]
     )
     assert done.exit_code == 0, done.output
     sums = next(line for line in done.output.splitlines() if line.startswith("sum"))
@@ -149,11 +149,11 @@ def test_the_command_prints_a_table_that_closes_and_writes_json(tmp_path) -> Non
 
 def test_too_few_photons_are_refused() -> None:
     with pytest.raises(RenderError, match="too few"):
-        ledger_of(ots.load("gelsight-mini"), 10)
+        ledger_of(ots.load("gelsight-mini-ideal"), 10)
 
 
 def test_a_design_whose_lights_are_off_has_an_empty_ledger(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     for group in design.lights:
         design = ots.set_value(design, f"lights.{group}.flux", 0.0)
     ots.save_design(design, tmp_path / "dark")
@@ -174,7 +174,7 @@ def test_the_lens_gets_the_light_of_the_picture() -> None:
     middle = projected_solid_angles(RayCamera((0, 0, 0), (0, 0, 1), (0, 1, 0), 90.0, 41, 41))
     assert middle[20, 20] == pytest.approx((2 / 41) ** 2, rel=2e-3)
 
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     design = ots.set_value(
         design,
         "camera.blur",

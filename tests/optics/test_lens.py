@@ -29,7 +29,7 @@ BALL = ots.Contact(ots.Sphere(1.5), at=(3.0, 2.0), depth=0.8)
 
 def mini(**changes: Any) -> SensorDesign:
     """GelSight Mini with other values of its camera."""
-    design = ots.load("builtin:gelsight-mini")
+    design = ots.load("builtin:gelsight-mini-ideal")
     return ots.set_value(design, "camera", design.camera.model_dump(mode="json") | changes)
 
 
@@ -162,7 +162,7 @@ def test_pictures_are_noisy_by_their_seed_alone() -> None:
 def test_only_the_fitted_sensor_has_no_plain_camera(name: str) -> None:
     """The others have ideal cameras, as the experiments of the paper do."""
     is_plain = ots.load(f"builtin:{name}").camera.picture_chain().is_plain
-    assert is_plain == (name != "gelsight-mini-fitted")
+    assert is_plain == (name != "gelsight-mini")
 
 
 def test_light_is_kept_where_only_the_sensor_of_the_camera_changes() -> None:

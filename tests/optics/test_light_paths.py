@@ -21,14 +21,14 @@ would exceed this."""
 
 
 def absorbing() -> ots.SensorDesign:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     design.materials["acrylic"] = Dielectric(ior=1.491, absorption=(0.02, 0.02, 0.02))
     design.materials["silicone-xp565"] = Dielectric(ior=1.41, absorption=(0.05, 0.02, 0.05))
     return design
 
 
 def dispersive() -> ots.SensorDesign:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     design.dispersion = True
     design.materials["acrylic"] = Dielectric(ior=1.49, dispersion=(1.48, 1.49, 1.50))
     return design
@@ -41,7 +41,7 @@ def design_of(name: str) -> ots.SensorDesign:
 
 @pytest.mark.parametrize(
     "name",
-    ["gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte", "absorbing", "dispersive"],
+    ["gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte", "absorbing", "dispersive"],
 )
 def test_photons_end_as_the_ledger_says(name: str) -> None:
     model = OpticalModel(design_of(name))
@@ -62,11 +62,11 @@ def test_photons_end_as_the_ledger_says(name: str) -> None:
 
 @pytest.fixture(scope="module")
 def mini() -> dict[str, list[PhotonPath]]:
-    return photon_paths(OpticalModel(ots.load("gelsight-mini")))
+    return photon_paths(OpticalModel(ots.load("gelsight-mini-ideal")))
 
 
 def test_a_way_leads_from_a_light_to_where_it_ends(mini: dict[str, list[PhotonPath]]) -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     for group, paths in mini.items():
         lights = np.array([light.position for light in design.lights[group].lights])
         starts = np.array([path.points[0] for path in paths])
@@ -80,7 +80,7 @@ def test_a_way_leads_from_a_light_to_where_it_ends(mini: dict[str, list[PhotonPa
 
 
 def test_other_seeds_give_other_photons(mini: dict[str, list[PhotonPath]]) -> None:
-    model = OpticalModel(ots.load("gelsight-mini"))
+    model = OpticalModel(ots.load("gelsight-mini-ideal"))
     again, other = photon_paths(model), photon_paths(model, seed=1)
     for one, two, three in zip(mini["red"], again["red"], other["red"], strict=True):
         assert np.array_equal(one.points, two.points)
@@ -88,6 +88,6 @@ def test_other_seeds_give_other_photons(mini: dict[str, list[PhotonPath]]) -> No
 
 
 def test_a_dark_group_has_no_photons() -> None:
-    model = OpticalModel(ots.set_value(ots.load("gelsight-mini"), "lights.red.flux", 0.0))
+    model = OpticalModel(ots.set_value(ots.load("gelsight-mini-ideal"), "lights.red.flux", 0.0))
     found = photon_paths(model)
     assert found["red"] == [] and len(found["green"]) == 100

@@ -21,7 +21,7 @@ BALL = Contact(Sphere(3.0), at=(0.5, 0.0), depth=0.8)
 
 @pytest.fixture(scope="module")
 def model() -> OpticalModel:
-    design = load("gelsight-mini")
+    design = load("gelsight-mini-ideal")
     design.markers = Markers(grid=(9, 7), pitch=2.0, radius=0.4)
     return OpticalModel(design)
 
@@ -40,7 +40,7 @@ def test_dots_are_where_the_flat_gel_has_them(touched: TactileImage) -> None:
 
 
 def test_dots_are_dark_where_the_truth_says(model: OpticalModel, touched: TactileImage) -> None:
-    plain = load("gelsight-mini")
+    plain = load("gelsight-mini-ideal")
     without = OpticalModel(plain).render([BALL], SIZE, photons=60_000)
     left = touched.radiance.sum(axis=2) / without.radiance.sum(axis=2)
     column, row = np.floor(touched.markers.after).astype(int).T
@@ -82,7 +82,7 @@ def test_a_table_of_them_is_saved_and_goes_with_them(
         rows = list(csv.DictReader(file))
     assert len(rows) == 63
     assert float(rows[0]["column_after"]) == pytest.approx(touched.markers.after[0, 0], rel=1e-4)
-    OpticalModel(load("gelsight-mini")).render([], (32, 24), photons=20_000).save(tmp_path)
+    OpticalModel(load("gelsight-mini-ideal")).render([], (32, 24), photons=20_000).save(tmp_path)
     assert not (tmp_path / "markers.csv").exists()
 
 
@@ -96,7 +96,7 @@ def test_dots_beyond_the_edge_are_left_out(model: OpticalModel) -> None:
     [{}, {"grid": (2, 2)}, {"pitch": 1.0, "places": [(0, 0)]}, {"grid": (0, 2), "pitch": 1.0}],
 )
 def test_markers_that_make_no_sense_are_refused(fields: dict[str, object]) -> None:
-    design = load("gelsight-mini").model_dump()
+    design = load("gelsight-mini-ideal").model_dump()
     design["markers"] = {"radius": 0.3, **fields}
     with pytest.raises((OptiSenseError, ValueError), match=r"markers|grid"):
-        type(load("gelsight-mini")).model_validate(design)
+        type(load("gelsight-mini-ideal")).model_validate(design)

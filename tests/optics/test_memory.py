@@ -38,7 +38,7 @@ def test_freed_arrays_go_back_to_the_system(
 
 def test_drafts_of_another_sensor_are_dropped_and_those_of_an_edit_stay() -> None:
     renderer = Renderer()
-    mini = ots.load("gelsight-mini")
+    mini = ots.load("gelsight-mini-ideal")
     renderer.model(mini)
     drafts = renderer.draft_model(mini)
     edited = mini.copy()

@@ -28,7 +28,7 @@ the contact by reflection at the glass."""
 
 @pytest.mark.parametrize("specularity", CONTACT)
 def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> None:
-    case = PatchCase("gelsight-mini", specularity)
+    case = PatchCase("gelsight-mini-ideal", specularity)
     model = OpticalModel(case.design(), "llvm")
     image = model.render([case.contact(model)], RESOLUTION, PHOTONS, seed=1, skin="conforming")
     patches = Patches.of(image)

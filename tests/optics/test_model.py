@@ -21,15 +21,15 @@ PHOTONS = 400_000
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
 ASIDE = Contact(Sphere(radius=2.0), at=(3.0, -2.0), depth=0.6)
 
-IN_CONTACT = {"gelsight-mini": 0.03, "gelsight-mini-cylindrical": 0.06}
+IN_CONTACT = {"gelsight-mini-ideal": 0.03, "gelsight-mini-ideal-cylindrical": 0.06}
 """Field against photon mapping, relative, over the whole contact: of green, and of red and blue
 together, which mirror each other. On the cylinder photon mapping's own noise is 2 %, and the field
 2.5 % brighter in red and blue (of twelve seeds)."""
 
-MAPPED = {"gelsight-mini": 2, "gelsight-mini-cylindrical": 4}
+MAPPED = {"gelsight-mini-ideal": 2, "gelsight-mini-ideal-cylindrical": 4}
 """Pictures by photon mapping that are averaged: an even number, as their halves tell the noise."""
 
-PER_PIXEL = {"gelsight-mini": 0.07, "gelsight-mini-cylindrical": 0.2}
+PER_PIXEL = {"gelsight-mini-ideal": 0.07, "gelsight-mini-ideal-cylindrical": 0.2}
 """RMS error over the contact's pixels without the noise of photon mapping. Measured: flat 0.01 to
 0.04; cylinder, where few photons reach the ball's flanks and photon mapping is noisy, 0.05 to 0.15.
 """
@@ -42,11 +42,11 @@ two orientations. The noise is 0.005."""
 
 
 @cache
-def model(name: str = "gelsight-mini", specularity: float = 0.0) -> OpticalModel:
+def model(name: str = "gelsight-mini-ideal", specularity: float = 0.0) -> OpticalModel:
     return OpticalModel(design(name, specularity), "llvm")
 
 
-def design(name: str = "gelsight-mini", specularity: float = 0.0) -> SensorDesign:
+def design(name: str = "gelsight-mini-ideal", specularity: float = 0.0) -> SensorDesign:
     return set_value(build(name), "coating.specularity", specularity)
 
 
@@ -77,7 +77,7 @@ def test_layers_add_up_to_the_image() -> None:
 
 
 def test_groups_rendered_together_add_up_to_the_same_lights_in_one_group() -> None:
-    parted = build("gelsight-mini")
+    parted = build("gelsight-mini-ideal")
     for name in parted.lights:
         parted = set_value(parted, f"lights.{name}.colour", [1, 1, 1])
     joined = parted.copy()
@@ -147,7 +147,7 @@ def test_cells_do_not_depend_on_the_coating_before() -> None:
 
 
 def test_the_reading_of_specularity_changes_a_model_as_it_makes_one() -> None:
-    design = set_value(build("gelsight-mini"), "coating.specularity", 0.3)
+    design = set_value(build("gelsight-mini-ideal"), "coating.specularity", 0.3)
     used = OpticalModel(design, "llvm")
     pictures = [mean_layers(render(used, BALL))]
     for scattering in ("blend-fixed-roughness", "conductor"):
@@ -248,7 +248,11 @@ def mirrored_means(image: TactileImage) -> np.ndarray:
 
 @pytest.mark.parametrize(
     ("name", "specularity"),
-    [("gelsight-mini", 0.0), ("gelsight-mini-cylindrical", 0.0), ("gelsight-mini", 0.3)],
+    [
+        ("gelsight-mini-ideal", 0.0),
+        ("gelsight-mini-ideal-cylindrical", 0.0),
+        ("gelsight-mini-ideal", 0.3),
+    ],
 )
 def test_the_light_field_agrees_with_photon_mapping(name: str, specularity: float) -> None:
     of = model(name, specularity)

@@ -56,7 +56,7 @@ def test_a_white_sphere_lights_its_port_as_the_formula_says(reflectance: float) 
 
 def test_the_groups_of_a_mini_come_from_their_sides_of_the_picture() -> None:
     """As they do in the real one: red from the top, green from the right, blue from below."""
-    model = OpticalModel(ots.load("gelsight-mini"))
+    model = OpticalModel(ots.load("gelsight-mini-ideal"))
     middle = light_at(model, (0.0, 0.0), PHOTONS)
     for group, azimuth in (("red", 90.0), ("green", 0.0), ("blue", -90.0)):
         assert middle.groups[group].main_azimuth == pytest.approx(azimuth, abs=12.0)
@@ -80,7 +80,7 @@ def test_noise_is_the_spread_of_other_seeds() -> None:
 
 
 def test_what_can_t_be_is_refused_and_dark_groups_are_left_out() -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     design.lights["red"].flux = 0.0
     model = OpticalModel(design)
     assert list(light_at(model, (0.0, 0.0), 20_000).groups) == ["green", "blue"]
@@ -92,12 +92,14 @@ def test_what_can_t_be_is_refused_and_dark_groups_are_left_out() -> None:
 
 def test_the_command_tells_prints_and_draws_it(tmp_path: Path) -> None:
     few = ["--photons", "20000", "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, ["ledger", "gelsight-mini", "--at", "-6,4", "--at=0,0", *few])
+    done = CliRunner().invoke(
+        app, ["ledger", "gelsight-mini-ideal", "--at", "-6,4", "--at=0,0", *few]
+    )
     assert done.exit_code == 0, done.output
     assert "light at (-6, 4) mm" in done.output and "refracted only (%)" in done.output
     data = json.loads((tmp_path / "ledger.json").read_text())
     assert [place["at"] for place in data["places"]] == [[-6.0, 4.0], [0.0, 0.0]]
     page = (tmp_path / "ledger.html").read_text(encoding="utf-8")
     assert page.count('<svg class="dome"') == 6
-    done = CliRunner().invoke(app, ["ledger", "gelsight-mini", "--at", "left"])
+    done = CliRunner().invoke(app, ["ledger", "gelsight-mini-ideal", "--at", "left"])
     assert done.exit_code != 0 and "place 'left'" in done.output

@@ -75,7 +75,7 @@ def test_an_image_is_stored_as_its_camera_does() -> None:
 
 
 def test_a_design_of_the_usual_response_is_written_as_ever() -> None:
-    camera = sensors.load("builtin:gelsight-mini").camera
+    camera = sensors.load("builtin:gelsight-mini-ideal").camera
     assert "response" not in camera.model_dump(mode="json")
     camera.response = SquareRoot()
     written = camera.model_dump(mode="json")

@@ -70,7 +70,7 @@ class TestLonePixels:
 
 def steep() -> SensorDesign:
     """A Mini whose skin goes down the sides of its gel, with lamps 0.2 mm off them below."""
-    design = sensors.gelsight_mini()
+    design = sensors.gelsight_mini_ideal()
     (x0, y0, z), (x1, y1, z1) = design.meshes["gel"].bounds.tolist()
     gel = TriangleMesh.box((x0, y0, z), (x1, y1, z1), (50, 41, 8))
     design.meshes["gel"] = gel

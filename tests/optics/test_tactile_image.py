@@ -9,7 +9,7 @@ import numpy as np
 
 from optisense.optics import TactileImage
 from optisense.report import write_report
-from optisense.sensors import gelsight_mini
+from optisense.sensors import gelsight_mini_ideal
 
 
 def image(*groups: str) -> TactileImage:
@@ -28,7 +28,7 @@ def files(folder: Path) -> set[str]:
 def test_another_image_takes_away_what_was_written_about_the_first(tmp_path: Path) -> None:
     first = image("red", "green")
     first.save(tmp_path)
-    write_report(tmp_path / "report.html", gelsight_mini(), first)
+    write_report(tmp_path / "report.html", gelsight_mini_ideal(), first)
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "layers" / "blue.exr").write_text("mine too")
     image("red").save(tmp_path)

@@ -37,7 +37,9 @@ GOALS = ["rgb2normal", "normdiff"]
 
 
 def test_a_design_is_its_dimensions_and_what_is_set_in_it() -> None:
-    design = design_of(sensor("gelsight-mini", {"coating.specularity": 0.3}, gel_size=[20.0, 18.0]))
+    design = design_of(
+        sensor("gelsight-mini-ideal", {"coating.specularity": 0.3}, gel_size=[20.0, 18.0])
+    )
     assert design.coating.specularity == 0.3
     assert np.ptp(design.meshes["gel"].bounds, axis=0)[:2] == pytest.approx([20.0, 18.0])
 
@@ -45,12 +47,12 @@ def test_a_design_is_its_dimensions_and_what_is_set_in_it() -> None:
 @pytest.mark.slow
 def test_scores_are_those_of_evaluate_whatever_was_asked_before(tmp_path: Path) -> None:
     asked = {"objectives": GOALS, "settings": IMAGES}
-    shiny = sensor("gelsight-mini", {"coating.specularity": 0.3})
+    shiny = sensor("gelsight-mini-ideal", {"coating.specularity": 0.3})
     found = [
         scores({"design": design, **asked}, tmp_path).values["scores"]
-        for design in (shiny, sensor("gelsight-mini"), shiny)
+        for design in (shiny, sensor("gelsight-mini-ideal"), shiny)
     ]
-    plain = ots.evaluate(ots.load("gelsight-mini"), GOALS, **_tuples(IMAGES))
+    plain = ots.evaluate(ots.load("gelsight-mini-ideal"), GOALS, **_tuples(IMAGES))
     assert found[1] == pytest.approx({name: score.value for name, score in plain.items()}, rel=SAME)
     assert found[0] == pytest.approx(found[2], rel=SAME)
     assert found[0]["normdiff"] != pytest.approx(found[1]["normdiff"], rel=1e-3)
@@ -59,7 +61,7 @@ def test_scores_are_those_of_evaluate_whatever_was_asked_before(tmp_path: Path) 
 @pytest.mark.slow
 def test_an_objective_that_fails_leaves_a_gap_with_its_reason(tmp_path: Path) -> None:
     settings = {**IMAGES, "exposure": 1e6}
-    design = sensor("gelsight-mini")
+    design = sensor("gelsight-mini-ideal")
     found = scores({"design": design, "objectives": GOALS, "settings": settings}, tmp_path).values
     assert found["scores"] == dict.fromkeys(GOALS)
     assert all("overexposed" in reason for reason in found["failures"].values())
@@ -71,7 +73,7 @@ def test_relit_scores_are_those_of_a_design_with_these_colours(tmp_path: Path) -
     asked = {"objectives": ["normdiff"], "settings": IMAGES}
     relit = relit_scores(
         {
-            "design": sensor("gelsight-mini"),
+            "design": sensor("gelsight-mini-ideal"),
             "groups": groups,
             "colourings": ["RGB", "GGB"],
             "own": {"least_pixels": 20},
@@ -79,7 +81,7 @@ def test_relit_scores_are_those_of_a_design_with_these_colours(tmp_path: Path) -
         },
         tmp_path,
     ).values["colourings"]
-    design = sensor("gelsight-mini", {"lights.red.colour": [0.0, 1.0, 0.0]})
+    design = sensor("gelsight-mini-ideal", {"lights.red.colour": [0.0, 1.0, 0.0]})
     again = scores({"design": design, **asked}, tmp_path).values["scores"]["normdiff"]
     assert relit["GGB"]["scores"]["normdiff"] == pytest.approx(again, rel=SCORE_ROUNDING)
     assert relit["RGB"]["scores"]["normdiff"] > again  # two colours tell less than three
@@ -89,7 +91,7 @@ def test_less_noise_confuses_less(tmp_path: Path) -> None:
     variants = {"much": {"noise": 0.3}, "little": {"noise": 0.03}}
     found = variants_of_score(
         {
-            "design": sensor("gelsight-mini"),
+            "design": sensor("gelsight-mini-ideal"),
             "objective": "normdiff",
             "variants": variants,
             "settings": IMAGES,
@@ -110,12 +112,12 @@ def test_objects_leave_their_mark(name: str, tmp_path: Path) -> None:
 
 
 def test_nine_balls_are_seen(tmp_path: Path) -> None:
-    asked: dict[str, Any] = {"design": sensor("gelsight-mini"), **IMAGES}
+    asked: dict[str, Any] = {"design": sensor("gelsight-mini-ideal"), **IMAGES}
     assert picture({**asked, "contacts": NINE}, tmp_path).values["pixels_in_contact"] > 90
 
 
 def test_a_camera_straight_above_keeps_shapes_and_a_slant_stretches_them(tmp_path: Path) -> None:
-    design = sensor("gelsight-mini")
+    design = sensor("gelsight-mini-ideal")
     straight = stretch({"design": design, "ray_resolution": [32, 24]}, tmp_path).values
     assert straight["median"] == pytest.approx(1.0, abs=0.1)
     angles = np.radians([0.0, 30.0, 60.0])  # a plane tilted about one axis: 1 / cos
@@ -129,7 +131,7 @@ def test_a_camera_straight_above_keeps_shapes_and_a_slant_stretches_them(tmp_pat
 @pytest.mark.slow
 def test_tasks_are_read_and_samples_kept(tmp_path: Path) -> None:
     asked: Mapping[str, Any] = {
-        "design": sensor("gelsight-mini"),
+        "design": sensor("gelsight-mini-ideal"),
         "tasks": {"misalignment": [16, 12], "cylinder-radius": [48, 36]},
         "samples": 10,
         "seed": 1,
@@ -170,7 +172,7 @@ def test_a_searched_mirror_can_be_built_again(method: str, tmp_path: Path) -> No
 @pytest.mark.slow
 def test_all_colourings_are_told_by_their_letters(tmp_path: Path) -> None:
     asked: dict[str, Any] = {
-        "design": sensor("gelsight-mini"),
+        "design": sensor("gelsight-mini-ideal"),
         "space": {"lights.*.colour": ["R", "G", "B"]},
         "objectives": GOALS,
         "method": "light-colours",
@@ -188,7 +190,7 @@ def test_all_colourings_are_told_by_their_letters(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_times_of_images(tmp_path: Path) -> None:
     asked: dict[str, Any] = {
-        "design": sensor("gelsight-mini"),
+        "design": sensor("gelsight-mini-ideal"),
         "resolutions": [[80, 60], [120, 90]],
         "photons": 60_000,
         "seeds": [0, 1],

@@ -27,7 +27,7 @@ def test_the_same_light_comes_together_then_the_same_sensor() -> None:
     shiny = score("gelbelt", 0, {"coating.specularity": 0.5})
     thick = score("gelbelt", 0, None, gel_thickness=4.0)
     seen, other_photons = see("gelbelt", 0), see("gelbelt", 0, 2000)
-    mini = score("gelsight-mini", 0)
+    mini = score("gelsight-mini-ideal", 0)
     found = shares([first, mini, second, shiny, thick, seen, other_photons])
     assert found == [[first, seen, second, shiny, other_photons], [mini], [thick]]
 

@@ -105,7 +105,7 @@ def test_a_broken_file_is_named(tmp_path: Path) -> None:
 
 def rays(width: int) -> Unit:
     settings = {"ray_resolution": [width, width]}
-    inputs = {"design": sensor("gelsight-mini"), "objectives": ["aoap"], "settings": settings}
+    inputs = {"design": sensor("gelsight-mini-ideal"), "objectives": ["aoap"], "settings": settings}
     return Unit(scores, inputs, f"rays {width}")
 
 
@@ -125,7 +125,7 @@ from paper import Bench, Unit
 from paper.evaluations import scores, sensor
 
 def rays(width):
-    inputs = {"design": sensor("gelsight-mini"), "objectives": ["aoap"],
+    inputs = {"design": sensor("gelsight-mini-ideal"), "objectives": ["aoap"],
               "settings": {"ray_resolution": [width, width]}}
     return Unit(scores, inputs, "rays")
 

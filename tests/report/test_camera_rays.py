@@ -13,16 +13,16 @@ from optisense.design.section_drawing import LOST_RAY, RAY, section_svg
 from optisense.optics import OpticalModel
 from optisense.report.camera_rays import ACROSS, CameraRays
 from optisense.report.scene_view import scene_data
-from optisense.sensors import gelsight_mini, load
+from optisense.sensors import gelsight_mini_ideal, load
 
 
 @pytest.fixture(scope="module")
 def mini() -> CameraRays:
-    return CameraRays.of(OpticalModel(gelsight_mini()))
+    return CameraRays.of(OpticalModel(gelsight_mini_ideal()))
 
 
 def test_rays_of_a_mini_are_bent_by_the_tray_and_reach_the_skin(mini: CameraRays) -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     assert all(ray.arrived for ray in mini.rays)
     for ray in mini.rays:
         assert ray.points[0] == pytest.approx(design.camera.position, abs=1e-5)
@@ -50,19 +50,19 @@ def test_rays_of_a_svelte_go_by_its_mirrors() -> None:
 
 
 def test_the_3d_view_holds_the_segments_of_every_second_ray(mini: CameraRays) -> None:
-    scene = scene_data(gelsight_mini(), {}, mini)
+    scene = scene_data(gelsight_mini_ideal(), {}, mini)
     ends = np.frombuffer(base64.b64decode(scene["rays"]["seen"]), "<f4").reshape(-1, 2, 3)
     rows, columns = mini.shape
     chosen = [mini.rays[r * columns + c] for r in range(0, rows, 2) for c in range(0, columns, 2)]
     assert len(ends) == sum(len(ray.points) - 1 for ray in chosen)
-    assert np.allclose(ends[0, 0], gelsight_mini().camera.position, atol=1e-5)
+    assert np.allclose(ends[0, 0], gelsight_mini_ideal().camera.position, atol=1e-5)
     assert np.allclose(ends[0, 1], ends[1, 0])
     assert scene["rays"]["lost"] == ""
-    assert scene_data(gelsight_mini(), {})["rays"] == {}
+    assert scene_data(gelsight_mini_ideal(), {})["rays"] == {}
 
 
 def test_lines_of_rays_lie_within_the_drawing(mini: CameraRays) -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     svg = section_svg(design, mini.in_section(along_rows(design)))
     paths = re.findall(rf'<path d="M([^"]+)" stroke="{RAY}"', svg)
     assert len(paths) == ACROSS

@@ -23,7 +23,7 @@ EVIL = "</script><img src=x onerror=alert(1)>"
 
 @pytest.fixture(scope="module")
 def section() -> LightSection:
-    return LightSection.of(OpticalModel(ots.load("gelsight-mini")), 20_000)
+    return LightSection.of(OpticalModel(ots.load("gelsight-mini-ideal")), 20_000)
 
 
 def scene_of(page: str) -> dict[str, object]:
@@ -34,7 +34,7 @@ def scene_of(page: str) -> dict[str, object]:
 
 
 def test_each_bar_is_full_and_has_the_shares_of_the_ledger(section: LightSection) -> None:
-    bars = section.values(ots.load("gelsight-mini"))["bars"]
+    bars = section.values(ots.load("gelsight-mini-ideal"))["bars"]
     assert [bar["name"] for bar in bars] == list(section.ledger.emitted)
     for bar in bars:
         ends = 0.0
@@ -71,7 +71,7 @@ def test_ways_are_the_segments_of_all_photons_by_place_and_group(section: LightS
 
 
 def test_the_report_of_a_render_has_the_section_if_it_is_given(section: LightSection) -> None:
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     image = OpticalModel(design).render((), resolution=(32, 24), photons=20_000)
     page = render_page(design, image, light=section)
     for words in ("Where the light goes", *section.colours, *design.lights, "data-ways"):
@@ -83,7 +83,7 @@ def test_the_report_of_a_render_has_the_section_if_it_is_given(section: LightSec
 
 
 def test_texts_of_a_design_stay_texts(section: LightSection) -> None:
-    design = ots.load("gelsight-mini").copy()
+    design = ots.load("gelsight-mini-ideal").copy()
     design.name = design.description = EVIL
     page = ledger_page(design, section)
     assert "<img src=x" not in page
@@ -91,7 +91,7 @@ def test_texts_of_a_design_stay_texts(section: LightSection) -> None:
 
 
 def test_the_page_asks_the_network_for_nothing(section: LightSection) -> None:
-    page = ledger_page(ots.load("gelsight-mini"), section)
+    page = ledger_page(ots.load("gelsight-mini-ideal"), section)
     assert not re.search(r'(src|href)\s*=\s*"(?!data:)', page)
     assert "default-src 'none'" in page
 

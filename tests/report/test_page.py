@@ -15,7 +15,7 @@ from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
 from optisense.report.page import render_page
 from optisense.report.tables import contact_rows
-from optisense.sensors import gelsight_mini
+from optisense.sensors import gelsight_mini_ideal
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
 EVIL = "</script><img src=x onerror=alert(1)>"
@@ -23,12 +23,12 @@ EVIL = "</script><img src=x onerror=alert(1)>"
 
 @pytest.fixture(scope="module")
 def image() -> TactileImage:
-    model = OpticalModel(gelsight_mini())
+    model = OpticalModel(gelsight_mini_ideal())
     return model.render([BALL], resolution=(32, 24), photons=20_000)
 
 
 def test_settings_lights_contacts_and_sources_are_on_the_page(image: TactileImage) -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     page = render_page(design, image, [BALL])
     for words in (
         "32 × 24",
@@ -45,15 +45,15 @@ def test_settings_lights_contacts_and_sources_are_on_the_page(image: TactileImag
 
 
 def test_the_scene_data_is_json(image: TactileImage) -> None:
-    page = render_page(gelsight_mini(), image, [BALL])
+    page = render_page(gelsight_mini_ideal(), image, [BALL])
     found = re.search(r'<script type="application/json" id="scene-data">(.*?)</script>', page)
     assert found
     drawn = [part["name"] for part in json.loads(found[1])["parts"]]
-    assert drawn == [*gelsight_mini().parts, "sphere 1"]
+    assert drawn == [*gelsight_mini_ideal().parts, "sphere 1"]
 
 
 def test_texts_of_a_design_stay_texts(image: TactileImage) -> None:
-    design = gelsight_mini().copy()
+    design = gelsight_mini_ideal().copy()
     design.name = design.description = EVIL
     design.provenance["camera.fov"] = Provenance(status="assumed", source=EVIL)
     design.camera.model = "pi-v2"
@@ -63,23 +63,23 @@ def test_texts_of_a_design_stay_texts(image: TactileImage) -> None:
 
 
 def test_an_interrupted_render_is_told(image: TactileImage) -> None:
-    assert "was interrupted" not in render_page(gelsight_mini(), image)
+    assert "was interrupted" not in render_page(gelsight_mini_ideal(), image)
     stopped = TactileImage(
         image.layers, image.normals, image.contact_mask, image.points, dict(image.settings), True
     )
-    assert "was interrupted" in render_page(gelsight_mini(), stopped)
+    assert "was interrupted" in render_page(gelsight_mini_ideal(), stopped)
 
 
 def test_a_render_without_contacts_says_so(image: TactileImage) -> None:
-    assert "Nothing touches the sensor" in render_page(gelsight_mini(), image)
+    assert "Nothing touches the sensor" in render_page(gelsight_mini_ideal(), image)
 
 
 def test_the_file_is_written_whole_or_not_at_all(image: TactileImage, tmp_path: Path) -> None:
-    path = write_report(tmp_path / "report.html", gelsight_mini(), image, [BALL])
+    path = write_report(tmp_path / "report.html", gelsight_mini_ideal(), image, [BALL])
     assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
     with pytest.raises(OutputError, match="can't be written"):
-        write_report(path / "report.html", gelsight_mini(), image, [BALL])
+        write_report(path / "report.html", gelsight_mini_ideal(), image, [BALL])
 
 
 def test_contacts_tell_depth_force_and_area() -> None:

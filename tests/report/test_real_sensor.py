@@ -29,6 +29,7 @@ def test_only_the_very_sensor_has_a_real_picture() -> None:
     assert has_real_picture(mini)
     assert not has_real_picture(set_value(mini, "coating.specularity", 0.3))
     assert not has_real_picture(load("gelsight-mini-spherical"))
+    assert not has_real_picture(load("gelsight-mini-ideal"))
     assert not has_real_picture(load("gelbelt"))
 
 
@@ -37,25 +38,23 @@ def test_both_pictures_are_alike_bright_and_show_the_ball_at_one_place(
 ) -> None:
     assert found.real.shape == found.model.shape == (240, 320, 3)
     assert np.median(found.model) == pytest.approx(np.median(found.real), rel=0.15)
-    assert found.shading[0] > 0.8  # the red light comes from the same side, ...
-    assert found.shading[1] < 0.0  # ... and the green one wanes towards the other
+    assert found.shading[0] > 0.9 and found.shading[2] > 0.5  # these come from the same sides
 
 
-def test_what_the_page_says_of_the_green_light_is_so(found: RealComparison) -> None:
-    """Near the green LEDs, on the right, it is weak in the model and not in the real sensor."""
+def test_the_green_light_is_as_even_as_in_the_real_sensor(found: RealComparison) -> None:
+    """Near the green LEDs, on the right, it is nearly as strong as in the middle."""
     real, simulated = (
         picture[:, 280:, 1].mean() / picture[:, 140:180, 1].mean()
         for picture in (found.real.astype(float), found.model.astype(float))
     )
-    assert simulated < 0.6 < 0.7 < real
-    assert found.evenness[0, 1] > 2.0 * found.evenness[1, 1]
+    assert simulated == pytest.approx(real, rel=0.2)
 
 
 def test_figures_are_of_the_pictures(found: RealComparison) -> None:
     apart = found.real.astype(float) - found.model
     assert found.difference == pytest.approx(np.sqrt((apart**2).mean()))
     assert found.shares.sum(axis=1) == pytest.approx([1.0, 1.0])
-    assert 10.0 < found.difference < 60.0
+    assert 2.0 < found.difference < 0.4 * found.own_spread
 
 
 def test_the_page_shows_both_with_their_source(model: OpticalModel, found: RealComparison) -> None:

@@ -10,7 +10,7 @@ import pytest
 from optisense.geometry import TriangleMesh
 from optisense.report.edges import feature_edges
 from optisense.report.scene_view import scene_data
-from optisense.sensors import gelsight_mini
+from optisense.sensors import gelsight_mini_ideal
 
 
 def decoded(text: str, dtype: str) -> np.ndarray:
@@ -30,7 +30,7 @@ def test_an_open_sheet_shows_its_border_only() -> None:
 
 
 def test_every_part_light_and_the_camera_are_there() -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     ball = TriangleMesh.box((-1, -1, 0), (1, 1, 2))
     scene = scene_data(design, {"ball": ball})
     assert [part["name"] for part in scene["parts"]] == [*design.parts, "ball"]
@@ -46,7 +46,7 @@ def test_every_part_light_and_the_camera_are_there() -> None:
 
 
 def test_the_frustum_is_as_wide_as_the_field_of_view() -> None:
-    design = gelsight_mini()
+    design = gelsight_mini_ideal()
     camera = scene_data(design, {})["camera"]
     corners = np.array(camera["corners"]) - camera["position"]
     middle_left, middle_right = corners[[0, 3]].mean(axis=0), corners[[1, 2]].mean(axis=0)
@@ -57,6 +57,6 @@ def test_the_frustum_is_as_wide_as_the_field_of_view() -> None:
 
 def test_a_huge_mesh_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("optisense.report.scene_view.MAX_TRIANGLES", 100)
-    names = [part["name"] for part in scene_data(gelsight_mini(), {})["parts"]]
+    names = [part["name"] for part in scene_data(gelsight_mini_ideal(), {})["parts"]]
     assert "gel" not in names
     assert "guide" in names

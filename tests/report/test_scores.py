@@ -11,14 +11,14 @@ from optisense.objectives import Evaluation, Objective, Score, Settings
 from optisense.objectives.scored import Scored
 from optisense.optics import OpticalModel
 from optisense.report.scores import render_scores
-from optisense.sensors import gelsight_mini
+from optisense.sensors import gelsight_mini_ideal
 
 EVIL = "</svg></table><img src=x onerror=alert(1)>"
 
 
 @pytest.fixture(scope="module")
 def evaluation() -> Evaluation:
-    return Evaluation(OpticalModel(gelsight_mini()), Settings(ray_resolution=(20, 16)))
+    return Evaluation(OpticalModel(gelsight_mini_ideal()), Settings(ray_resolution=(20, 16)))
 
 
 def page(evaluation: Evaluation, *scores: Score) -> str:

@@ -41,7 +41,7 @@ def opposite(design: SensorDesign) -> float:
 
 @pytest.fixture(scope="module")
 def result() -> SearchResult:
-    mini = ots.load("gelsight-mini")
+    mini = ots.load("gelsight-mini-ideal")
     return search(mini, SPACE, [steep, opposite], method="pareto", budget=60, seed=2)
 
 
@@ -96,7 +96,7 @@ def test_what_got_worse_is_told_where_rays_may_move(page: str) -> None:
     def wide(design: SensorDesign) -> float:
         return design.camera.fov
 
-    mini = ots.load("gelsight-mini")
+    mini = ots.load("gelsight-mini-ideal")
     found = search(mini, {"camera.fov": (40.0, 60.0)}, wide, method="random", budget=3)
     figures = RayFigures(0.5, 0.25, 0.75, 0.5, 4.0, 1.1, 1.5, np.full((3, 4), 1.2))
     after = replace(figures, aoap=0.6, evenness=1.0)
@@ -120,7 +120,7 @@ def test_columns_that_an_interruption_leaves_empty_are_left_out(tmp_path: Path) 
             raise KeyboardInterrupt
         return design.coating.specularity
 
-    mini = ots.load("gelsight-mini")
+    mini = ots.load("gelsight-mini-ideal")
     space = {"coating.specularity": (0.0, 1.0)}
     found = search(mini, space, stopped, method="random", budget=9)
     assert found.interrupted
@@ -160,7 +160,7 @@ def test_a_study_without_scores_has_a_page(tmp_path: Path) -> None:
     from optisense.search import Plan, SearchSpace
 
     plan = Plan(space=SearchSpace({"coating.specularity": (0.0, 1.0)}), goals=["aoap"])
-    study = Study.create(tmp_path / "new", ots.load("gelsight-mini"), plan)
+    study = Study.create(tmp_path / "new", ots.load("gelsight-mini-ideal"), plan)
     text = render_study(study)
     study.close()
     assert "No trial has a score yet" in text
@@ -168,7 +168,7 @@ def test_a_study_without_scores_has_a_page(tmp_path: Path) -> None:
 
 def test_the_command_writes_the_page(tmp_path: Path) -> None:
     folder = tmp_path / "study"
-    search(ots.load("gelsight-mini"), SPACE, opposite, method="random", budget=5, out=folder)
+    search(ots.load("gelsight-mini-ideal"), SPACE, opposite, method="random", budget=5, out=folder)
     done = CliRunner().invoke(app, ["report", str(folder), "--no-pictures"])
     assert done.exit_code == 0, done.output
     assert "search for opposite" in (folder / "report.html").read_text(encoding="utf-8")
@@ -211,7 +211,7 @@ def test_the_command_renders_the_best_trials(tmp_path: Path) -> None:
     folder = tmp_path / "study"
     space = {"camera.fov": (45.0, 55.0, 3)}
     search(
-        ots.load("gelsight-mini"),
+        ots.load("gelsight-mini-ideal"),
         space,
         "aoap",
         method="grid",

@@ -30,7 +30,7 @@ def score(design: SensorDesign) -> float:
 
 @pytest.fixture(scope="module")
 def found() -> Tolerance:
-    grey = set_value(ots.load("gelsight-mini"), "coating.reflectance", (0.5, 0.5, 0.5))
+    grey = set_value(ots.load("gelsight-mini-ideal"), "coating.reflectance", (0.5, 0.5, 0.5))
     errors = {
         "coating.reflectance.r": ToleranceDistribution(0.1, "uniform"),
         "coating.reflectance.g": ToleranceDistribution(0.02),
@@ -69,7 +69,7 @@ def test_the_command(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = CliRunner().invoke(
         app,
-        ["tolerance", "gelsight-mini", *QUICK, *errors, "--sensors", "24", "--out", str(out),
+        ["tolerance", "gelsight-mini-ideal", *QUICK, *errors, "--sensors", "24", "--out", str(out),
          "--report", "--json"],
     )  # fmt: skip
     assert done.exit_code == 0, done.output
@@ -95,7 +95,7 @@ def test_the_command(tmp_path: Path) -> None:
     ],
 )
 def test_bad_input_is_told(options: list[str], message: str) -> None:
-    done = CliRunner().invoke(app, ["tolerance", "gelsight-mini", *options])
+    done = CliRunner().invoke(app, ["tolerance", "gelsight-mini-ideal", *options])
     assert done.exit_code == 2
     assert message in " ".join(done.output.split())
 

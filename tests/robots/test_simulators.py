@@ -81,7 +81,7 @@ def test_mass_and_inertia(made: Made) -> None:
 
 def test_mass_properties() -> None:
     """Mass, centre and inertia of two plates agree with trimesh's."""
-    made = {each.name: each.mesh for each in shapes(sensors.build("gelsight-mini"))}
+    made = {each.name: each.mesh for each in shapes(sensors.build("gelsight-mini-ideal"))}
     plates = [made[name] for name in ("tray", "guide")]
     bodies = [as_manifold(mesh) for mesh in plates]
     mass, centre, inertia = mass_properties(bodies, [1.19 * KILOGRAMS] * len(bodies))
@@ -94,7 +94,7 @@ def test_mass_properties() -> None:
 
 
 def test_a_weighed_sensor() -> None:
-    design = sensors.build("gelsight-mini")
+    design = sensors.build("gelsight-mini-ideal")
     one, other = sensor_body(design), sensor_body(design, mass=20.0)
     assert other.mass == pytest.approx(0.020)
     np.testing.assert_allclose(other.inertia, one.inertia * (0.020 / one.mass))
@@ -105,7 +105,7 @@ def test_a_weighed_sensor() -> None:
 
 
 def test_wrong_numbers_are_refused() -> None:
-    design = sensors.build("gelsight-mini")
+    design = sensors.build("gelsight-mini-ideal")
     with pytest.raises(DesignError, match="the mass is 0"):
         sensor_body(design, mass=0.0)
     with pytest.raises(DesignError, match="no solid part 'skin'"):

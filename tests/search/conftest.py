@@ -18,7 +18,7 @@ TWO_NUMBERS = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0,
 
 @pytest.fixture(scope="session")
 def mini() -> SensorDesign:
-    return ots.load("gelsight-mini")
+    return ots.load("gelsight-mini-ideal")
 
 
 @pytest.fixture(scope="session")

@@ -28,7 +28,7 @@ def test_only_what_is_bright_is_told_from_what_turns_rays() -> None:
 
 def test_chief_rays_stay_where_only_brightness_varies() -> None:
     """The paths have the stated effects on rays."""
-    design = ots.load("gelsight-mini")
+    design = ots.load("gelsight-mini-ideal")
     model = OpticalModel(design)
     before = model.chief_rays((40, 30)).points
     for path, value in (("coating.specularity", 0.9), ("lights.red.flux", 40.0)):

@@ -44,21 +44,26 @@ def failure(name: str, path: str, value: float) -> str | None:
         ("gelsight360", "parts.shell.shift.z", -100.0, "'gel' and 'shell' lie on one another"),
         ("gelsight360", "parts.boards.shift.z", -30.0, "of group 'lg1' sits on part 'boards'"),
         ("gelsight360", "parts.boards.turn.z", -60.0, "of group 'lg1' sits on part 'boards'"),
-        ("gelsight-mini", "parts.tray.shift.z", 1.0, "'tray' and 'guide' lie on one another"),
-        ("gelsight-mini", "parts.guide.shift.y", -30.0, "'tray' and 'guide' lie on one another"),
-        ("gelsight-mini", "cages.skin.points[0].z", -14.25, "cuts into part 'tray'"),
-        ("gelsight-mini", "cages.skin.points[0].x", -42.6, "has come off part 'tray'"),
-        ("gelsight-mini", "cages.skin.points[17].y", 40.0, "reaches"),
-        ("gelsight-mini-cylindrical", "cages.skin.points[26].x", 45.0, "reaches"),
-        ("gelsight-mini-spherical", "cages.skin.points[17].y", 40.0, "reaches"),
-        ("gelsight-mini", "lights.green.shift.z", 2.5, "inside part 'tray'"),
-        ("gelsight-mini", "lights.green.lights[0].shift.z", 2.5, "light 0 of group 'green'"),
-        ("gelsight-mini", "parts.guide.turn.z", 3.0, "inside part 'guide'"),
+        ("gelsight-mini-ideal", "parts.tray.shift.z", 1.0, "'tray' and 'guide' lie on one another"),
+        (
+            "gelsight-mini-ideal",
+            "parts.guide.shift.y",
+            -30.0,
+            "'tray' and 'guide' lie on one another",
+        ),
+        ("gelsight-mini-ideal", "cages.skin.points[0].z", -14.25, "cuts into part 'tray'"),
+        ("gelsight-mini-ideal", "cages.skin.points[0].x", -42.6, "has come off part 'tray'"),
+        ("gelsight-mini-ideal", "cages.skin.points[17].y", 40.0, "reaches"),
+        ("gelsight-mini-ideal-cylindrical", "cages.skin.points[26].x", 45.0, "reaches"),
+        ("gelsight-mini-ideal-spherical", "cages.skin.points[17].y", 40.0, "reaches"),
+        ("gelsight-mini-ideal", "lights.green.shift.z", 2.5, "inside part 'tray'"),
+        ("gelsight-mini-ideal", "lights.green.lights[0].shift.z", 2.5, "light 0 of group 'green'"),
+        ("gelsight-mini-ideal", "parts.guide.turn.z", 3.0, "inside part 'guide'"),
         ("gelbelt", "materials.acrylic.ior", 1.0, "material 'acrylic' is air"),
         ("gelbelt", "materials.clear-tape.ior", 1.2, "no transparent solid"),
         ("gelbelt", "materials.air-film.ior", 1.4, "material 'air-film' is a solid"),
-        ("gelsight-mini", "materials.silicone-xp565.ior", 4.0, "no clear elastomer"),
-        ("gelsight-mini", "materials.silicone-xp565.ior", 1.0, "'silicone-xp565' is air"),
+        ("gelsight-mini-ideal", "materials.silicone-xp565.ior", 4.0, "no clear elastomer"),
+        ("gelsight-mini-ideal", "materials.silicone-xp565.ior", 1.0, "'silicone-xp565' is air"),
     ],
 )
 def test_nobody_could_build_it(name: str, path: str, value: float, said: str) -> None:
@@ -69,17 +74,17 @@ def test_nobody_could_build_it(name: str, path: str, value: float, said: str) ->
     ("name", "path", "value"),
     [
         # The tray is 1.5 mm wider than the gel and the guide: they may slide on it.
-        ("gelsight-mini", "parts.tray.shift.x", 1.0),
-        ("gelsight-mini", "parts.guide.turn.z", 0.3),
+        ("gelsight-mini-ideal", "parts.tray.shift.x", 1.0),
+        ("gelsight-mini-ideal", "parts.guide.turn.z", 0.3),
         # These lights are cast into the shell.
         ("gelsight360", "lights.lg1.shift.z", 0.2),
-        ("gelsight-mini", "lights.green.shift.x", -1.0),
+        ("gelsight-mini-ideal", "lights.green.shift.x", -1.0),
         # Nothing touches the mirror.
         ("gelsight-svelte", "parts.M2.shift.x", 0.5),
         # The bottom of the gel becomes smaller and stays flat.
-        ("gelsight-mini", "cages.skin.points[0].x", -10.0),
-        ("gelsight-mini", "cages.skin.points[14].z", 3.0),
-        ("gelsight-mini", "materials.silicone-xp565.ior", 1.55),
+        ("gelsight-mini-ideal", "cages.skin.points[0].x", -10.0),
+        ("gelsight-mini-ideal", "cages.skin.points[14].z", 3.0),
+        ("gelsight-mini-ideal", "materials.silicone-xp565.ior", 1.55),
     ],
 )
 def test_what_can_be_built_is_scored(name: str, path: str, value: float) -> None:
@@ -101,7 +106,7 @@ def test_parts_may_part_where_they_may_cross() -> None:
 
 
 def test_it_is_the_same_in_another_process() -> None:
-    one = evaluator("gelsight-mini", "parts.guide.shift.z")
+    one = evaluator("gelsight-mini-ideal", "parts.guide.shift.z")
     point = np.array([10.0])
     expected = one(point, 0).failure
     assert expected is not None

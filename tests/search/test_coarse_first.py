@@ -108,7 +108,7 @@ def test_coarse_scores_take_fewer_pixels_and_photons_and_one_image(mini: SensorD
     assert (usual["resolution"], usual["photons"]) == ([320, 240], 125_000)
 
 
-@pytest.mark.parametrize("name", ["gelsight-mini", "gelbelt"])
+@pytest.mark.parametrize("name", ["gelsight-mini-ideal", "gelbelt"])
 def test_the_smallest_contact_keeps_enough_pixels(name: str) -> None:
     design = ots.load(name)
     space = SearchSpace({"coating.specularity": (0.0, 1.0)}).bind(design)

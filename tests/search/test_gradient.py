@@ -166,7 +166,7 @@ def test_a_gradient_that_is_said_to_hold_is_within_five_per_cent() -> None:
 def test_a_transparent_part_that_moves_is_climbed_by_differences() -> None:
     """The cage of GelSight Mini bends its gel, by which rays have no derivative."""
     bound = SearchSpace({"cages.skin.points": CagePoints(Around(0.5), points=[4, 13, 14])}).bind(
-        load("gelsight-mini")
+        load("gelsight-mini-ideal")
     )
     found = Gradient(Problem(bound, ("2to3pw",), 10), resolution=32)
     usual = DesignEvaluator(bound, ["2to3pw"], {"ray_resolution": (32, 24)}, apart=False)

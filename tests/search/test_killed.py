@@ -24,7 +24,7 @@ import cheap_goals
 import optisense as ots
 
 ots.search.search(
-    ots.load("gelsight-mini"),
+    ots.load("gelsight-mini-ideal"),
     {"coating.specularity": (0.0, 1.0), "camera.position.x": (-1.0, 3.0)},
     cheap_goals.told,
     budget=40,

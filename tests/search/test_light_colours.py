@@ -39,7 +39,11 @@ GOALS = ("rgb2normal", "normdiff", Objective("redness", redness, "Redness"))
 def result() -> SearchResult:
     """All 27 colourings of a GelSight Mini's three groups."""
     return search(
-        ots.load("gelsight-mini"), COLOURS, list(GOALS), method="light-colours", settings=QUICK
+        ots.load("gelsight-mini-ideal"),
+        COLOURS,
+        list(GOALS),
+        method="light-colours",
+        settings=QUICK,
     )
 
 
@@ -105,7 +109,7 @@ class TestOrder:
         varied: dict[str, object] = dict(COLOURS)
         if steps:
             varied["lights.*.flux"] = (1.0, 2.0, steps)
-        space = SearchSpace(varied).bind(ots.load("gelsight-mini"))
+        space = SearchSpace(varied).bind(ots.load("gelsight-mini-ideal"))
         return Problem(space, ("score",), budget, seed=3)
 
     def drive(self, method: LightColours) -> Iterator[np.ndarray]:

@@ -356,7 +356,7 @@ def test_expand_tells_what_was_asked(mini: SensorDesign) -> None:
 def test_a_camera_from_the_library_brings_its_sensor_where_there_is_one() -> None:
     """An ideal camera stays ideal; one with a sensor and a lens gets those of the other camera."""
     space = SearchSpace({"camera.model": ["gelsight-mini", "pi-v1"]})
-    plain = sensors.gelsight_mini()
+    plain = sensors.gelsight_mini_ideal()
     real = library.with_imaging(plain, "pi-v2", focus_distance=19.4)
     changed = [space.bind(design).apply(np.array([1.0])).camera for design in (plain, real)]
     assert [camera.model for camera in changed] == ["pi-v1", "pi-v1"]

@@ -44,7 +44,7 @@ def theirs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     plan = Plan(space=space, goals=[f"{mine}:score"], method="random", budget=2)
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(folder / "state"))
-        with closing(Study.create(folder / "study", ots.load("gelsight-mini"), plan)) as made:
+        with closing(Study.create(folder / "study", ots.load("gelsight-mini-ideal"), plan)) as made:
             run_study(made)
     return folder
 

@@ -82,7 +82,7 @@ def test_errors_that_only_act_together_each_have_the_whole_share(result: Toleran
 
 def test_intervals_hold_the_truth_nine_times_in_ten() -> None:
     bound = ManufacturingErrors({RED: 0.01, GREEN: 0.02}).bind(
-        set_value(ots.load("gelsight-mini"), "coating.reflectance", (0.5, 0.5, 0.5))
+        set_value(ots.load("gelsight-mini-ideal"), "coating.reflectance", (0.5, 0.5, 0.5))
     )
     held_share = held_percentile = 0
     for seed in range(60):
@@ -159,7 +159,7 @@ def test_results_are_json(result: Tolerance) -> None:
 
 
 def test_usual_errors_fit_every_sensor() -> None:
-    for name in ("gelsight-mini", "gelsight360", "gelsight-svelte", "gelbelt"):
+    for name in ("gelsight-mini-ideal", "gelsight360", "gelsight-svelte", "gelbelt"):
         design = ots.load(name)
         errors = usual_errors(design)
         bound = errors.bind(design)

@@ -39,13 +39,13 @@ def test_normals_of_the_skin_look_into_the_gel(sensor: SensorDesign) -> None:
 
 
 def test_flat_gel_volume_is_its_box() -> None:
-    gel = sensors.gelsight_mini().meshes["gel"]
+    gel = sensors.gelsight_mini_ideal().meshes["gel"]
     assert gel.volume == pytest.approx(25.25 * 20.75 * 4.25)
 
 
 def test_the_camera_sees_the_published_part_of_the_gel() -> None:
     """Trace the outermost ray of the image's width and height through the flat layers."""
-    camera = sensors.gelsight_mini().camera
+    camera = sensors.gelsight_mini_ideal().camera
     half_width = math.tan(math.radians(camera.fov / 2))
     half_height = half_width * camera.resolution[1] / camera.resolution[0]
     for slope, length, tolerance in zip(
@@ -59,7 +59,7 @@ def test_the_camera_sees_the_published_part_of_the_gel() -> None:
 
 
 def test_the_lights_face_the_guide_across_a_gap() -> None:
-    design = sensors.gelsight_mini()
+    design = sensors.gelsight_mini_ideal()
     low, high = design.meshes["guide"].bounds
     for group in design.lights.values():
         assert len(group.lights) == 5
@@ -73,7 +73,7 @@ def test_the_lights_face_the_guide_across_a_gap() -> None:
 
 def test_light_comes_from_top_right_and_bottom_of_the_picture() -> None:
     """As published ball presses shade: red +94..+99, green -4..-7, blue -63..-76 degrees."""
-    design = sensors.gelsight_mini()
+    design = sensors.gelsight_mini_ideal()
     right, up, _ = design.camera.axes()
     for name, angle in {"red": 90, "green": 0, "blue": -90}.items():
         centre = np.mean([light.position for light in design.lights[name].lights], axis=0)
@@ -81,25 +81,25 @@ def test_light_comes_from_top_right_and_bottom_of_the_picture() -> None:
 
 
 def test_the_cylinder_is_bent_along_x_only() -> None:
-    skin = sensors.gelsight_mini_cylindrical().deformed_meshes()["skin"].vertices
+    skin = sensors.gelsight_mini_ideal_cylindrical().deformed_meshes()["skin"].vertices
     x = skin[:, 0] / 25.25 + 0.5
     np.testing.assert_allclose(skin[:, 2], 6.0 * 2 * x * (1 - x), atol=1e-9)
 
 
 def test_the_dome_is_highest_in_the_middle() -> None:
-    skin = sensors.gelsight_mini_spherical().deformed_meshes()["skin"].vertices
+    skin = sensors.gelsight_mini_ideal_spherical().deformed_meshes()["skin"].vertices
     x, y = skin[:, 0] / 25.25 + 0.5, skin[:, 1] / 20.75 + 0.5
     np.testing.assert_allclose(skin[:, 2], 9.0 * 4 * x * (1 - x) * y * (1 - y), atol=1e-9)
 
 
 def test_the_first_sensor_marks_what_is_assumed() -> None:
-    provenance = sensors.gelsight_mini().provenance
+    provenance = sensors.gelsight_mini_ideal().provenance
     for path in ("parts.guide", "lights.red", "camera.position", "materials.silicone-xp565.ior"):
         assert provenance[path].status == "assumed"
 
 
 def test_dimensions_can_be_chosen() -> None:
-    design = sensors.gelsight_mini(gel_thickness=3.0, leds_per_group=8, led_pitch=2.5)
+    design = sensors.gelsight_mini_ideal(gel_thickness=3.0, leds_per_group=8, led_pitch=2.5)
     assert design.meshes["gel"].bounds[0, 2] == -3.0
     assert design.camera.position[2] == -3.0 - 1.0 - 17.0
     assert len(design.lights["blue"].lights) == 8
@@ -108,12 +108,12 @@ def test_dimensions_can_be_chosen() -> None:
 
 
 def test_a_bent_sensor_takes_dimensions_too() -> None:
-    design = sensors.gelsight_mini_spherical(4.0, gel_thickness=3.0)
+    design = sensors.gelsight_mini_ideal_spherical(4.0, gel_thickness=3.0)
     skin = design.deformed_meshes()["skin"].bounds
     assert skin[1, 2] == pytest.approx(1.0, abs=0.01)  # a quarter of the rise
     assert design.meshes["gel"].bounds[0, 2] == -3.0
     assert design.provenance["cages.skin.points"].status == "assumed"
-    assert "bent to a dome; chosen: gel_thickness 3" in design.description
+    assert "bent to a dome, ideal camera; chosen: gel_thickness 3" in design.description
     assert sensors.check(design) == []
 
 
@@ -131,18 +131,18 @@ def test_a_bent_sensor_takes_dimensions_too() -> None:
 )
 def test_what_cannot_be_is_refused(change: dict[str, Any], message: str, hint: str) -> None:
     with pytest.raises(DesignError, match=message) as caught:
-        sensors.gelsight_mini(**change)
+        sensors.gelsight_mini_ideal(**change)
     assert hint in str(caught.value.hint)
-    assert caught.value.where == "gelsight-mini"
+    assert caught.value.where == "gelsight-mini-ideal"
 
 
 def test_a_gel_is_not_pressed_through_its_tray() -> None:
     with pytest.raises(DesignError, match="through its tray") as caught:
-        sensors.gelsight_mini_cylindrical(-9.0)
+        sensors.gelsight_mini_ideal_cylindrical(-9.0)
     assert "more than -8.5 mm" in str(caught.value.hint)
 
 
-@pytest.mark.parametrize("name", ["gelsight-mini", "gelsight-svelte", "gelsight360"])
+@pytest.mark.parametrize("name", ["gelsight-mini-ideal", "gelsight-svelte", "gelsight360"])
 def test_leds_are_as_bright_as_their_weakest_colour_can_be(name: str) -> None:
     for group in sensors.build(name).lights.values():
         known = library.entry("light", group.model)
@@ -152,12 +152,12 @@ def test_leds_are_as_bright_as_their_weakest_colour_can_be(name: str) -> None:
 
 class TestLoad:
     def test_by_name(self) -> None:
-        assert optisense.load("gelsight-mini").name == "gelsight-mini"
+        assert optisense.load("gelsight-mini-ideal").name == "gelsight-mini-ideal"
 
     def test_by_folder(self, tmp_path: Path) -> None:
-        save_design(sensors.gelsight_mini(), tmp_path / "mine")
-        assert optisense.load(tmp_path / "mine").name == "gelsight-mini"
-        assert optisense.load(str(tmp_path / "mine")).name == "gelsight-mini"
+        save_design(sensors.gelsight_mini_ideal(), tmp_path / "mine")
+        assert optisense.load(tmp_path / "mine").name == "gelsight-mini-ideal"
+        assert optisense.load(str(tmp_path / "mine")).name == "gelsight-mini-ideal"
 
     def test_a_misspelt_name(self) -> None:
         with pytest.raises(DesignError, match="Did you mean 'gelsight-mini'"):
@@ -166,15 +166,15 @@ class TestLoad:
     def test_a_name_that_is_also_a_folder(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        save_design(sensors.gelsight_mini_spherical(), tmp_path / "gelsight-mini")
+        save_design(sensors.gelsight_mini_ideal_spherical(), tmp_path / "gelsight-mini-ideal")
         monkeypatch.chdir(tmp_path)
         with pytest.raises(DesignError, match="also a folder"):
-            optisense.load("gelsight-mini")
-        assert optisense.load("./gelsight-mini").name == "gelsight-mini-spherical"
-        assert optisense.load("builtin:gelsight-mini").name == "gelsight-mini"
+            optisense.load("gelsight-mini-ideal")
+        assert optisense.load("./gelsight-mini-ideal").name == "gelsight-mini-ideal-spherical"
+        assert optisense.load("builtin:gelsight-mini-ideal").name == "gelsight-mini-ideal"
 
     def test_an_unknown_light_is_an_error(self) -> None:
-        design = sensors.gelsight_mini()
+        design = sensors.gelsight_mini_ideal()
         design.lights["red"].model = "smd-3529"
         with pytest.raises(DesignError, match="Did you mean 'smd-3528'"):
             sensors.check(design)
@@ -184,7 +184,7 @@ class TestFitted:
     """The Mini that was fitted to photographs of a real unit."""
 
     def test_what_was_fitted_says_so(self) -> None:
-        design = sensors.gelsight_mini_fitted()
+        design = sensors.gelsight_mini()
         fitted = {p for p, known in design.provenance.items() if known.status == "calibrated"}
         assert fitted >= {f"lights.{name}.flux" for name in design.lights}
         assert fitted >= {"camera.position", "camera.tone_curve", "camera.shading"}
@@ -194,8 +194,23 @@ class TestFitted:
             assert "GelSLAM" in design.provenance[path].source
         assert design.provenance["parts.tray"].status == "sourced"
 
+    def test_bent_ones_have_the_same_light_and_camera(self) -> None:
+        flat = sensors.gelsight_mini()
+        for bent in (sensors.gelsight_mini_cylindrical(), sensors.gelsight_mini_spherical()):
+            assert (bent.camera, bent.lights) == (flat.camera, flat.lights)
+            assert bent.parts.keys() == flat.parts.keys() and bent.cages != flat.cages
+
+    def test_it_takes_dimensions(self) -> None:
+        flat, thin = sensors.gelsight_mini(), sensors.gelsight_mini(gel_thickness=3.0)
+        across, along = thin.camera.position[:2], thin.camera.position[2]
+        assert across == flat.camera.position[:2]  # the fitted place across its axis
+        assert along == pytest.approx(flat.camera.position[2] + 1.25)  # behind the tray, as before
+        assert thin.description.endswith("of a real unit; chosen: gel_thickness 3")
+        assert thin.lights["red"].flux == flat.lights["red"].flux
+        assert sensors.gelsight_mini(led_flux=2.0).lights["red"].flux == 2.0
+
     def test_it_sees_as_much_of_the_skin_as_photographs_show(self) -> None:
-        model = optisense.OpticalModel(sensors.gelsight_mini_fitted())
+        model = optisense.OpticalModel(sensors.gelsight_mini())
         points = model.chief_rays((160, 120)).points
         seen = np.linalg.norm(points[60, -1] - points[60, 0]) * 160 / 159
         assert seen == pytest.approx(20.3, rel=0.025)
@@ -208,7 +223,7 @@ class TestFitted:
         rows, columns = np.mgrid[:120, :160] + 0.5
         away = np.hypot(columns - BALL_PLACE[0] / 2, rows - BALL_PLACE[1] / 2) > 45.0
         ratios = []
-        for name in ("gelsight-mini-fitted", "gelsight-mini"):
+        for name in ("gelsight-mini", "gelsight-mini-ideal"):
             model = optisense.OpticalModel(sensors.build(name))
             image = model.render(resolution=(160, 120), photons=200_000)
             chain = image.chain.without_noise()

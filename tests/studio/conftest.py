@@ -97,7 +97,7 @@ def mini_design(_extension: None) -> tuple[Any, Any]:
     from studio.scene.gather import gather
 
     bpy.ops.wm.read_homefile(use_empty=True)
-    assert bpy.ops.optisense.new(sensor="gelsight-mini") == {"FINISHED"}
+    assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
     return gather(bpy.context.scene)
 
 

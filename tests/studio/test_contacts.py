@@ -90,7 +90,7 @@ def test_nine_contacts_are_like_the_active_one(mini: Any, select: Callable[..., 
     assert {each.optisense.indenter for each in objects_of(mini, "CONTACT")} == {"sphere"}
 
 
-@pytest.mark.parametrize("sensor", ["gelsight-mini-spherical", "gelsight-svelte"])
+@pytest.mark.parametrize("sensor", ["gelsight-mini-ideal-spherical", "gelsight-svelte"])
 def test_an_indenter_lies_as_it_is_drawn(sensor: str, scene: Any) -> None:
     assert bpy.ops.optisense.new(sensor=sensor) == {"FINISHED"}
     assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}

@@ -194,7 +194,7 @@ def test_an_engine_of_another_version_says_so(tmp_path: Path) -> None:
     )
     engine = Engine([sys.executable, str(script)], str(tmp_path))
     errors: list[EngineError] = []
-    request = engine.send("warm", on_error=errors.append, design="gelsight-mini")
+    request = engine.send("warm", on_error=errors.append, design="gelsight-mini-ideal")
     engine.wait(request)
     assert "speaks protocol 9" in errors[0].message
     assert errors[0].hint == "Update the extension"
@@ -214,7 +214,7 @@ def test_a_program_that_never_answers_is_no_engine(
         monkeypatch.setattr("studio.core.engine.GREETING_SECONDS", patience)
         monkeypatch.setenv("OPTISENSE_ENGINE", told)
         for run in (
-            lambda: bpy.ops.optisense.new(sensor="gelsight-mini"),
+            lambda: bpy.ops.optisense.new(sensor="gelsight-mini-ideal"),
             lambda: bpy.ops.optisense.add_mesh(filepath=str(silent)),
         ):
             with pytest.raises(RuntimeError, match=words):
@@ -229,7 +229,7 @@ def test_a_picture_of_the_sensor_before_is_not_relit_and_says_so(mini: Any) -> N
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     before, now = shown(), bpy.context.window_manager.optisense_picture
     assert not now.is_before and bpy.ops.optisense.report.poll()
-    assert bpy.ops.optisense.new(sensor="gelsight-mini") == {"FINISHED"}
+    assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
     mini.optisense.light_groups[0].flux = 0.0
     session.ask_and_wait("library", kind="coating")  # a relighting would have come before this
     assert now.is_before and not now.is_relit and np.array_equal(shown(), before)

@@ -67,7 +67,7 @@ def test_an_objective_of_ones_own(mini: Any, tmp_path: Path) -> None:
 def test_scores_of_the_sensor_before_say_so(mini: Any) -> None:
     values = evaluated("aoap")
     assert not values.is_before
-    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     assert values.is_before
     evaluate_operator.take({"scores": []})
     assert not values.is_before
@@ -80,7 +80,7 @@ def test_rays_are_coloured_by_outcome_and_leave_with_their_sensor(scene: Any) ->
     drawn = {each.optisense.key: tuple(each.color) for each in objects_of(scene, "SHOWN")}
     assert {"ray hit", "ray absorbed"} <= drawn.keys() and len(set(drawn.values())) == len(drawn)
     assert "hit (green)" in values.rays and "absorbed (black)" in values.rays
-    assert bpy.ops.optisense.new(sensor="gelsight-mini") == {"FINISHED"}
+    assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
     assert not objects_of(scene, "SHOWN") and not values.rays and not bpy.data.curves
 
 

@@ -58,7 +58,7 @@ def test_the_tour_goes_on_as_its_steps_are_done(scene: Any) -> None:
     assert bpy.ops.optisense.tour() == {"FINISHED"}
     try:
         assert "step 1 of 5" in told()
-        assert bpy.ops.optisense.new(sensor="gelsight-mini") == {"FINISHED"}
+        assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
         assert "step 2 of 5" in told() and "Middle" in told()
         assert bpy.ops.optisense.add_contact() == {"FINISHED"}
         assert "step 3 of 5" in told()

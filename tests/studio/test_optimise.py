@@ -31,7 +31,7 @@ def parameters(scene: Any, text: str) -> list[dict[str, Any]]:
     return list(found["parameters"])
 
 
-@pytest.mark.parametrize("sensor", ["gelsight-mini", "gelsight-svelte"])
+@pytest.mark.parametrize("sensor", ["gelsight-mini-ideal", "gelsight-svelte"])
 def test_pose_material_and_points_of_every_object_can_vary(
     sensor: str, scene: Any, select: Callable[..., None], library: None
 ) -> None:

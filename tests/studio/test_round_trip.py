@@ -18,8 +18,8 @@ from studio.scene.gather import gather, gather_document
 SENSORS = (
     "gelbelt",
     "gelsight360",
-    "gelsight-mini",
-    "gelsight-mini-spherical",
+    "gelsight-mini-ideal",
+    "gelsight-mini-ideal-spherical",
     "gelsight-svelte",
 )
 
@@ -52,7 +52,7 @@ def test_every_field_of_a_sensor_comes_back(sensor: str, scene: Any, tmp_path: P
 
 
 def test_what_blender_does_not_show_of_a_design_comes_back(scene: Any, tmp_path: Path) -> None:
-    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     bpy.ops.optisense.save_as(filepath=str(tmp_path / "plain"))
     file = tmp_path / "plain" / "design.yaml"
     frost = "    faces: {end: {direction: [0, 1, 0], within: 10, roughness: 0.4}}\n"
@@ -97,7 +97,7 @@ def test_the_design_lives_in_its_collections(mini: Any) -> None:
 
 def test_opening_again_replaces_the_sensor(mini: Any) -> None:
     count = len(mini.objects)
-    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     assert len(mini.objects) == count
 
 
@@ -108,7 +108,7 @@ def test_a_saved_folder_is_not_overwritten_by_another_sensor(mini: Any, tmp_path
     with pytest.raises(RuntimeError):
         bpy.ops.optisense.save_as(filepath=str(tmp_path / "a"))
     assert bpy.ops.optisense.open(filepath=str(tmp_path / "a" / "design.yaml")) == {"FINISHED"}
-    assert mini.optisense.title == "gelsight-mini"
+    assert mini.optisense.title == "gelsight-mini-ideal"
 
 
 def test_what_is_edited_is_written_and_nothing_else(mini: Any) -> None:
@@ -209,7 +209,7 @@ def test_undo_of_a_bent_cage_straightens_its_parts(mini: Any) -> None:
 
 
 def test_what_a_camera_does_with_light_comes_back(scene: Any, tmp_path: Path) -> None:
-    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     bpy.ops.optisense.add_camera(model="pi-v2", imaging=True)
     assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "saved")) == {"FINISHED"}
     camera = as_read(str(tmp_path / "saved"))[0]["camera"]

@@ -65,7 +65,7 @@ def test_the_change_since_the_last_edit_is_told(mini: Any) -> None:
     score = values.scores["aoap"]
     assert score.number < before and score.change.endswith("worse")
     assert evaluated("aoap").scores["aoap"].change == "unchanged"
-    bpy.ops.optisense.new(sensor="gelsight-mini")
+    bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     assert evaluated("aoap").scores["aoap"].change == ""  # those of another sensor do not count
 
 

@@ -22,13 +22,13 @@ from optisense.optics.transport.chief_rays import ChiefRays  # noqa: E402
 @pytest.fixture(scope="session")
 def mini() -> OpticalModel:
     """A flat GelSight Mini; tests don't change it."""
-    return OpticalModel(load("gelsight-mini"))
+    return OpticalModel(load("gelsight-mini-ideal"))
 
 
 @pytest.fixture(scope="session")
 def cylindrical_mini() -> OpticalModel:
     """A GelSight Mini bent to a cylinder; tests don't change it."""
-    return OpticalModel(load("gelsight-mini-cylindrical"))
+    return OpticalModel(load("gelsight-mini-ideal-cylindrical"))
 
 
 LIGHTS = np.array([[0.8, 0.0, -0.6], [-0.4, 0.69282, -0.6], [-0.4, -0.69282, -0.6]])

@@ -141,7 +141,7 @@ def test_an_interrupted_dataset_continues_to_the_same(
         file.write("images/000002.png,2,sphe")
     # Another model, as a new process would have.
     assert_same(
-        generate(OpticalModel(load("gelsight-mini")), tmp_path / "a", COUNT, SETTINGS), made
+        generate(OpticalModel(load("gelsight-mini-ideal")), tmp_path / "a", COUNT, SETTINGS), made
     )
 
 
@@ -160,7 +160,7 @@ def test_other_settings_and_other_designs_are_refused(made: Dataset, mini: Optic
     with pytest.raises(TaskError, match=r"settings\.contacts\.tilt was 0\.0, is 5"):
         contacts = replace(SETTINGS.contacts, tilt=5)
         generate(mini, made.folder, COUNT, replace(SETTINGS, contacts=contacts))
-    shiny = load("gelsight-mini")
+    shiny = load("gelsight-mini-ideal")
     shiny.coating.specularity = 0.4
     with pytest.raises(TaskError, match=r"coating\.specularity was 0\.0, is 0\.4"):
         generate(OpticalModel(shiny), made.folder, COUNT, SETTINGS)
@@ -168,13 +168,13 @@ def test_other_settings_and_other_designs_are_refused(made: Dataset, mini: Optic
 
 
 def test_where_numbers_come_from_does_not_matter(made: Dataset) -> None:
-    same: SensorDesign = load("gelsight-mini")
+    same: SensorDesign = load("gelsight-mini-ideal")
     same.provenance.clear()
     assert len(generate(OpticalModel(same), made.folder, COUNT, SETTINGS)) == COUNT
 
 
 def test_the_design_lies_beside_its_pictures(made: Dataset) -> None:
-    assert load(made.folder / "design").coating == load("gelsight-mini").coating
+    assert load(made.folder / "design").coating == load("gelsight-mini-ideal").coating
 
 
 def test_a_folder_with_other_things_in_it_is_left_alone(mini: OpticalModel, tmp_path: Path) -> None:
@@ -233,7 +233,7 @@ def test_a_dataset_of_a_sensor_with_an_own_lamp_opens_and_continues_elsewhere(
     (tmp_path / "our-lamp.ies").write_text(LAMP)
     red = (1.0, 0.0, 0.0)
     library.add_ies(tmp_path / "our-lamp.ies", flux=4.0, colour=red, colour_name="red")
-    design = load("gelsight-mini")
+    design = load("gelsight-mini-ideal")
     lamps = design.lights["red"].model_dump() | {"model": "our-lamp"}
     design.lights["red"] = LightGroup.model_validate(lamps)
     settings = replace(SETTINGS, radiance=False)

@@ -93,7 +93,11 @@ def test_the_card_tells_licence_seed_versions_and_splits(made: Dataset) -> None:
     assert head["license"] == "cc-by-4.0"
     names = [each["split"] for each in head["configs"][0]["data_files"]]
     assert names == [name for name in SPLITS if made.split(name)]
-    for words in ("gelsight-mini", "| seed | 0 |", f"mitsuba {made.info['made_with']['mitsuba']}"):
+    for words in (
+        "gelsight-mini-ideal",
+        "| seed | 0 |",
+        f"mitsuba {made.info['made_with']['mitsuba']}",
+    ):
         assert words in text, words
     write_card(made)  # goes on with the licence that was chosen
     assert "license: cc-by-4.0" in path.read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ from optisense import OpticalModel, load, set_value
 from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
 from optisense.optics import TactileImage
-from optisense.sensors.gelsight_mini import gelsight_mini
+from optisense.sensors.gelsight_mini_ideal import gelsight_mini_ideal
 from optisense.tasks import ReconstructionSettings, VerificationSettings, verify
 from optisense.tasks.paired_bootstrap import BETTER, UNKNOWN, WORSE
 from optisense.tasks.press_readings import PressReading, whole_errors
@@ -91,7 +91,7 @@ def test_presses_are_alike_in_both_and_not_too_deep(mini: OpticalModel) -> None:
 
 
 def test_presses_are_less_deep_where_the_gel_is_thin() -> None:
-    thin = OpticalModel(gelsight_mini(gel_thickness=1.2))
+    thin = OpticalModel(gelsight_mini_ideal(gel_thickness=1.2))
     chosen = choose_presses((thin, thin), ["wedge"], 2, seed=0)
     for press in chosen.presses:
         assert press.contacts[0].depth <= MOST_DEEP * 1.2
@@ -99,7 +99,7 @@ def test_presses_are_less_deep_where_the_gel_is_thin() -> None:
 
 
 def test_objects_are_scaled_to_what_the_camera_sees() -> None:
-    narrow = OpticalModel(set_value(load("gelsight-mini"), "camera.fov", 20.0))
+    narrow = OpticalModel(set_value(load("gelsight-mini-ideal"), "camera.fov", 20.0))
     chosen = choose_presses((narrow, narrow), ["coin", "nut"], 1, seed=0)
     rays = narrow.chief_rays((64, 48))
     seen = np.ptp(rays.points[rays.hit], axis=0)

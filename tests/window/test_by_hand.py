@@ -65,8 +65,8 @@ def test_the_tab_is_there(bench: Bench) -> None:
 
 
 def test_a_new_mini(bench: Bench) -> None:
-    bench.new_sensor("gelsight-mini")
-    assert bench.see("scene().optisense.title") == "gelsight-mini"
+    bench.new_sensor("gelsight-mini-ideal")
+    assert bench.see("scene().optisense.title") == "gelsight-mini-ideal"
     assert len(bench.see("[light.name for light in kinds('LIGHT')]")) == 15
     bench.drawn()
     right = bench.see(f"max({CORNERS_ACROSS})")
@@ -161,7 +161,7 @@ def test_it_is_saved(bench: Bench) -> None:
     bench.choose_file()
     bench.until("scene().optisense.is_saved")
     bench.rest()
-    written = yaml.safe_load((bench.home / "gelsight-mini" / "design.yaml").read_text())
+    written = yaml.safe_load((bench.home / "gelsight-mini-ideal" / "design.yaml").read_text())
     assert len(written["lights"]) == 3
 
 
@@ -199,7 +199,7 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     assert bench.see("kinds('CAMERA')[0].optisense.fov") == pytest.approx(best, abs=1e-4)
     bench.press("optisense.save")
     bench.until("'Saved in' in state().note")
-    folder = bench.home / "gelsight-mini"
+    folder = bench.home / "gelsight-mini-ideal"
     written = yaml.safe_load((folder / "design.yaml").read_text())
     assert written["camera"]["fov"] == best
     bench.press("optisense.open", across=0.25)
@@ -225,18 +225,20 @@ def test_a_report_and_files_for_workshop_and_robot_are_written(bench: Bench) -> 
     bench.press("optisense.report")
     bench.choose_file()
     bench.until("'Written to' in state().note")
-    page = (bench.home / "gelsight-mini.html").read_text(encoding="utf-8")
-    assert page.count("data:image/png;base64,") >= 2 and "gelsight-mini" in page
+    page = (bench.home / "gelsight-mini-ideal.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") >= 2 and "gelsight-mini-ideal" in page
     bench.press("optisense.export")
     bench.choose_file()
     bench.until("'files in' in state().note")
-    written = bench.home / "gelsight-mini-workshop"
+    written = bench.home / "gelsight-mini-ideal-workshop"
     assert {"gel.stl", "skin.stl"} <= {each.name for each in written.rglob("*.stl")}
     bench.press("optisense.export_robot")
     bench.choose_file()
     bench.until("'-robot' in state().note")
-    robot = bench.home / "gelsight-mini-robot"
-    assert {"gelsight-mini.xml", "gelsight-mini.urdf"} <= {each.name for each in robot.iterdir()}
+    robot = bench.home / "gelsight-mini-ideal-robot"
+    assert {"gelsight-mini-ideal.xml", "gelsight-mini-ideal.urdf"} <= {
+        each.name for each in robot.iterdir()
+    }
 
 
 def test_a_click_on_a_group_selects_its_lights(bench: Bench) -> None:

@@ -39,7 +39,9 @@ EXPOSURE = 700.0
 def photograph_real_sensor(folder: Path) -> None:
     """Write photographs of a Mini with brighter red lights, as a user takes them."""
     folder.mkdir()
-    model = ots.OpticalModel(ots.set_value(ots.load("gelsight-mini"), "lights.red.flux", FLUX))
+    model = ots.OpticalModel(
+        ots.set_value(ots.load("gelsight-mini-ideal"), "lights.red.flux", FLUX)
+    )
     shots: dict[str, list[ots.Contact]] = {"background": []}
     for name, place in PLACES.items():
         shots[name] = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6)]
@@ -53,7 +55,7 @@ def photograph_real_sensor(folder: Path) -> None:
 def test_a_ball_is_pressed_by_force(bench: Bench) -> None:
     bench.greet()
     bench.open_tab()
-    bench.new_sensor("gelsight-mini")
+    bench.new_sensor("gelsight-mini-ideal")
     bench.only(SIMULATE)
     bench.press("optisense.add_contact", across=0.75)
     bench.until("len(kinds('CONTACT')) == 1")

@@ -53,7 +53,7 @@ def changed(before: np.ndarray, after: np.ndarray) -> float:
 
 def test_the_command_shows_a_design_in_the_workspace(bench: Bench) -> None:
     bench.close()
-    bench.start(design="gelsight-mini")
+    bench.start(design="gelsight-mini-ideal")
     bench.until("window().workspace.name == 'OptiSense'")
     bench.until("sorted(a.type for a in window().screen.areas) == ['IMAGE_EDITOR', 'VIEW_3D']")
     bench.until("scene().optisense.is_open and not state().busy")

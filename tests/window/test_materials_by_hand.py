@@ -31,7 +31,7 @@ OWN_PICTURE = f"{GALLERY}.picture('material', {NAME!r})"
 def test_a_material_of_the_library_is_put_on_the_gel(bench: Bench) -> None:
     bench.greet()
     bench.open_tab()
-    bench.new_sensor("gelsight-mini")
+    bench.new_sensor("gelsight-mini-ideal")
     bench.select_part("gel", ON_GEL)
     names = bench.see("[e['name'] for e in part('engine.catalogue').entries('material')]")
     bench.choose(bench.find("material", across=0.4), names.index(OF_LIBRARY))
@@ -86,6 +86,6 @@ def test_it_is_put_on_the_gel_and_saved_with_the_design(bench: Bench) -> None:
     bench.choose_file()
     bench.until("scene().optisense.is_saved")
     bench.rest()
-    written = yaml.safe_load((bench.home / "gelsight-mini" / "design.yaml").read_text())
+    written = yaml.safe_load((bench.home / "gelsight-mini-ideal" / "design.yaml").read_text())
     assert written["parts"]["gel"]["material"] == NAME
     assert written["materials"][NAME]["ior"] == INDEX

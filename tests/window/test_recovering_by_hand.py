@@ -44,7 +44,7 @@ def test_an_empty_sensor_is_begun(bench: Bench) -> None:
 
 
 def test_a_click_on_a_light_chooses_its_group(bench: Bench) -> None:
-    bench.new_sensor("gelsight-mini")
+    bench.new_sensor("gelsight-mini-ideal")
     bench.until(f"not {PROBLEM}")
     bench.only(LIGHTS)
     for light in bench.see(f"[each.name for each in {GREEN}]"):

@@ -55,7 +55,7 @@ def test_the_tour_leads_to_a_picture_and_its_score(bench: Bench) -> None:
     bench.open_tab()
     bench.press("optisense.tour")
     assert bench.see(STEP) == 0
-    bench.new_sensor("gelsight-mini")
+    bench.new_sensor("gelsight-mini-ideal")
     bench.until(f"{STEP} == 1")
     bench.only(SIMULATE)
     bench.press("optisense.add_contact", across=0.75)

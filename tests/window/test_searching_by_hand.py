@@ -18,7 +18,7 @@ from .bench import Bench
 from .test_by_hand import FIRST_ROW, VARY
 from .test_rows_by_hand import EVALUATE
 
-STUDY = "gelsight-mini-search-2"
+STUDY = "gelsight-mini-ideal-search-2"
 """Where the second search of the design is kept, beside its folder."""
 
 FILE = "[uU]ntitled.blend"
@@ -71,7 +71,7 @@ def ghost_pixels(bench: Bench) -> int:
 def test_a_mini_is_saved(bench: Bench) -> None:
     bench.greet()
     bench.open_tab()
-    bench.new_sensor("gelsight-mini")
+    bench.new_sensor("gelsight-mini-ideal")
     bench.press("optisense.save_as", across=0.85)
     bench.choose_file()
     bench.until("scene().optisense.is_saved")
@@ -149,7 +149,7 @@ def test_the_best_is_kept_as_a_variant(bench: Bench) -> None:
     bench.until("'Written to' in state().note")
     bench.photograph("kept")
     kept = yaml.safe_load((bench.home / f"{STUDY}-best" / "design.yaml").read_text())
-    own = yaml.safe_load((bench.home / "gelsight-mini" / "design.yaml").read_text())
+    own = yaml.safe_load((bench.home / "gelsight-mini-ideal" / "design.yaml").read_text())
     height = kept["cages"]["skin"]["points"][14]["z"]
     assert own["cages"]["skin"]["points"][14]["z"] == 0.0
     assert f"= {height:.4g}" in bench.see(f"{TOLD}.values")

@@ -14,7 +14,7 @@ from PIL import Image
 from .bench import Bench
 from .test_rows_by_hand import EVALUATE
 
-SENSORS = ("gelsight-mini", "digit", "gelsight360", "gelsight-svelte")
+SENSORS = ("gelsight-mini-ideal", "digit", "gelsight360", "gelsight-svelte")
 
 FILLED = 0.12
 """Share of the free part of the view that a sensor covers at least when it is opened."""

@@ -42,7 +42,7 @@ def see_soon(bench: Bench, expression: str, wanted: float) -> None:
 def test_a_new_mini(bench: Bench) -> None:
     bench.greet()
     bench.open_tab()
-    bench.new_sensor("gelsight-mini")
+    bench.new_sensor("gelsight-mini-ideal")
 
 
 def test_a_cage_around_the_skin_alone_is_told(bench: Bench) -> None:

@@ -10,9 +10,9 @@ from optisense.design import SensorDesign
 
 @pytest.fixture(scope="module")
 def flat() -> SensorDesign:
-    return sensors.build("gelsight-mini")
+    return sensors.build("gelsight-mini-ideal")
 
 
 @pytest.fixture(scope="module")
 def dome() -> SensorDesign:
-    return sensors.build("gelsight-mini-spherical")
+    return sensors.build("gelsight-mini-ideal-spherical")

@@ -135,7 +135,7 @@ def test_the_table_holds_every_line(dome: SensorDesign) -> None:
 def test_the_readable_bill_names_everything(dome: SensorDesign) -> None:
     bill = bill_of_materials(dome)
     text = bill.markdown()
-    assert text.startswith("# Bill of materials: gelsight-mini-spherical\n")
+    assert text.startswith("# Bill of materials: gelsight-mini-ideal-spherical\n")
     for heading in ("Lights", "Camera", "Materials", "Coating"):
         assert f"## {heading}\n" in text
     for item in bill.items:
@@ -169,7 +169,7 @@ def test_the_bill_tells_what_is_assumed_and_what_is_not_drawn() -> None:
     sheet.parts["far-coat"].thickness = None
     line = items(sheet, "material")["far-coat"]
     assert line.unit == "cm^2" and "a sheet without thickness" in line.note
-    design = sensors.gelsight_mini().copy()
+    design = sensors.gelsight_mini_ideal().copy()
     design.provenance["parts.gel"] = Provenance(status="sourced", source="its data sheet")
     note = items(design, "material")["gel"].note
     assert "assumed" not in note and "sheet" not in note

@@ -46,7 +46,7 @@ def test_leds_far_apart_or_face_to_face_have_boards_of_their_own() -> None:
     assert boards(((0, 0, 3), up), ((9, 0, 0), down)) == [1, 2]  # beside one another
 
 
-@pytest.mark.parametrize("name", ["digit", "gelbelt", "gelsight360", "gelsight-mini"])
+@pytest.mark.parametrize("name", ["digit", "gelbelt", "gelsight360", "gelsight-mini-ideal"])
 def test_position_files_give_places_and_directions_back(name: str, tmp_path: Path) -> None:
     """Both tables of a board, read as those of any program and laid into the sensor again."""
     design = sensors.build(name)
@@ -93,7 +93,7 @@ def test_the_tables_for_jlcpcb(tip: SensorDesign, tmp_path: Path) -> None:
 
 
 def test_the_outline_is_around_all_bodies(tmp_path: Path) -> None:
-    design = sensors.gelsight_mini()
+    design = sensors.gelsight_mini_ideal()
     files = {file.name: file for file in export(design, tmp_path, [])}
     pairs = files["board-1.dxf"].read_text().split()
     numbers = {code: [float(pairs[k + 1]) for k in range(0, len(pairs) - 1, 2) if pairs[k] == code]

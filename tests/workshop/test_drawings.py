@@ -113,7 +113,7 @@ def test_edges_behind_a_plate_are_hidden() -> None:
 
 
 def test_which_parts_are_plates() -> None:
-    mini = {each.name: each for each in plates(shapes(sensors.gelsight_mini()))}
+    mini = {each.name: each for each in plates(shapes(sensors.gelsight_mini_ideal()))}
     assert {name: each.thickness for name, each in mini.items()} == pytest.approx(
         {"tray": 1.0, "guide": 4.0}
     )

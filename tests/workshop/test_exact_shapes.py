@@ -139,9 +139,9 @@ class TestStepFiles:
         """Its sides are the cage's own polynomials: a mesh cut four times as finely agrees."""
         from optisense.geometry.step import read_step
 
-        (file,) = export(sensors.gelsight_mini_spherical(), tmp_path, ["step"])[:1]
+        (file,) = export(sensors.gelsight_mini_ideal_spherical(), tmp_path, ["step"])[:1]
         read = {body.name: body for body in read_step(file)}
-        fine = sensors.gelsight_mini_spherical(tessellation=0.25).deformed_meshes()["gel"]
+        fine = sensors.gelsight_mini_ideal_spherical(tessellation=0.25).deformed_meshes()["gel"]
         assert read["gel"].mesh.volume == pytest.approx(fine.volume, rel=2e-4)
         assert read["gel"].solid
         assert file.stat().st_size < 100_000

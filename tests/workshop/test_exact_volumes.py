@@ -114,13 +114,13 @@ class TestExactVolumes:
 
     def test_what_cages_bend(self) -> None:
         """A point that moves by 9 mm has the weight 2 u (1 - u) each way, 1/3 in the mean."""
-        made = parts(sensors.gelsight_mini_spherical())
+        made = parts(sensors.gelsight_mini_ideal_spherical())
         flat, bulge = 25.25 * 20.75 * 4.25, 25.25 * 20.75 * 9.0 / 9.0
         assert exact_volume(made["gel"]) == pytest.approx(flat + bulge, rel=SAME_VOLUME)
 
     def test_a_gel_bent_to_a_cylinder(self) -> None:
         """Three points that move by 6 mm have the weight 2 u (1 - u), 1/3 in the mean."""
-        made = parts(sensors.gelsight_mini_cylindrical())
+        made = parts(sensors.gelsight_mini_ideal_cylindrical())
         expected = 25.25 * 20.75 * (4.25 + 6.0 / 3.0)
         assert exact_volume(made["gel"]) == pytest.approx(expected, rel=SAME_VOLUME)
         assert drawn_volume(made["gel"], axis=1) == pytest.approx(expected, rel=SAME_VOLUME)

@@ -152,14 +152,16 @@ def test_what_has_no_mould_says_why() -> None:
 def test_the_command_writes_the_halves_and_tells_the_draft(tmp_path: Path) -> None:
     out = tmp_path / "out"
     done = CliRunner().invoke(
-        app, ["export", "gelsight-mini", "--moulds", "-f", "stl", "-f", "3mf", "-o", str(out)]
+        app, ["export", "gelsight-mini-ideal", "--moulds", "-f", "stl", "-f", "3mf", "-o", str(out)]
     )
     assert done.exit_code == 0, done.output
     assert "gel-mould: 391 mm^2 of the gel's sides" in done.output
     names = {file.name for file in out.iterdir()}
-    assert {"gel-mould-front.stl", "gel-mould-back.stl", "gelsight-mini-moulds.3mf"} <= names
+    assert {"gel-mould-front.stl", "gel-mould-back.stl", "gelsight-mini-ideal-moulds.3mf"} <= names
     front = trimesh.load(out / "gel-mould-front.stl")
     assert front.is_watertight
-    plain = CliRunner().invoke(app, ["export", "gelsight-mini", "-o", str(tmp_path / "plain")])
+    plain = CliRunner().invoke(
+        app, ["export", "gelsight-mini-ideal", "-o", str(tmp_path / "plain")]
+    )
     assert plain.exit_code == 0
     assert not [file for file in (tmp_path / "plain").iterdir() if "mould" in file.name]

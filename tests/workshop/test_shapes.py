@@ -86,7 +86,7 @@ def test_trimesh_reads_it_too(dome: SensorDesign, tmp_path: Path, kind: str) -> 
 
 def test_a_3mf_file_holds_all_parts_in_their_places(dome: SensorDesign, tmp_path: Path) -> None:
     export(dome, tmp_path, ["3mf"])
-    found = objects(tmp_path / "gelsight-mini-spherical.3mf")
+    found = objects(tmp_path / "gelsight-mini-ideal-spherical.3mf")
     made = shapes(dome)
     assert list(found) == [shape.name for shape in made]
     for shape in made:
@@ -104,7 +104,7 @@ def test_trimesh_opens_the_3mf_file(dome: SensorDesign, tmp_path: Path) -> None:
     import trimesh
 
     export(dome, tmp_path, ["3mf"])
-    scene = trimesh.load(tmp_path / "gelsight-mini-spherical.3mf")
+    scene = trimesh.load(tmp_path / "gelsight-mini-ideal-spherical.3mf")
     assert scene.units == "millimeter"
     for shape in shapes(dome):
         loaded = scene.geometry[shape.name]
@@ -131,12 +131,12 @@ def test_names_that_xml_would_stumble_over(flat: SensorDesign, tmp_path: Path) -
 def test_a_step_file_reads_back(tmp_path: Path) -> None:
     from optisense.geometry.step import read_step
 
-    dome = sensors.gelsight_mini(tessellation=2.5)
+    dome = sensors.gelsight_mini_ideal(tessellation=2.5)
     cage = dome.cages["skin"]
     top = cage.index(1, 1, 2)
     cage.points[top] = Point(x=cage.points[top].x, y=cage.points[top].y, z=9.0)
     export(dome, tmp_path, ["step"])
-    read = {b.name: b for b in read_step(tmp_path / "gelsight-mini.step")}
+    read = {b.name: b for b in read_step(tmp_path / "gelsight-mini-ideal.step")}
     for shape in shapes(dome):
         body = read[shape.name]
         assert body.solid == shape.is_solid
@@ -145,7 +145,7 @@ def test_a_step_file_reads_back(tmp_path: Path) -> None:
         assert body.mesh.area == pytest.approx(shape.mesh.area, rel=1e-3)
         if shape.is_solid:
             assert body.mesh.volume == pytest.approx(shape.volume, rel=1e-2)
-    text = (tmp_path / "gelsight-mini.step").read_text(errors="replace")
+    text = (tmp_path / "gelsight-mini-ideal.step").read_text(errors="replace")
     assert ".MILLI.,.METRE." in text.replace(" ", "")
 
 
