@@ -125,5 +125,5 @@ def test_an_old_blender_a_broken_one_and_no_blender_are_told(tmp_path: Path) -> 
 def test_an_unknown_design_is_told_before_blender_starts(tmp_path: Path) -> None:
     program = fake_blender(tmp_path)
     result = run("gelsight-mimi", "--blender", str(program))
-    assert result.exit_code == 2 and "gelsight-mini-ideal" in result.output
+    assert result.exit_code == 2 and "gelsight-mini" in result.output
     assert not (tmp_path / "log").exists()
