@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, TypeVar, cast
 
 from optisense.errors import OptiSenseError
@@ -22,6 +22,10 @@ class CachedValues:
         """Create an object without values."""
         self.seconds: dict[str, float] = {}
         self._made: dict[str, Any] = {}
+
+    def take(self, other: CachedValues, names: Iterable[str]) -> None:
+        """Take those of the named values that another object has computed."""
+        self._made |= {name: other._made[name] for name in names if name in other._made}
 
     def shared(self, name: str, make: Callable[[], _T]) -> _T:
         """Return a value that is computed on first use; an error is kept as well, and raised again.

@@ -117,6 +117,7 @@ def normdiff(
     noise: float = NOISE,
     theta_weight: float = THETA_WEIGHT,
     phi_weight: float = PHI_WEIGHT,
+    nearest_only: bool = False,
     colours: str = COLOURS,
     least_pixels: int = LEAST_PIXELS,
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
@@ -129,6 +130,8 @@ def normdiff(
         evaluation: the sensor.
         noise: half the width of the colour range, as a share of the value in each channel.
         theta_weight, phi_weight: weights of the two ranges in the sum.
+        nearest_only: whether the confusion at a normal is that of the one pixel nearest to it,
+            instead of the mean over all pixels that it is nearest to.
         colours: kind of colours that the noise is added to, "response" or "picture" (see
             `Press.colours`).
         least_pixels: smallest number of indented pixels of a press.
@@ -148,7 +151,13 @@ def normdiff(
     for press in evaluation.presses:
         indented, theta, phi = _indentation(press, least_pixels)
         found = confusion(
-            press.colours(indented, colours), theta, phi, noise, theta_weight, phi_weight
+            press.colours(indented, colours),
+            theta,
+            phi,
+            noise,
+            theta_weight,
+            phi_weight,
+            nearest_only=nearest_only,
         )
         maps.append(found)
         places.append(
@@ -208,13 +217,15 @@ def confusion(
     noise: float = NOISE,
     theta_weight: float = THETA_WEIGHT,
     phi_weight: float = PHI_WEIGHT,
+    *,
+    nearest_only: bool = False,
 ) -> Confusion:
     """Compute steps 2 to 6 of the paper for the indented pixels of one press.
 
     Args:
         colours: (n, 3) colours, 0 to 1.
         theta, phi: (n,) polar angle and azimuth of the true normal, degrees.
-        noise, theta_weight, phi_weight: see `normdiff`.
+        noise, theta_weight, phi_weight, nearest_only: see `normdiff`.
     """
     c = np.asarray(colours, dtype=np.float64)
     polar, azimuth = np.asarray(theta, dtype=np.float64), np.asarray(phi, dtype=np.float64)
@@ -225,6 +236,12 @@ def confusion(
     total = theta_weight * theta_range + phi_weight * phi_range
     # Steps 2, 5 and 6: each normal of a grid takes the mean over the pixels nearest to it.
     cells, cell_theta, cell_phi = normal_cells(polar, azimuth)
+    if nearest_only:
+        apart = _angles_between(polar, azimuth, cell_theta, cell_phi)
+        order = np.lexsort((apart, cells))
+        chosen = order[np.unique(cells[order], return_index=True)[1]]
+        cells, cell_theta, cell_phi = cells[chosen], cell_theta[chosen], cell_phi[chosen]
+        total, theta_range, phi_range = total[chosen], theta_range[chosen], phi_range[chosen]
     found, first, member = np.unique(cells, return_index=True, return_inverse=True)
     number = np.bincount(member)
 
@@ -235,6 +252,17 @@ def confusion(
     return Confusion(
         cell_theta[first], cell_phi[first], mean(total), mean(theta_range), mean(phi_range), found
     )
+
+
+def _angles_between(
+    theta: FloatArray, phi: FloatArray, other_theta: FloatArray, other_phi: FloatArray
+) -> FloatArray:
+    """Return the angles (n,), degrees, between directions of these polar angles and azimuths."""
+    one, other = np.radians(theta), np.radians(other_theta)
+    cosine = np.cos(one) * np.cos(other)
+    cosine += np.sin(one) * np.sin(other) * np.cos(np.radians(phi - other_phi))
+    angles: FloatArray = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+    return angles
 
 
 def azimuth_on_sphere(arc: ArrayLike, theta: ArrayLike) -> FloatArray:

@@ -32,6 +32,10 @@ LEAST_PIXELS = 8
 MOST_LEAST_PIXELS = 10_000
 """Largest number of pixels that a line or press may be asked to have; none has as many."""
 
+LINE, PRESS = "line", "press"
+"""Pixels whose colours one principal component describes: those of a line (the OptiSense paper), or
+those of all lines through a ball."""
+
 MOST_DIRECTIONS = 360
 """Largest number of lines, one per degree: closer lines have the same pixels."""
 
@@ -55,7 +59,7 @@ class Fit:
 
 
 def on_lines(
-    press: Press, *, directions: int, half_lines: bool, least_pixels: int, colours: str
+    press: Press, *, directions: int, half_lines: bool, least_pixels: int, **settings: object
 ) -> NDArray[np.bool_]:
     """Return a mask (h, w) of the pixels on the lines of a press, the only ones that are read; see
     `rgb2normal`.
@@ -88,6 +92,8 @@ def rgb2normal(
     *,
     directions: int = DIRECTIONS,
     half_lines: bool = False,
+    signed: bool = True,
+    dominant: str = LINE,
     colours: str = COLOURS,
     least_pixels: int = LEAST_PIXELS,
 ) -> tuple[float, dict[str, Any], dict[str, Any]]:
@@ -100,21 +106,29 @@ def rgb2normal(
         evaluation: the sensor.
         directions: number of compass directions; two opposite ones share a diameter.
         half_lines: whether each direction's radius, from the centre outward, is fitted separately.
+        signed: whether tilts on the two flanks of a ball have opposite signs.
+        dominant: pixels of which the dominant colour is the first principal component: "line" or
+            "press" (all lines through the ball).
         colours: kind of colours, "picture" or "response" (see `Press.colours`).
         least_pixels: smallest number of pixels of a line.
     """
     _refuse_directions(directions, half_lines)
+    if dominant not in (LINE, PRESS):
+        raise ObjectiveError(
+            f"the setting 'dominant' is {dominant!r}", hint=f"Use {LINE} or {PRESS}"
+        )
     refuse_outside("least_pixels", least_pixels, 3, MOST_LEAST_PIXELS)
     refuse_kind(colours)
     angles = np.arange(directions) * 360.0 / directions
     places: list[dict[str, Any]] = []
     lines = []
     for press in evaluation.presses:
+        tilted = _tilts_on_lines(press, directions, half_lines, least_pixels)
+        read = {angle: press.colours(chosen, colours) for angle, (chosen, _) in tilted.items()}
+        axis = principal_axis(np.concatenate(list(read.values()))) if dominant == PRESS else None
         fits = {
-            angle: fit(tilts, press.colours(chosen, colours))
-            for angle, (chosen, tilts) in _tilts_on_lines(
-                press, directions, half_lines, least_pixels
-            ).items()
+            angle: fit(tilts if signed else np.abs(tilts), read[angle], axis)
+            for angle, (_, tilts) in tilted.items()
         }
         scores = {f"{angle:g}": fits[_line_of(angle, fits)].linearity for angle in angles}
         places.append(
@@ -229,9 +243,11 @@ def signed_angles(press: Press, angle: float, normals: ArrayLike) -> FloatArray:
     return tilt
 
 
-def fit(angles: ArrayLike, colours: ArrayLike) -> Fit:
-    """Fit the first principal component of colours (m, 3) to angles (m,) in degrees."""
-    x, y = np.asarray(angles, dtype=np.float64), dominant_colour(colours)
+def fit(angles: ArrayLike, colours: ArrayLike, axis: FloatArray | None = None) -> Fit:
+    """Fit the dominant colour of colours (m, 3) to angles (m,) in degrees; see `dominant_colour`
+    for the axis.
+    """
+    x, y = np.asarray(angles, dtype=np.float64), dominant_colour(colours, axis)
     if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:  # constant values have no linear relation
         return Fit(x, y, 0.0, float(y.mean()), 0.0)
     across, up = x - x.mean(), y - y.mean()
@@ -244,13 +260,19 @@ def fit(angles: ArrayLike, colours: ArrayLike) -> Fit:
     )
 
 
-def dominant_colour(colours: ArrayLike) -> FloatArray:
-    """Return the projection (m,) of colours (m, 3) on their first principal component (PCA), about
-    their mean.
+def dominant_colour(colours: ArrayLike, axis: FloatArray | None = None) -> FloatArray:
+    """Return the projection (m,) of colours (m, 3), about their mean, on an axis (3,): their own
+    first principal component if None.
     """
     c = np.asarray(colours, dtype=np.float64)
-    centred = c - c.mean(axis=0)
-    return centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
+    return (c - c.mean(axis=0)) @ (principal_axis(c) if axis is None else axis)
+
+
+def principal_axis(colours: ArrayLike) -> FloatArray:
+    """Return the first principal component (3,) of colours (m, 3), a unit vector (PCA)."""
+    c = np.asarray(colours, dtype=np.float64)
+    first: FloatArray = np.linalg.svd(c - c.mean(axis=0), full_matrices=False)[2][0]
+    return first
 
 
 def _line_of(angle: float, fits: dict[float, Fit]) -> float:

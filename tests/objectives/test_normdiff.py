@@ -61,6 +61,14 @@ def test_at_the_end_of_the_range_the_confusion_is_cut_off() -> None:
     assert np.abs(found.theta_range - expected).max() < 1.5
 
 
+def test_one_pixel_for_each_normal_says_the_same_of_a_smooth_map() -> None:
+    theta, phi = evenly(12_000)
+    colours = np.stack([0.15 * np.exp(0.05 * theta), 0.03 * np.exp(0.02 * phi), 0 * phi], axis=1)
+    mean, one = (confusion(colours, theta, phi, nearest_only=only) for only in (False, True))
+    assert (one.cells == mean.cells).all()
+    assert one.confusion.mean() == pytest.approx(mean.confusion.mean(), rel=0.02)
+
+
 def test_less_noise_confuses_less_and_no_noise_not_at_all() -> None:
     theta, phi = evenly(4000)
     colours = np.stack([0.15 * np.exp(0.05 * theta), 0.03 * np.exp(0.02 * phi), 0 * phi], axis=1)

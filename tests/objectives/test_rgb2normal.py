@@ -89,6 +89,40 @@ def test_a_colour_that_follows_the_angle_scores_one(
     assert halves == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_colour_of_the_unsigned_angle_scores_one_without_signs(
+    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
+) -> None:
+    def colour(normals: np.ndarray) -> np.ndarray:
+        tilt = np.arctan2(np.hypot(normals[:, 0], normals[:, 1]), normals[:, 2])
+        return np.stack([0.2 + 0.2 * tilt, 0 * tilt, 0 * tilt], axis=1)
+
+    evaluation = evaluation_of(make_press(colour, DEPTH))
+    unsigned, _, _ = rgb2normal(evaluation, colours="response", signed=False)
+    assert unsigned == pytest.approx(1.0, abs=1e-3)
+    assert rgb2normal(evaluation, colours="response")[0] < 0.01
+
+
+def test_one_dominant_colour_for_all_lines_is_blind_across_it(
+    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
+) -> None:
+    """Red tells the tilt to the east, and green, less strongly, the tilt to the north: the common
+    dominant colour is red, which is alike on both flanks along the line from south to north."""
+
+    def colour(normals: np.ndarray) -> np.ndarray:
+        east, north = normals[:, 0], normals[:, 1]
+        slope = east**2 + north**2
+        return 0.4 + np.stack([0.5 * east + 0.2 * slope, 0.25 * north, 0 * east], axis=1)
+
+    evaluation = evaluation_of(make_press(colour, DEPTH))
+    _, alone, _ = rgb2normal(evaluation, colours="response")
+    _, shared, _ = rgb2normal(evaluation, colours="response", dominant="press")
+    assert alone["directions"]["90"] > 0.9
+    assert shared["directions"]["0"] > 0.9
+    assert shared["directions"]["90"] < 0.1
+    with pytest.raises(ObjectiveError, match="dominant"):
+        rgb2normal(evaluation, dominant="picture")
+
+
 def test_the_unsigned_angle_would_score_nothing(make_press: Callable[..., Press]) -> None:
     to_lights = lights(0.0, 0.0, 0.0)
     press = make_press(lambda normals: 0.5 * normals @ to_lights.T, DEPTH)
