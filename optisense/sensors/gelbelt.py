@@ -1,11 +1,8 @@
 """GelBelt: a soft belt that runs over two wheels and slides across a fixed acrylic window.
 
-Frame: the origin is the centre of the sensing surface, +z points out of the sensor, x along the
-    belt's motion, y along the wheels' axes. The layers from outside in are: coating, gel, clear
-    tape, an air gap, acrylic, air, camera. The camera is inside the loop of the belt. The green
-    LEDs are at -x.
-y along the wheels' axes. From outside in: coating, gel, clear tape, a film of air, acrylic, air,
-camera. The camera sits inside the loop of the belt. The green LEDs are at -x.
+The origin is the centre of the sensing surface, +z points out of the sensor, x along the belt's
+motion, y along the wheels' axes. The layers from outside in are: coating, gel, clear tape, an air
+gap, acrylic, air, camera. The camera is inside the loop of the belt. The green LEDs are at -x.
 
 The belt is not cast onto the acrylic but slides on it. The air gap between them keeps light that
 enters the side of the acrylic from entering the belt, by total reflection.
