@@ -25,12 +25,15 @@ from optisense.sensors import SENSORS
 from paper.unit import Found
 
 if TYPE_CHECKING:
-    from optisense.optics import OpticalModel
+    from optisense.optics import ChiefRays, OpticalModel
 
 Plain = Mapping[str, Any]
 
 NINE = "nine balls"
 """Name of the contacts that are the balls which objectives press."""
+
+SAME_IMAGES = ("contacts", "untouched image", "untouched radiance", "pressed images")
+"""Values of an evaluation that do not depend on the exposure."""
 
 _keepers: dict[tuple[Any, ...], tuple[SensorDesign, ModelKeeper]] = {}
 _current: dict[tuple[Any, ...], tuple[str, OpticalModel]] = {}
@@ -131,6 +134,7 @@ def scores_by_readings(inputs: Plain, folder: Path) -> Found:
     fixed = Evaluation(model, replace(settings, exposure=automatic.untouched_exposure))
     found = {}
     for exposure, evaluation in zip(inputs["exposures"], (automatic, fixed), strict=True):
+        evaluation.take(automatic, SAME_IMAGES)  # the second one renders nothing
         found[exposure] = {
             objective: {
                 name: _scores({"": evaluate(evaluation, objective, **own)})["scores"][""]
@@ -148,17 +152,26 @@ def stretch(inputs: Plain, folder: Path) -> Found:
     ellipse that belongs to it is 1 where shapes are kept. Tells the median over pixels and the
     ratio that a tenth of them exceeds.
     """
-    rays = _model(inputs["design"]).chief_rays(tuple(inputs["ray_resolution"]))
-    points = rays.points.astype(np.float64)
-    right = (points[:, 1:] - points[:, :-1])[:-1]
-    down = (points[1:] - points[:-1])[:, :-1]
-    whole = rays.hit[:-1, :-1] & rays.hit[:-1, 1:] & rays.hit[1:, :-1]
-    ratios = axes_ratio(right[whole], down[whole])
+    ratios = _stretches(_model(inputs["design"]).chief_rays(tuple(inputs["ray_resolution"])))
     return Found(
         {"median": float(np.median(ratios)), "tenth": float(np.percentile(ratios, 90))}
         if len(ratios)
         else {"median": None, "tenth": None}
     )
+
+
+def median_stretch(rays: ChiefRays) -> float | None:
+    """How much longer than wide a small round thing appears, the median over pixels (`stretch`)."""
+    ratios = _stretches(rays)
+    return float(np.median(ratios)) if len(ratios) else None
+
+
+def _stretches(rays: ChiefRays) -> NDArray[np.float64]:
+    points = rays.points.astype(np.float64)
+    right = (points[:, 1:] - points[:, :-1])[:-1]
+    down = (points[1:] - points[:-1])[:, :-1]
+    whole = rays.hit[:-1, :-1] & rays.hit[:-1, 1:] & rays.hit[1:, :-1]
+    return axes_ratio(right[whole], down[whole])
 
 
 def axes_ratio(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:

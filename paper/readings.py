@@ -8,10 +8,10 @@ combinations of them are scored, and each statement is held against each.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from paper import gelbelt_lights, gelsight360, mini_shapes
+from paper import gelbelt_lights, gelsight360, mini_shapes, mirror_readings
 from paper.claims import Claim, Table
 from paper.evaluations import relit_scores, scores_by_readings, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
@@ -33,7 +33,9 @@ EXPOSURES = ("lowered for bright contacts", "of the untouched skin")
 VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
     "rgb2normal": {
         "signed tilt": {},
+        "unsigned tilt": {"signed": False},
         "half lines": {"half_lines": True},
+        "one dominant colour a press": {"dominant": "press"},
         "linear colours": {"colours": "response"},
     },
     "normdiff": {
@@ -41,6 +43,7 @@ VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
         "noise from end to end": {"noise": 0.15},
         "only the polar angle": {"phi_weight": 0.0},
         "colours of the picture": {"colours": "picture"},
+        "one pixel for each normal": {"nearest_only": True},
     },
 }
 """Readings of both scores: settings by name, the default first."""
@@ -122,16 +125,35 @@ def steps(settings: Values) -> Steps:
         )
         for depth in settings["depths"]
     ]
-    records = yield [*units, *coloured]
+    mirrors = mirror_readings.units(settings)
+    records = yield [*units, *coloured, *mirrors.values()]
     keys = [(name, law, depth) for depth in settings["depths"] for name, law, _ in designs]
     answers = dict(zip(keys, records, strict=False))
-    tips = dict(zip(settings["depths"], records[len(units) :], strict=True))
-    held: dict[str, list[bool | None]] = {}
+    tips = dict(zip(settings["depths"], records[len(units) : -len(mirrors)], strict=True))
     options = factors(settings)
-    for reading in itertools.product(*options.values()):
-        for claim in _claims_under(reading, settings, answers, tips):
+    pressed = (
+        _claims_under(reading, settings, answers, tips)
+        for reading in itertools.product(*options.values())
+    )
+    mirror = (
+        [_named("GelSight Svelte", each) for each in mirror_readings.claims_of(record)]
+        for record in records[-len(mirrors) :]
+    )
+    return Finding({**_held(options, pressed), "mirror": _held(mirror_readings.factors(), mirror)})
+
+
+def _held(options: dict[str, tuple[str, ...]], found: Iterable[list[Claim]]) -> Values:
+    """The factors, and whether each statement holds under each reading, in the readings' order."""
+    held: dict[str, list[bool | None]] = {}
+    for claims_found in found:
+        for claim in claims_found:
             held.setdefault(claim.says, []).append(claim.holds)
-    return Finding({"factors": {name: list(each) for name, each in options.items()}, "held": held})
+    return {"factors": {name: list(each) for name, each in options.items()}, "held": held}
+
+
+def _groups(numbers: Values) -> list[Values]:
+    """The statements on pressed balls, and those on the mirror, each with their factors."""
+    return [{key: numbers[key] for key in ("factors", "held")}, numbers["mirror"]]
 
 
 def _claims_under(
@@ -187,7 +209,8 @@ def _named(what: str, claim: Claim) -> Claim:
 def claims(numbers: Values) -> list[Claim]:
     """Each statement: true under all readings, under none, or hanging on the reading."""
     found = []
-    for says, row in numbers["held"].items():
+    rows = [item for group in _groups(numbers) for item in group["held"].items()]
+    for says, row in rows:
         told = [holds for holds in row if holds is not None]
         count = sum(told)
         agrees = None if not told or 0 < count < len(row) else count == len(row)
@@ -217,23 +240,24 @@ def _readings(numbers: Values) -> list[Reading]:
 
 def tables(numbers: Values) -> list[Table]:
     """How many statements hold with each option, and with which options each statement holds."""
-    held, readings = numbers["held"], _readings(numbers)
-    rows, shares = [], [[says] for says in held]
-    for place, (factor, options) in enumerate(numbers["factors"].items()):
-        cells: list[list[str]] = [[] for _ in held]
-        for option in options:
-            alone = readings.index((*readings[0][:place], option, *readings[0][place + 1 :]))
-            among = [k for k, reading in enumerate(readings) if reading[place] == option]
-            parts = [sum(row[k] is True for k in among) / len(among) for row in held.values()]
-            count = sum(row[alone] is True for row in held.values())
-            mean = sum(parts) / max(1, len(parts))
-            rows.append([factor, option, f"{count} of {len(held)}", f"{100 * mean:.0f} %"])
-            for cell, part in zip(cells, parts, strict=True):
-                cell.append(f"{100 * part:.0f}")
-        for line, cell in zip(shares, cells, strict=True):
-            line.append(" / ".join(cell))
-    counts = _counts(held)
-    most = max(counts)
+    rows, best, shares = [], [], []
+    for group in _groups(numbers):
+        held = group["held"]
+        counts = _counts(held)
+        names = list(group["factors"])
+        reading = _readings(group)[counts.index(max(counts))]
+        said = ", ".join(f"{name}: {each}" for name, each in zip(names, reading, strict=True))
+        best.append([f"{max(counts)} of {len(held)}", said])
+        own, cells = _by_option(group)
+        rows += own
+        shares.append(
+            Table(
+                "Share of readings under which each statement holds, %, by the options in the "
+                "order of the first table",
+                ["statement", *names],
+                [[says, *cell] for says, cell in zip(held, cells, strict=True)],
+            )
+        )
     return [
         Table(
             "Statements that hold with one option changed from the default, and the share of "
@@ -242,17 +266,33 @@ def tables(numbers: Values) -> list[Table]:
             rows,
         ),
         Table(
-            "The reading with which most statements hold",
-            ["statements", *numbers["factors"]],
-            [[f"{most} of {len(held)}", *readings[counts.index(most)]]],
+            "The readings with which most statements on pressed balls and on the mirror hold",
+            ["statements", "reading"],
+            best,
         ),
-        Table(
-            "Share of readings under which each statement holds, %, by the options in the order "
-            "of the first table",
-            ["statement", *numbers["factors"]],
-            shares,
-        ),
+        *shares,
     ]
+
+
+def _by_option(group: Values) -> tuple[list[list[str]], list[list[str]]]:
+    """A row for each option of each factor, and for each statement a cell for each factor."""
+    held, readings = group["held"], _readings(group)
+    rows: list[list[str]] = []
+    cells: list[list[str]] = [[] for _ in held]
+    for place, (factor, options) in enumerate(group["factors"].items()):
+        shown: list[list[str]] = [[] for _ in held]
+        for option in options:
+            alone = readings.index((*readings[0][:place], option, *readings[0][place + 1 :]))
+            among = [k for k, reading in enumerate(readings) if reading[place] == option]
+            parts = [sum(row[k] is True for k in among) / len(among) for row in held.values()]
+            count = sum(row[alone] is True for row in held.values())
+            mean = sum(parts) / max(1, len(parts))
+            rows.append([factor, option, f"{count} of {len(held)}", f"{100 * mean:.0f} %"])
+            for cell, part in zip(shown, parts, strict=True):
+                cell.append(f"{100 * part:.0f}")
+        for line, cell in zip(cells, shown, strict=True):
+            line.append(" / ".join(cell))
+    return rows, cells
 
 
 def _counts(held: dict[str, list[bool | None]]) -> list[int]:
@@ -268,8 +308,9 @@ def notes(numbers: Values) -> list[str]:
         "Every combination of the options is one reading. *Cannot be told* means here that a "
         "statement holds under some readings and not under others. Law, exposure and the readings "
         "of RGB2Normal are varied for GelSight Mini and GelBelt; for GelSight360's colourings, "
-        "which are computed from layers, depth and NormDiff are. The mirror of GelSight Svelte is "
-        "searched between flat and most curved, as the paper says, in the experiment of its own. "
+        "which are computed from layers, depth and NormDiff are. The bounds of the mirror and the "
+        "part of the skin are varied for GelSight Svelte, whose mirror is searched by gradient "
+        "here. "
         "Defaults follow the paper's words and not this table. With few specularities a statement "
         "on the best one may hold by chance: a quick run has three."
     ]

@@ -64,6 +64,9 @@ def values(unit: Unit, score: Score) -> dict[str, Any]:
         return {name: {"error": 1.0, "guess": 5.0, "snr": 4.0} for name in asked["tasks"]}
     if kind == "searched":
         return searched(asked, score)
+    if kind == "bent_mirror":
+        first = {"aoap": 0.24, "stretch": 1.2}
+        return {"first": first, "best": {"aoap": 0.63, "stretch": 1.1}, "trials": 10}
     assert kind == "image_times"
     sizes = len(asked["resolutions"])
     times = [[[2.0 + 0.1 * k, 3.9]] * sizes for k in range(len(asked["seeds"]))]

@@ -181,9 +181,11 @@ def test_readings_tell_what_decides(answered: Answered) -> None:
     finding, _ = answered(experiment, experiment.settings(True), by_law)
     claim = next(c for c in experiment.claims(finding.numbers) if "about 0.2" in c.says)
     assert claim.verdict == "cannot be told"
-    assert claim.here.startswith("holds under 48 of 144 readings; as read here it does not hold")
+    assert claim.here.startswith("holds under 100 of 300 readings; as read here it does not hold")
     row = next(r for r in experiment.tables(finding.numbers)[2].rows if "about 0.2" in r[0])
-    assert row[1:] == ["0 / 0 / 100", "33 / 33", "33 / 33", "33 / 33 / 33", "33 / 33 / 33 / 33"]
+    assert row[1:] == ["0 / 0 / 100", "33 / 33", "33 / 33", *[" / ".join(["33"] * 5)] * 2]
+    mirror = next(r for r in experiment.tables(finding.numbers)[3].rows if "0.635" in r[0])
+    assert mirror[1:] == ["100 / 100", "100 / 100"]
 
 
 def test_a_slow_image_on_a_busy_machine_tells_nothing(answered: Answered) -> None:

@@ -1,0 +1,137 @@
+"""GelSight Svelte's mirror under readings of what its search may change, and of its skin.
+
+The OptiSense paper bends the mirror "between flat and most curved", and considers "a simplified
+sensing surface" and "the centre of the sensing surface" first. Each choice is searched by gradient,
+which needs few trials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from optisense.design import SensorDesign
+from optisense.geometry import TriangleMesh
+from optisense.optics import OpticalModel
+from paper.claims import Claim
+from paper.evaluations import design_of, median_stretch, sensor, tuples
+from paper.experiment import Values
+from paper.spread import spread
+from paper.svelte_mirror import SENSOR
+from paper.svelte_mirror import claims as mirror_claims
+from paper.unit import Found, Record, Unit
+
+SPACES: dict[str, dict[str, dict[str, Any]]] = {
+    "between flat and most curved": {"cages.M1.blend": {"between": [0.0, 1.0]}},
+    "8 mm to either side": {
+        "cages.M1.points.x": {"around": 8.0},
+        "cages.M1.points.y": {"around": 1.0},
+        "cages.M1.points.z": {"around": 2.0},
+    },
+}
+"""What the search may change; the second is that of the case study in docs/case-studies.md."""
+
+SKINS = ("whole", "middle third")
+"""Which part of the skin is the sensing surface; the paper does not say how it is simplified."""
+
+LEAST_PICTURE = 0.1
+"""Smallest share of the pixels that must see the sensing surface: a third of the skin is in 18 % of
+the picture at the start, where the usual limit is 20 %."""
+
+
+def factors() -> dict[str, tuple[str, ...]]:
+    """Options of each factor, the default first, in the order of `units`."""
+    return {"the mirror bends": tuple(SPACES), "part of the skin": SKINS}
+
+
+def units(settings: Values) -> dict[tuple[str, str], Unit]:
+    """Return the search of the mirror under each reading of bounds and skin."""
+    return {
+        (bounds, skin): Unit(
+            bent_mirror,
+            {
+                "design": sensor(SENSOR),
+                "skin": skin,
+                "space": space,
+                "budget": settings["mirror_trials"],
+                "settings": {
+                    "ray_resolution": settings["mirror_resolution"],
+                    "least_picture": LEAST_PICTURE,
+                },
+            },
+            f"Svelte's mirror, {bounds}, {skin} of the skin",
+        )
+        for bounds, space in SPACES.items()
+        for skin in SKINS
+    }
+
+
+def bent_mirror(inputs: Mapping[str, Any], folder: Path) -> Found:
+    """A search of the mirror by AOAP: `design`, `skin` (one of `SKINS`), `space`, `budget`,
+    `settings`.
+
+    Tells AOAP and the stretch of round things for the start and for the best trial.
+    """
+    from optisense.search import Around, search
+
+    design = design_of(inputs["design"])
+    if inputs["skin"] == SKINS[1]:
+        crop_to_middle(design)
+    space = {
+        path: Around(each["around"]) if "around" in each else tuple(each["between"])
+        for path, each in inputs["space"].items()
+    }
+    study = folder / "study"
+    result = search(
+        design,
+        space,
+        "aoap",
+        method="gradient",
+        budget=inputs["budget"],
+        settings=tuples(inputs["settings"]),
+        out=study,
+        resume=(study / "study.json").is_file(),
+    )
+    if result.interrupted:
+        raise KeyboardInterrupt
+    size = tuple(inputs["settings"]["ray_resolution"])
+    found = {
+        name: {
+            "aoap": trial.score,
+            "stretch": median_stretch(OpticalModel(trial.design).chief_rays(size)),
+        }
+        for name, trial in (("first", result.start), ("best", result.best))
+    }
+    result.study.close()
+    return Found({**found, "trials": len(result.trials) - 1})
+
+
+def crop_to_middle(design: SensorDesign) -> None:
+    """Keep the middle third of the skin along the finger (z)."""
+    mesh = design.meshes["skin"]
+    heights = mesh.vertices[mesh.faces].mean(axis=1)[:, 2]
+    low, high = mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()
+    third = (high - low) / 3.0
+    faces = mesh.faces[(heights > low + third) & (heights < high - third)]
+    used, numbers = np.unique(faces, return_inverse=True)
+    design.meshes["skin"] = TriangleMesh(
+        mesh.vertices[used], numbers.reshape(-1, 3).astype(np.int32)
+    )
+
+
+def claims_of(record: Record) -> list[Claim]:
+    """The paper's statements on the mirror, held against one search."""
+    found = record.values
+    nothing = {"aoap": None, "stretch": None}
+    first, best = found.get("first", nothing), found.get("best", nothing)
+    row = {key: spread([best[key]]) for key in nothing}
+    mirrors = {
+        "first": {key: spread([first[key]]) for key in nothing},
+        "cma-es": row,
+        "gradient": row,
+    }
+    course = [[0.0] * (found.get("trials", 0) + 1)]
+    return mirror_claims({"mirrors": mirrors, "courses": {"cma-es": course, "gradient": course}})
