@@ -54,7 +54,8 @@ def test_the_best_by_full_scores_is_found_although_coarse_ones_are_biased(
     promoted = [trial for trial in result.trials if trial.fresh and not trial.is_start]
     assert len(promoted) <= LEAST_MOST < len(result.trials) / 3
     assert result.best.values["coating.specularity"] == pytest.approx(BEST, abs=0.06)
-    assert len(result.best.fresh) == len(result.start.fresh) == 3
+    assert len(result.best.fresh) == 3
+    assert len(result.start.fresh) == 1  # it is so far behind that one score tells
     assert result.best.fresh_score() == max(trial.fresh_score() for trial in promoted)
     least = min(trial.score for trial in promoted)
     left = [trial.score for trial in result.trials if not trial.fresh]

@@ -46,6 +46,9 @@ design, so that only the better one is promoted: the last trials of CMA-ES are n
 def promote(study: Study, work: Work) -> None:
     """Give the start and the promising trials of a study full scores with fresh seeds.
 
+    The start gets one full score, and further ones only if chance may be why it is worse than the
+    trial that leads.
+
     Scores that exist are kept, so that a study that was stopped meanwhile goes on.
 
     Args:
@@ -63,14 +66,23 @@ def promote(study: Study, work: Work) -> None:
         if not batch:
             break
         waiting = waiting[len(batch) :]
-        further = len(seeds[1:]) * (1 + len(start))
+        further = len(seeds[1:])
         promoted += _scored(batch, seeds[:1], work, further)
         if start:
             start = _scored(start, seeds[:1], work, further)
     while (leader := _leader(promoted)) is not None and len(leader.fresh) < len(seeds):
         others = [trial for trial in promoted if trial.number != leader.number]
-        start = _scored(start, seeds, work)
         promoted = [*_scored([leader], seeds, work), *others]
+    if start and leader is not None and _may_be_as_good(start[0], leader):
+        _scored(start, seeds, work)
+
+
+def _may_be_as_good(trial: Trial, leader: Trial) -> bool:
+    """Return whether chance may be why a trial with one full score is worse than the leader, whose
+    scores tell by how much two scores of a design differ.
+    """
+    chance = SURE * math.sqrt(2.0) * leader.fresh_spread()
+    return trial.fresh_score() > leader.fresh_score() - chance
 
 
 def _promising(promoted: Sequence[Trial], batch: Sequence[Trial]) -> list[Trial]:
