@@ -14,7 +14,7 @@ from pydantic import Field
 from optisense.commands.ledger import LedgerOptions
 from optisense.commands.options import MOST_PIXELS
 from optisense.commands.rendering import RenderOptions
-from optisense.design import LightGroup, SensorDesign
+from optisense.design import LightGroup, SensorDesign, set_value
 from optisense.engine.contacts import (
     AnyContact,
     contacts_of,
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
 DRAFT_WIDTH = 160
 """Width of a draft, in pixels; it has a quarter of the pixels of an image that is 320 pixels wide.
 """
+
+NUDGE = 1e-3
+"""Distance (mm) by which a light is moved to prepare drafts of moved lights; any other one does."""
 
 MOST_PLACES = 100
 """Largest number of places of one ledger; each takes as long as the ledger."""
@@ -128,7 +131,13 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
         model.render(contacts_of(["sphere:1.5@0,0:0.2"]), size, photons="draft")
     if fields.drafts:
         job.progress(0.8, "getting drafts ready")
-        session.renderer.draft_model(design).render((), size, photons="draft")
+        drafts = session.renderer.draft_model(design)
+        drafts.render((), size, photons="draft")
+        job.progress(0.9, "getting drafts of moved lights ready")
+        name, group = next(iter(design.lights.items()))
+        x = group.lights[0].position[0] + NUDGE
+        drafts.set_design(set_value(design, f"lights.{name}.lights[0].position.x", x))
+        drafts.render((), size, photons="draft")
     return {"seconds": round(time.perf_counter() - began, 3)}
 
 

@@ -8,8 +8,8 @@ out) and only becomes less efficient. Contacts are pressed in coarsely and get f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -20,19 +20,30 @@ from optisense.design import SensorDesign
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.optics.imaging.tactile_image import TactileImage
-from optisense.optics.model import OpticalModel
+from optisense.optics.model import OpticalModel, Sight
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore
 from optisense.optics.scene.assembly import assemble
-from optisense.optics.scene.ray_scene import Piece
+from optisense.optics.scene.emitters import emitter_table
+from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.scene.surfaces import SurfaceKind
 from optisense.optics.skin_view import VIEW_RESOLUTION, SkinView
+from optisense.quality import photons_of
 
 DRAFT_CELL_SCALE = 2.4
 """Ratio of a draft's cell size to that of a full image. With the few photons of a draft, wider
 cells give a smaller error against the full image: 9 % instead of 14 % with cells half as wide. They
 also take much less time to smooth."""
 
+
+DRAFT_PILOT_PHOTONS = 60_000
+"""Number of photons of a draft's pilot pass, a fifth of that of a full image, as no more than a
+draft's photons follow the emission guide."""
+
+DRAG_PHOTONS = 0.5
+"""Share of a draft's photons that are traced while something moves; a draft of all photons follows
+at rest."""
 
 PLACED_CONTACTS = 64
 """Number of contacts whose placed meshes a draft keeps: more than the presses of any objective, and
@@ -60,30 +71,83 @@ class _Shown:
     kept: bool
 
 
+@dataclass
+class _Kept:
+    """What drafts keep while only lights move: the camera's view of the sensor, and the sensor
+    without the windows of the lights that move.
+    """
+
+    sight: Sight
+    unlit: tuple[list[Piece], RayScene] | None = None
+
+    def lit_by(self, moved: frozenset[int], scenes: SensorScenes) -> LitScene:
+        """Return the sensor with the light groups ``moved`` alone, without their windows.
+
+        The groups are numbered from 0 in the order of their numbers; the others get the numbers
+        that follow.
+        """
+        order = sorted(moved)
+        emitters = scenes.assembly.emitters
+        numbers = [
+            number
+            for number, piece in enumerate(scenes.pieces)
+            if piece.surface.kind is not SurfaceKind.LIGHT
+            or emitters[piece.surface.light].group not in moved
+        ]
+        pieces = [scenes.pieces[number] for number in numbers]
+        if self.unlit is None or not _same(self.unlit[0], pieces):
+            self.unlit = pieces, RayScene(pieces, numbers, scenes.table)
+        place = {group: number for number, group in enumerate(order)}
+        renamed = [replace(e, group=place.get(e.group, len(order))) for e in emitters]
+        return LitScene(
+            self.unlit[1].with_table(scenes.table),
+            scenes.opaque,
+            emitter_table(renamed, len(order)),
+            scenes.coloured,
+            scenes.roughness,
+        )
+
+
 class DraftCacheStore(CacheStore):
     """Store of radiance caches in coarse cells that reuses data of the store before it."""
 
     cell_size = DRAFT_CELL_SCALE * CELL_SIZE
     thorough = False
+    pilot_photons = DRAFT_PILOT_PHOTONS
     uses_pilot = False  # saves half of the tracing time, for some per cent on flanks of contacts
 
     def __init__(
-        self, lit: LitScene, seen: NDArray[np.floating], before: DraftCacheStore | None
+        self,
+        lit: LitScene,
+        seen: NDArray[np.floating],
+        before: DraftCacheStore | None,
+        groups: Iterable[int] | None = None,
     ) -> None:
-        """Create an empty store; `before` is the store of the previous design, if there is one."""
+        """Create an empty store.
+
+        Args:
+            lit: the sensor.
+            seen: (n, 3) points (mm) that the camera sees.
+            before: the store of the previous design, if there is one.
+            groups: the light groups whose light is traced; all groups if None.
+        """
         super().__init__(lit, seen)
+        self.groups = None if groups is None else frozenset(groups)
         self.seen = seen
         self.has_old_cells = False
         """Whether the surface cells are those of a shape before."""
         self._learned_on = self._divided = lit.opaque
+        self.most_groups = lit.table.groups
+        """Number of light groups for which the surface cells are large enough."""
         if before is None:
             return
         off = _apart(lit.opaque, before._divided)
         same_view = seen is before.seen or np.array_equal(seen, before.seen)
-        same_groups = lit.table.groups == before._lit.table.groups
-        if off < CELL_TOLERANCE and same_view and same_groups:
+        # Cells are larger for more groups, and those of all groups do for some of them.
+        if off < CELL_TOLERANCE and same_view and lit.table.groups <= before.most_groups:
             self._cells, self._kernels = before._cells, before._kernels
             self._divided, self.has_old_cells = before._divided, off > 0.0
+            self.most_groups = before.most_groups
         if before.has_guide_for(lit):
             self._guide, self._learned_on = before._guide, before._learned_on
 
@@ -129,6 +193,10 @@ class DraftModel(OpticalModel):
         self._rest: dict[str, TriangleMesh] = {}
         self._bent: dict[str, TriangleMesh] = {}
         self._before: DraftCacheStore | None = None
+        self._moved: frozenset[int] | None = None
+        self._kept: _Kept | None = None
+        self._faint: dict[str, NDArray[np.float32]] = {}
+        """The faint light (`KnownView.faint`) of each group that drafts reuse."""
         self._shown: _Shown | None = None
         super().__init__(self._straightened(design), variant)
 
@@ -144,45 +212,81 @@ class DraftModel(OpticalModel):
     def render(self, contacts: Sequence[Contact] = (), *args: Any, **kwargs: Any) -> TactileImage:
         """Render a draft; see `OpticalModel.render`.
 
-        If only lights have moved since the previous draft, the layers of the other light groups are
-        reused. This ignores the shadows that moved lights cast in the light of the others. A second
-        request for the same draft renders it completely, with its media resolved;
-        ``settings["kept_layers"]`` and ``settings["kept_media"]`` record what was reused.
+        If the design has changed since the previous draft, fewer photons are traced, and the light
+        that interfaces, or contacts and skin, reflect to each other is taken to be the same share
+        of the light. If only lights have moved, the layers of the other light groups and the
+        visible points are reused, and photons pass through the windows of the moved lights. This
+        ignores the shadows that moved lights cast. A second request for the same draft renders it
+        completely, with its media resolved; ``settings["kept_layers"]``,
+        ``settings["kept_view"]`` and ``settings["kept_media"]`` record what was reused.
         """
         asked = tuple(contacts), args, {k: v for k, v in kwargs.items() if k != "progress"}
         before = self._shown if self._shown is not None and self._shown.asked == asked else None
         moved = None if before is None else _moved(before.design, self.design)
-        if before is not None and not moved:  # no light moved, or more than lights
-            if moved is not None and not before.kept:
+        still = moved is not None and not moved
+        if before is not None and still:
+            if not before.kept:
                 return self._relit(before.image)
-            if moved is not None:
-                self._resolve()
+            self._resolve()
             moved = None
         self._shown = None
-        self._store.groups = moved
+        if moved != self._moved and self._caches is not None:  # of other light groups
+            self._before, self._caches = self._draft_store, None
+        self._moved = moved
+        if moved is None:
+            self._kept = None
+        if before is None or not _same_picture(before.design, self.design) or still:
+            self._faint = {}
+        elif "photons" in kwargs:
+            kwargs["photons"] = round(DRAG_PHOTONS * photons_of(kwargs["photons"]))
         image = super().render(contacts, *args, **kwargs)
-        kept = [] if moved is None else [n for k, n in enumerate(self.groups) if k not in moved]
-        if before is not None:
-            for name in kept:
-                image.unit_layers[name] = before.image.unit_layers[name]
+        if not self._faint and self._kept is not None and self._kept.sight.known.faint is not None:
+            self._faint = dict(zip(self.groups, self._kept.sight.known.faint, strict=True))
+        kept: list[str] = []
+        if before is not None and moved is not None:
+            kept = [name for k, name in enumerate(self.groups) if k not in moved]
+            layers = before.image.unit_layers | image.unit_layers
+            image.unit_layers = {name: layers[name] for name in self.groups}
             image = self._relit(image)
         bent = self.scenes.assembly.media.bent or self._has_old_cells
-        image.settings |= {"kept_layers": kept, "kept_media": bent}
+        view = before is not None and bool(self._faint) and not still
+        image.settings |= {"kept_layers": kept, "kept_view": view, "kept_media": bent}
         if not image.interrupted:
-            self._shown = _Shown(asked, self.design, image, bent or bool(kept))
+            self._shown = _Shown(asked, self.design, image, bent or view)
         return image
 
     @property
+    def _traced_groups(self) -> list[str]:
+        names = self.groups
+        return names if self._moved is None else [names[k] for k in sorted(self._moved)]
+
+    def _sight(
+        self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
+    ) -> Sight:
+        if self._moved is None or self._kept is None:
+            self._kept = _Kept(super()._sight(contacts, resolution, skin))
+        known = self._kept.sight.known
+        known.faint = None
+        if self._faint:
+            known.faint = np.stack([self._faint[name] for name in self._traced_groups])
+        return self._kept.sight
+
+    @property
+    def _draft_store(self) -> DraftCacheStore | None:
+        return self._caches if isinstance(self._caches, DraftCacheStore) else None
+
+    @property
     def _has_old_cells(self) -> bool:
-        return isinstance(self._caches, DraftCacheStore) and self._caches.has_old_cells
+        return self._draft_store is not None and self._draft_store.has_old_cells
 
     def _resolve(self) -> None:
         """Resolve media that were only moved along with bent parts, and divide bent surfaces into
         cells.
         """
-        if isinstance(self._caches, DraftCacheStore) and self._caches.has_old_cells:
-            self._caches.forget_cells()
-            self._before, self._caches = self._caches, None
+        store = self._draft_store
+        if store is not None and store.has_old_cells:
+            store.forget_cells()
+            self._before, self._caches = store, None
         if self.scenes.assembly.media.bent:
             assembly = assemble(self.design, self.scenes.assembly)
             scenes = SensorScenes(assembly, self.design.coating, self.scenes)
@@ -195,12 +299,16 @@ class DraftModel(OpticalModel):
         )
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
-        if isinstance(self._caches, DraftCacheStore):
-            self._before = self._caches
+        self._before = self._draft_store or self._before
         super()._set(design, scenes, view)
 
     def _new_store(self) -> DraftCacheStore:
-        lit, before = LitScene.of(self.scenes), self._before
+        before = self._before
+        if self._moved is not None and self._kept is not None and before is not None:
+            lit = self._kept.lit_by(self._moved, self.scenes)
+            if before.has_guide_for(lit):
+                return DraftCacheStore(lit, before.seen, before, range(len(self._moved)))
+        lit = LitScene.of(self.scenes)
         if before is not None and before.has_guide_for(lit):
             return DraftCacheStore(lit, before.seen, before)
         rays = self.chief_rays(VIEW_RESOLUTION)
@@ -237,10 +345,14 @@ def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
     )
 
 
-def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
-    """Return the numbers of the light groups that differ in more than flux and colour.
+def _same_picture(one: SensorDesign, other: SensorDesign) -> bool:
+    """Return whether two designs have the same camera and light groups."""
+    return one.camera == other.camera and list(one.lights) == list(other.lights)
 
-    The result is None if all groups differ, or if anything other than lights differs.
+
+def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
+    """Return the numbers of the light groups that differ in more than flux and colour; None if
+    anything other than lights differs.
     """
     if (
         list(one.lights) != list(other.lights)
@@ -249,12 +361,16 @@ def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
     ):
         return None
     pairs = zip(one.lights.values(), other.lights.values(), strict=True)
-    moved = frozenset(
+    return frozenset(
         k
         for k, (a, b) in enumerate(pairs)
         if (a.model, a.emitter, a.lights) != (b.model, b.emitter, b.lights)
     )
-    return None if len(moved) == len(one.lights) else moved
+
+
+def _same(one: list[Piece], other: list[Piece]) -> bool:
+    """Return whether lists hold the same objects."""
+    return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))
 
 
 def _apart(one: list[Piece], other: list[Piece]) -> float:

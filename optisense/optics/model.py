@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import drjit as dr
 import numpy as np
@@ -21,6 +21,7 @@ from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
+from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
 from optisense.optics.radiance_cache.lit_scene import LitScene
@@ -60,6 +61,27 @@ class RenderProgress:
     photons: int
     noise: float | None
     seconds: float
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What the camera sees of a sensor with contacts, before its light is known.
+
+    Attributes:
+        camera: the camera.
+        placed: meshes of the contacts' indenters in the design's frame, mm.
+        pressed: the elastic skin under the contacts; None without one.
+        scenes: the sensor with its contacts.
+        rays: the chief rays.
+        known: parts of the image that drafts reuse.
+    """
+
+    camera: RayCamera
+    placed: list[TriangleMesh]
+    pressed: PressedSkin | None
+    scenes: ContactScenes
+    rays: ChiefRays
+    known: KnownView = field(default_factory=KnownView)
 
 
 class OpticalModel(RayModel):
@@ -187,17 +209,9 @@ class OpticalModel(RayModel):
                 )
 
         on_stage(Stage.PREPARING, 0.0, 0, None)
-        camera = self.camera(resolution)
-        placed = [self.place(contact) for contact in contacts]
-        pressed = None
-        if contacts and skin == ELASTIC:
-            pressed = self.pressed(contacts, placed)
-            scenes = self._deformed_scenes(contacts, placed)
-        else:
-            scenes = self.scenes.touched(contacts, placed)
-        rays = trace_chief_rays(scenes.full, camera)
-        if not rays.hit.any():
-            raise sees_nothing(rays)
+        sight = self._sight(contacts, resolution, skin)
+        camera, rays, scenes = sight.camera, sight.rays, sight.scenes
+        placed, pressed = sight.placed, sight.pressed
         built = time.perf_counter()
 
         if estimator == SPPM:
@@ -207,27 +221,29 @@ class OpticalModel(RayModel):
             wanted = number
             if number is None and noise is None and seconds is None:
                 wanted = PICTURE_PHOTONS
-            field = self._store.field(
+            store = self._store
+            light = store.field(
                 seed, wanted, target, seconds, MAX_PHOTONS, began, on_stage, partial
             )
             lit = time.perf_counter()
-            on_stage(Stage.SHADING, 1.0, field[0].photons, field[0].noise)
+            on_stage(Stage.SHADING, 1.0, light[0].photons, light[0].noise)
             layers = render_cached(
-                field,
+                light,
                 scenes,
                 camera,
                 rays,
-                self.scenes.assembly.emitters,
+                store.emitters,
                 self.scenes.assembly.light_areas,
                 seed,
                 only_contacts,
                 pixel_importance,
                 self.is_draft,
+                sight.known if self.is_draft else None,
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()
         on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
-        units = dict(zip(self.groups, layers.radiance, strict=True))
+        units = dict(zip(self._traced_groups, layers.radiance, strict=True))
         markers = None
         if self.design.markers is not None:
             factor, markers = self._marked(layers, pressed, camera)
@@ -273,6 +289,28 @@ class OpticalModel(RayModel):
             "versions": versions(self.variant),
         }
         return image
+
+    def _sight(
+        self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
+    ) -> Sight:
+        """Press the contacts, and trace the chief rays of an image; see `render`."""
+        camera = self.camera(resolution)
+        placed = [self.place(contact) for contact in contacts]
+        pressed = None
+        if contacts and skin == ELASTIC:
+            pressed = self.pressed(contacts, placed)
+            scenes = self._deformed_scenes(contacts, placed)
+        else:
+            scenes = self.scenes.touched(contacts, placed)
+        rays = trace_chief_rays(scenes.full, camera)
+        if not rays.hit.any():
+            raise sees_nothing(rays)
+        return Sight(camera, placed, pressed, scenes, rays)
+
+    @property
+    def _traced_groups(self) -> list[str]:
+        """The names of the light groups whose layers are rendered."""
+        return self.groups
 
     def _marked(
         self, layers: ImageLayers, pressed: PressedSkin | None, camera: RayCamera

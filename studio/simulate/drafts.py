@@ -30,6 +30,8 @@ earlier request would be replaced by newer ones, each of which costs both proces
 """
 REST = 0.3
 """Time without a change after which a draft that reused earlier results is made anew, s."""
+REUSED = ("kept_layers", "kept_view", "kept_media")
+"""Settings of a draft that tell whether it reused earlier results."""
 
 _open: list[Request] = []
 _wanted = False
@@ -110,7 +112,7 @@ def _take(result: dict[str, Any]) -> None:
     if session.state().note.startswith(NONE):
         session.state().note = ""
     settings = result["settings"]
-    if (settings.get("kept_layers") or settings.get("kept_media")) and not _wanted:
+    if any(settings.get(each) for each in REUSED) and not _wanted:
         _again = time.monotonic() + REST
 
 

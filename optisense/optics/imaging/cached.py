@@ -23,6 +23,7 @@ from optisense.optics.imaging.contact_light import (
     mirrored_contact_layers,
 )
 from optisense.optics.imaging.film import REFERENCE_WIDTH, Film, repeated
+from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
@@ -173,6 +174,7 @@ def render_cached(
     only_contacts: bool = False,
     pixel_importance: PixelImportance | None = None,
     draft: bool = False,
+    known: KnownView | None = None,
 ) -> ImageLayers:
     """Shade an image from a radiance cache: one sample per pixel, more in and around contacts.
 
@@ -188,6 +190,7 @@ def render_cached(
         pixel_importance: function that gives, with ``only_contacts``, the share of the samples of
             each pixel; a pixel gets at least `MIN_PIXEL_SAMPLES`.
         draft: whether few samples are taken in contacts and grain is not resampled.
+        known: parts of an earlier draft that are reused, to which those that are missing are added.
     """
     began = time.perf_counter()
     field, interrupted = light
@@ -217,13 +220,24 @@ def render_cached(
             mirrored.count(pixel)
             glints.count(pixel)
         for channel in scenes.full.channels:
-            main, reflected = find_visible_points(
-                scenes.full, camera, pixel, number, spots, own, again, channel
-            )
+            points = None
+            if known is not None and not again:
+                points = known.points.get((thorough, sparse, channel))
+            if points is None:
+                only_main = again or faint_known
+                points = find_visible_points(
+                    scenes.full, camera, pixel, number, spots, own, only_main, channel
+                )
+                if known is not None and not again:
+                    known.points[thorough, sparse, channel] = points
+            main, reflected = points
+            if faint_known:
+                reflected = None
             if thorough:
-                direct, exchanged = shade_in_contacts(field, scenes, main)
+                direct, exchanged = shade_in_contacts(field, scenes, main, not faint_known)
                 film.add(main, direct)
-                between.add(main, exchanged)
+                if exchanged is not None:
+                    between.add(main, exchanged)
             else:
                 film.add(main, shade(field, scenes, culled_beams, main, False))
             film.add_light(main, emitters, areas)
@@ -231,6 +245,8 @@ def render_cached(
                 mirrored.add(reflected, shade(field, scenes, culled_beams, reflected, True))
                 glints.add_light(reflected, emitters, areas)
 
+    sparse = False
+    faint_known = known is not None and known.faint is not None
     region_image = np.where(rays.hit, rays.region, 0)
     mask = region_image == Region.INDENTER
     near = np.zeros_like(mask)
@@ -314,17 +330,22 @@ def render_cached(
                 sample(pixel, number, False, again=True)
                 layers = film.layers(width, height) + reflections
             fill(layers, alike)
+    if reflections is None:
+        reflections = mirrored.layers(width, height) + glints.without_specks(width, height, near)
+        layers = None
     if layers is None:
-        if reflections is None:
-            reflections = mirrored.layers(width, height) + glints.without_specks(
-                width, height, near
-            )
         layers = film.layers(width, height) + reflections
-    if near.any():
+    main_light = None if known is None else layers - reflections
+    if near.any() and not faint_known:
         reach = 1
         if field.metallic and not field.narrow_lobes:
             reach = round(BETWEEN_REACH * width) | 1
         layers = layers + between.spread_layers(width, height, [(mask, reach)])
+    if known is not None and main_light is not None:
+        if known.faint is None:
+            known.keep_faint(main_light, layers - main_light)
+        else:
+            layers = known.with_faint(main_light)
     if beside is not None:
         layers = layers + beside
     if mirrored_contacts is not None:

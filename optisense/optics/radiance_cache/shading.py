@@ -43,8 +43,8 @@ cheap."""
 
 
 def shade_in_contacts(
-    field: RadianceCache, scenes: ContactScenes, points: VisiblePoints
-) -> tuple[list[mi.Color3f], list[mi.Color3f]]:
+    field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, interreflection: bool = True
+) -> tuple[list[mi.Color3f], list[mi.Color3f] | None]:
     """Return the radiance of visible points on and near indenters towards the camera.
 
     Each direction bin is looked up along its own line.
@@ -53,6 +53,7 @@ def shade_in_contacts(
         field: the radiance cache.
         scenes: the scenes of the image, with indenters.
         points: the visible points.
+        interreflection: whether interreflection is computed.
 
     Returns:
         The radiance due to the light of the cache, and that due to interreflection; for each light
@@ -78,6 +79,8 @@ def shade_in_contacts(
         raised & dr.opaque(mi.Bool, scenes.convex),
     )
     far = sum_bins(field.binned(), scenes, at, dr.opaque(mi.Float, CONTACT_SHADOW_RAYS), sky)
+    if not interreflection:
+        return far, None
     between = glossy_interreflection if field.metallic else interreflected
     return far, between(field, scenes, at)
 

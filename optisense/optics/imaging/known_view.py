@@ -1,0 +1,46 @@
+"""Parts of an image that the next draft of the same view reuses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.optics.transport.camera_paths import VisiblePoints
+
+PointsKey = tuple[bool, bool, int | None]
+"""Whether visible points lie in contacts, whether only some of the pixels were chosen, and the
+channel of their light."""
+
+
+@dataclass
+class KnownView:
+    """Parts of an image that the next draft reuses.
+
+    Attributes:
+        points: main and reflected visible points.
+        faint: (groups, h, w, 3) light that is reflected by interfaces or between contacts and skin,
+            divided by the mean of the other light of its group; None if it is not known.
+    """
+
+    points: dict[PointsKey, tuple[VisiblePoints, VisiblePoints | None]] = field(
+        default_factory=dict
+    )
+    faint: NDArray[np.float32] | None = None
+
+    def with_faint(self, layers: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return layers (groups, h, w, 3) with the faint light, which is a fixed share of each
+        group's light.
+        """
+        assert self.faint is not None
+        return layers + self.faint * _means(layers)
+
+    def keep_faint(self, layers: NDArray[np.float32], faint: NDArray[np.float32]) -> None:
+        """Keep the faint light of an image, given its other light; both (groups, h, w, 3)."""
+        means = _means(layers)
+        self.faint = np.divide(faint, means, out=np.zeros_like(faint), where=means > 0)
+
+
+def _means(layers: NDArray[np.float32]) -> NDArray[np.float32]:
+    return layers.mean(axis=(1, 2, 3), keepdims=True)
