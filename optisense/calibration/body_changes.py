@@ -15,6 +15,7 @@ from optisense import library
 from optisense.design import Cage, Light, SensorDesign
 from optisense.design.emitters import AreaEmitter, LightModel, SpotEmitter
 from optisense.design.parts import FaceFinish, Role
+from optisense.errors import CalibrationError
 from optisense.geometry import TriangleMesh
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,9 @@ rounding errors, and far below any bend that is meant.
 
 EDGE_ANGLE = 30.0
 """Largest angle between the faces of an edge and one of the four sides of the picture, degrees."""
+
+EDGE = "edge-"
+"""Beginning of the names of faces that are edges."""
 
 WIDEST_ANGLE = 89.0
 """Largest angle from its axis to which a spot is widened, degrees."""
@@ -112,6 +116,37 @@ def turned(vector: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
     return np.asarray(vector * cosine + np.cross(axis, vector) * sine + along)
 
 
+def with_single_lights(design: SensorDesign) -> SensorDesign:
+    """Return a design in which each light has a group of its own, so that its power can be fitted:
+    `red-1`, `red-2` and so on for the lights of the group `red`.
+
+    Sources of a group become those of each of its lights.
+    """
+    found = design.copy()
+    found.lights, found.provenance = {}, {}
+    singles: dict[str, list[str]] = {}
+    for name, group in design.lights.items():
+        count = len(group.lights)
+        singles[name] = [f"{name}-{number}" for number in range(1, count + 1)]
+        if count == 1:
+            singles[name] = [name]
+        for single, light in zip(singles[name], group.lights, strict=True):
+            if single in found.lights or (single != name and single in design.lights):
+                raise CalibrationError(
+                    f"there is already a light group '{single}'", hint="Give it another name"
+                )
+            found.lights[single] = group.model_copy(update={"lights": [light]})
+    for path, source in design.provenance.items():
+        first, _, rest = path.partition(".")
+        name, dot, field = rest.partition(".")
+        of = singles.get(name, [name]) if first == "lights" else []
+        for single in of:
+            found.provenance[f"lights.{single}{dot}{field}"] = source
+        if not of:
+            found.provenance[path] = source
+    return found
+
+
 def widens(design: SensorDesign) -> list[str]:
     """Return the groups whose emission can be widened: flat windows and spots."""
     return [
@@ -142,8 +177,20 @@ def _widened(emitter: LightModel, factor: float) -> LightModel:
 
 
 def edge_parts(design: SensorDesign) -> list[str]:
-    """Return the rigid transparent parts whose edges may be rough: those without finished faces."""
-    return [name for name in design.parts_of(Role.SUPPORT) if not design.parts[name].faces]
+    """Return the rigid transparent parts whose edges may be rough: those without finished faces
+    other than such edges.
+    """
+    return [
+        name
+        for name in design.parts_of(Role.SUPPORT)
+        if all(face.startswith(EDGE) for face in design.parts[name].faces or {})
+    ]
+
+
+def edge_roughness(design: SensorDesign, parts: list[str]) -> float | None:
+    """Return the roughness of the edges of parts; None if they have none yet."""
+    known = [face.roughness for name in parts for face in (design.parts[name].faces or {}).values()]
+    return known[0] if known else None
 
 
 def with_edge_roughness(design: SensorDesign, parts: list[str], roughness: float) -> SensorDesign:
@@ -157,7 +204,7 @@ def with_edge_roughness(design: SensorDesign, parts: list[str], roughness: float
     for name in parts:
         normals = meshes[name].face_normals
         faces = {
-            f"edge-{side}": FaceFinish(
+            f"{EDGE}{side}": FaceFinish(
                 direction=tuple(way.tolist()), within=EDGE_ANGLE, roughness=roughness
             )
             for side, way in sides.items()

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.calibration.body_changes import with_single_lights
 from optisense.calibration.comparing import Comparison, usable
+from optisense.calibration.families import LEDS
 from optisense.calibration.fit_rounds import FitRounds, Progress
 from optisense.calibration.fitted_numbers import FittedNumber, correlated_pairs, fitted_numbers
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
@@ -61,6 +63,8 @@ def calibrate(
     from optisense.optics import OpticalModel
 
     chosen_settings = settings or CalibrationSettings()
+    if LEDS in chosen_settings.families:
+        design = with_single_lights(design)
     full, seen, notes = usable(photographs, refine=chosen_settings.refine)
     chosen = quantities_of(design, chosen_settings.families, chosen_settings.asked)
     held_out = chosen_settings.indices_held_out(full)

@@ -61,8 +61,20 @@ DISTORTION_RANGE = 0.1
 _LETTERS = "RGB"
 
 
+def lit_channels(design: SensorDesign) -> list[int]:
+    """Return the channels 0 to 2 (R, G, B) in which a light of the design emits."""
+    return [
+        channel
+        for channel in range(3)
+        if any(group.channel_flux()[channel] > 0.0 for group in design.lights.values())
+    ]
+
+
 def colours(design: SensorDesign) -> list[FitQuantity]:
-    """Return the entries of the colour matrix off its diagonal."""
+    """Return the entries of the colour matrix off its diagonal, without the shares of channels in
+    which no light emits: pictures do not show them.
+    """
+    lit = lit_channels(design)
     matrix = np.eye(3) if design.camera.colour_matrix is None else design.camera.colour_matrix
     return [
         FitQuantity(
@@ -71,7 +83,7 @@ def colours(design: SensorDesign) -> list[FitQuantity]:
             "", float(matrix[row][column]), -4.0, 4.0, MIX_RANGE, home="camera.colour_matrix",
         )
         for row in range(3)
-        for column in range(3)
+        for column in lit
         if row != column
     ]  # fmt: skip
 
@@ -101,8 +113,8 @@ def black(design: SensorDesign) -> list[FitQuantity]:
 
 
 def shading(design: SensorDesign) -> list[FitQuantity]:
-    """Return strength of the lens shading in each channel, and its power."""
-    own = design.camera.shading
+    """Return strength of the lens shading in each channel in which a light emits, and its power."""
+    own, lit = design.camera.shading, lit_channels(design)
     green, red, blue, power = FALLOFF_START, FALLOFF_START, FALLOFF_START, SHADING_POWER
     if isinstance(own, RadialShading):
         green, power = own.falloff, own.power
@@ -113,9 +125,10 @@ def shading(design: SensorDesign) -> list[FitQuantity]:
             f"camera.shading.{name}", f"dimming of {letter} in the picture's corners", "", start,
             0.0, 0.95, FALLOFF_RANGE, home="camera.shading",
         )
-        for name, letter, start in (
-            ("falloff", "G", green), ("red_falloff", "R", red), ("blue_falloff", "B", blue)
+        for channel, name, letter, start in (
+            (1, "falloff", "G", green), (0, "red_falloff", "R", red), (2, "blue_falloff", "B", blue)
         )
+        if channel in lit
     ]  # fmt: skip
     outwards = FitQuantity(
         "camera.shading.power", "exponent of the dimming by the distance from the middle", "",

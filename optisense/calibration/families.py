@@ -9,12 +9,17 @@ from optisense.calibration import body_changes, camera_families
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
 from optisense.design.materials import Coating, Dielectric
+from optisense.design.materials.coating import SMALLEST_ROUGHNESS
 from optisense.design.materials.gel_elasticity import MAX_POISSON_RATIO
 from optisense.design.parts import Role
 
 POWER_RANGE = 0.7
 """Plausible range of the logarithm of a light group's power: LEDs of one type differ by a factor of
 two, and their drive currents are not published.
+"""
+
+LED_RANGE = 0.3
+"""Plausible range of the logarithm of a single light's power: LEDs of one reel differ by a third.
 """
 
 LIGHT_PLACE_RANGE = 0.7
@@ -49,6 +54,11 @@ POISSON_RANGE = 0.01
 SPECULAR_RANGE = 0.1
 """Plausible range of a coating's specularity, which makers describe only in words."""
 
+ALPHA_RANGE = 0.2
+"""Plausible range of the roughness (GGX alpha) of a coating's metal flake; flakes of sprayed paints
+lie between 0.1 and 0.6.
+"""
+
 REFLECTANCE_RANGE = 0.3
 """Plausible range of the logarithm of a coating's reflectance: paints of one grey differ by a
 third.
@@ -80,15 +90,19 @@ class Family:
     usual: bool = True
 
 
-def _powers(design: SensorDesign) -> list[FitQuantity]:
+def _powers(design: SensorDesign, spread: float = POWER_RANGE) -> list[FitQuantity]:
     return [
         FitQuantity(
             f"lights.{name}.flux", f"power of the {name} lights", "mW", group.flux,
-            1e-3 * group.flux, min(1e6, 1e3 * group.flux), POWER_RANGE, True,
+            1e-3 * group.flux, min(1e6, 1e3 * group.flux), spread, True,
         )
         for name, group in design.lights.items()
         if group.flux > 0.0
     ]  # fmt: skip
+
+
+def _leds(design: SensorDesign) -> list[FitQuantity]:
+    return _powers(body_changes.with_single_lights(design), LED_RANGE)
 
 
 def _lights(design: SensorDesign) -> list[FitQuantity]:
@@ -178,6 +192,14 @@ def _coating(design: SensorDesign) -> list[FitQuantity]:
             SPECULAR_RANGE, renders=True,
         )
     ]  # fmt: skip
+    if coating.specularity > 0.0:  # without flake, pictures do not show its roughness
+        alpha = coating.reflection().roughness
+        found.append(
+            FitQuantity(
+                "coating.roughness", "roughness (GGX alpha) of the coating's flake", "", alpha,
+                SMALLEST_ROUGHNESS, 1.0, ALPHA_RANGE, renders=True,
+            )
+        )  # fmt: skip
     if brightest > 0.0:
         found.append(
             FitQuantity(
@@ -194,13 +216,16 @@ def _edges(design: SensorDesign) -> list[FitQuantity]:
     if not parts:
         return []
 
+    known = body_changes.edge_roughness(design, parts)
+
     def rough(changed: SensorDesign, value: float) -> SensorDesign:
         return body_changes.with_edge_roughness(changed, parts, value)
 
     return [
         FitQuantity(
             f"parts.{parts[0]}.edges", "roughness (GGX alpha) of the edges of rigid parts", "",
-            ROUGH_START, 0.0, 1.0, ROUGH_RANGE, False, True, False, rough,
+            ROUGH_START if known is None else known, 0.0, 1.0, ROUGH_RANGE, False, True, False,
+            rough,
             f"parts.{parts[0]}.faces",
         )
     ]  # fmt: skip
@@ -217,6 +242,9 @@ def _indices(design: SensorDesign) -> list[FitQuantity]:
     ]  # fmt: skip
 
 
+LEDS = "leds"
+"""Family with which each light gets a group of its own before the fit."""
+
 FAMILIES = {
     "powers": Family("power of each light group", _powers),
     "colours": Family("colour matrix of the camera", camera_families.colours),
@@ -229,11 +257,12 @@ FAMILIES = {
     "place": Family("place of the camera across its axis", camera_families.place),
     "pose": Family("turn of the camera, and its place along its axis", camera_families.pose, False),
     "distortion": Family("radial distortion of the lens", camera_families.distortion, False),
+    LEDS: Family("power of each single light, which replaces that of the groups", _leds, False),
     "lights": Family("place and tilt of each light group, along the camera's axis", _lights, False),
     "rows": Family("length of each straight row of lights", _rows, False),
     "emission": Family("width of the emission of lights", _emission, False),
     "edges": Family("roughness of the edges of rigid transparent parts", _edges, False),
-    "coating": Family("specularity and reflectance of the coating", _coating, False),
+    "coating": Family("specularity, roughness and reflectance of the coating", _coating, False),
     "gel": Family("thickness of a flat gel, and Poisson ratio", _gel, False),
     "indices": Family("refractive indices", _indices, False),
 }
@@ -244,6 +273,10 @@ USUAL = tuple(name for name, family in FAMILIES.items() if family.usual)
 
 
 def chosen_families(keep: Sequence[str], also: Sequence[str]) -> tuple[str, ...]:
-    """Return the default families without those in `keep`, and with those in `also`."""
+    """Return the default families without those in `keep`, and with those in `also`; powers of
+    single lights replace those of the groups.
+    """
     wanted = {*USUAL, *also} - {*keep}
+    if LEDS in wanted:
+        wanted.discard("powers")
     return tuple(name for name in FAMILIES if name in wanted)

@@ -36,6 +36,11 @@ HUBER = 2.0
 quadratically (Huber 1964).
 """
 
+LEVELS = 2.0, 253.0
+"""Smallest and largest level that is compared; beyond, pictures are clipped and noise is cut off,
+so that they do not show how dark or bright it is.
+"""
+
 STEP = 0.02
 """Step of a number's difference quotient, in plausible ranges."""
 
@@ -61,6 +66,9 @@ SMALL_GAIN = 0.02
 """Decrease of the sum of squares below which a descent ends. A number that is off by its
 uncertainty adds 1.
 """
+
+MEDIAN_SQUARE = 0.455
+"""Median of the square of a normally distributed number of variance 1."""
 
 LARGEST_STEP = 1.0
 """Largest change of a number in one step, in plausible ranges; the model is nearly linear there."""
@@ -95,8 +103,16 @@ class Solution:
         """Return the solution with the variance of the changes (n,) of its steps since an earlier
         one, whose light had other noise: it shows what noise does, and how far the fit is from its
         end.
+
+        A single change may be small by chance. If most changes are larger than the stated
+        deviations explain, all deviations are enlarged by their typical ratio (Birge 1932).
         """
-        return replace(self, covariance=self.covariance + np.diag(changes**2))
+        moved = changes != 0.0  # the others are at a limit
+        if not moved.any():
+            return self
+        ratios = changes[moved] ** 2 / np.diag(self.covariance)[moved]
+        scale = max(float(np.median(ratios)) / (2.0 * MEDIAN_SQUARE), 1.0)
+        return replace(self, covariance=scale * self.covariance + np.diag(changes**2))
 
 
 Scales = tuple[ErrorScale, ErrorScale]
@@ -136,8 +152,11 @@ class LayeredFit:
         self._start, self._slopes = start, slopes
         limits = np.array([each.limits() for each in chosen]).reshape(-1, 2)
         self._low, self._high = limits[:, 0], limits[:, 1]
-        self._real = photographs.background.astype(np.float64)
-        self._responses = [p.picture.astype(np.float64) - self._real for p in photographs.presses]
+        self._real = np.clip(photographs.background.astype(np.float64), *LEVELS)
+        self._responses = [
+            np.clip(press.picture.astype(np.float64), *LEVELS) - self._real
+            for press in photographs.presses
+        ]
         shape = self._real.shape[:2]
         self._masks = [distances(shape, place) <= NEAR for place in seen]
         scale = shape[1] / 320.0
@@ -152,7 +171,7 @@ class LayeredFit:
         return len(self._chosen)
 
     def pictures(self, steps: FloatArray, contacts: FloatArray) -> list[FloatArray]:
-        """Return the levels of the background and of each press."""
+        """Return the levels of the background and of each press, within those that are compared."""
         return [self._shown(-1, steps, None)] + [
             self._shown(index, steps, contacts[index]) for index in range(len(self._masks))
         ]
@@ -172,7 +191,8 @@ class LayeredFit:
         factors = power_factors(self._layers.groups, self._chosen, steps)
         radiance = np.tensordot(factors.astype(np.float32), moved, axes=1)
         chain = chain_with(self._layers.chain, self._chosen, steps)
-        return levels_of(np.maximum(radiance, 0.0), chain, self._exposure)
+        levels = levels_of(np.maximum(radiance, 0.0), chain, self._exposure)
+        return np.clip(levels, *LEVELS)
 
     def solve(
         self,

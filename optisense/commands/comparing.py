@@ -50,8 +50,8 @@ class CalibrateOptions(PhotographOptions):
     )
     also: Annotated[list[str], OptionNotation("NAME")] = Field(
         [],
-        description="What the fit also changes: pose, distortion, lights, rows, emission, edges, "
-        "coating, gel or indices. May be given several times.",
+        description="What the fit also changes: pose, distortion, leds, lights, rows, emission, "
+        "edges, coating, gel or indices. May be given several times.",
     )
     fit: Annotated[list[str], OptionNotation("PATH=LO:HI")] = Field(
         [],

@@ -12,8 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 import optisense as ots
-from optisense.calibration import Photographs, save_photographs
+from optisense.calibration import Photographs, photograph_model, save_photographs
+from optisense.calibration.body_changes import with_single_lights
 from optisense.calibration.calibrating import calibrate
+from optisense.calibration.families import chosen_families
 from optisense.calibration.gauss_newton import LayeredFit
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
@@ -25,7 +27,7 @@ from optisense.cli import app
 from optisense.design import Status, get_value, set_value
 from optisense.errors import CalibrationError
 
-from .conftest import PHOTONS
+from .conftest import PHOTONS, PLACES, SIZE
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -259,3 +261,19 @@ def test_an_interrupted_calibration_goes_on_where_it_was(
     again = calibrate(design, photographs, settings)
     for one, other in zip(found.numbers, again.numbers, strict=True):
         assert one.after == pytest.approx(other.after, rel=1e-5)  # sums of threads are rounded
+
+
+def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
+    design = with_single_lights(mini.design)
+    real = ots.OpticalModel(set_value(design, "lights.red-2.flux", 1.0))
+    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
+    shown = photograph_model(real, balls, resolution=SIZE, photons=200_000, seed=5)
+    kept = ["colours", "tone", "black", "shading", "view", "place"]
+    settings = CalibrationSettings(
+        families=chosen_families(kept, ["leds"]), rounds=1, photons=200_000, held_out=()
+    )
+    found = calibrate(mini.design, shown, settings)
+    power = {each.path.split(".")[1]: each.after for each in found.numbers}
+    others = np.mean([power[f"red-{number}"] for number in (1, 3, 4, 5)])
+    assert power["red-2"] / others == pytest.approx(1.0 / 2.1, abs=0.2)
+    assert list(found.design.lights) == list(design.lights)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import optisense as ots
-from optisense.calibration.families import FAMILIES, USUAL
+from optisense.calibration.body_changes import with_single_lights
+from optisense.calibration.families import FAMILIES, LEDS, USUAL, chosen_families
 from optisense.calibration.quantities import designed, quantities_of
-from optisense.design import SensorDesign, get_value
-from optisense.sensors import check, gelsight_mini_ideal
+from optisense.design import SensorDesign, get_value, set_value
+from optisense.sensors import check, gelsight_mini, gelsight_mini_ideal
 
-BODY = [name for name in FAMILIES if name not in USUAL]
+BODY = [name for name in FAMILIES if name not in (*USUAL, LEDS)]
 
 
 def changed(design: SensorDesign, family: str, word: str, value: float) -> SensorDesign:
@@ -25,9 +26,9 @@ def changed(design: SensorDesign, family: str, word: str, value: float) -> Senso
     "name", ["gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte"]
 )
 def test_every_family_leaves_a_sensor_that_can_be_simulated(name: str) -> None:
-    design = ots.load(name)
+    design = with_single_lights(ots.load(name))
     before = design.model_dump()
-    chosen = quantities_of(design, list(FAMILIES))
+    chosen = quantities_of(design, chosen_families([], list(FAMILIES)))
     assert {each.path.split(".")[0] for each in chosen} >= {"lights", "camera", "materials"}
     made = designed(design, chosen, np.full(len(chosen), 0.3))
     assert check(made) == check(design)
@@ -88,3 +89,47 @@ def test_emission_and_coating_change_by_factors() -> None:
     assert emitter.size == pytest.approx((1.2, 1.2))  # type: ignore[attr-defined]
     dark = changed(design, "coating", "reflectance", 0.6)
     assert dark.coating.reflectance == pytest.approx((0.3, 0.3, 0.3))  # type: ignore[attr-defined]
+
+
+def test_channels_without_light_have_no_share_and_no_dimming() -> None:
+    svelte = ots.load("gelsight-svelte")  # its lights are red and green
+    chosen = {each.path for each in quantities_of(svelte, ["colours", "shading"])}
+    assert chosen == {
+        "camera.colour_matrix[0][1]",
+        "camera.colour_matrix[1][0]",
+        "camera.colour_matrix[2][0]",
+        "camera.colour_matrix[2][1]",
+        "camera.shading.falloff",
+        "camera.shading.red_falloff",
+        "camera.shading.power",
+    }
+
+
+def test_single_lights_together_are_the_group() -> None:
+    design = gelsight_mini_ideal()
+    single = with_single_lights(design)
+    assert list(single.lights)[:2] == ["red-1", "red-2"] and len(single.lights) == 15
+    for name, group in design.lights.items():
+        own = [single.lights[each] for each in single.lights if each.startswith(name)]
+        assert [light for each in own for light in each.lights] == group.lights
+        assert {each.flux for each in own} == {group.flux}
+    assert check(single) == check(design)
+    assert [each.path for each in quantities_of(single, chosen_families(USUAL, ["leds"]))] == [
+        f"lights.{name}.flux" for name in single.lights
+    ]
+
+
+def test_the_flake_of_a_coating_becomes_rougher_where_there_is_one() -> None:
+    shiny = set_value(gelsight_mini_ideal(), "coating.specularity", 0.3)
+    made = changed(shiny, "coating", "roughness", 0.5)
+    assert made.coating.reflection().roughness == pytest.approx(0.5)
+    assert "roughness" not in shiny.coating.model_dump()
+    words = [each.words for each in quantities_of(gelsight_mini_ideal(), ["coating"])]
+    assert not any("roughness" in each for each in words)
+
+
+def test_edges_that_were_fitted_are_fitted_again() -> None:
+    (edges,) = quantities_of(gelsight_mini(), ["edges"])
+    assert 0.1 < edges.start < 0.2
+    (again,) = quantities_of(designed(gelsight_mini(), [edges], np.ones(1)), ["edges"])
+    assert again.start == pytest.approx(edges.start + edges.spread)

@@ -6,7 +6,14 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from optisense.design.fields import Colour, Fraction, Name, NonNegativeRGB, PositiveRGB
+from optisense.design.fields import (
+    Colour,
+    Fraction,
+    Name,
+    NonNegativeRGB,
+    PositiveRGB,
+    is_left_out,
+)
 from optisense.design.materials.base import CoatingModel, Reflection
 
 SMALLEST_ROUGHNESS = 0.05
@@ -59,11 +66,23 @@ class Coating(CoatingModel):
         description="what specularity changes: paint and flake in a blend; their shares alone; or "
         "the roughness of a bare metal",
     )
+    roughness: float | None = Field(
+        default=None,
+        ge=SMALLEST_ROUGHNESS,
+        le=1.0,
+        exclude_if=is_left_out,
+        description="GGX alpha of the metal flake; follows from the scattering law if left out",
+    )
 
     def reflection(self) -> Reflection:
         """Return a blend of paint and flake, or flake alone, by specularity."""
-        share, alpha = flake_lobe(self.specularity, self.scattering)
+        share, alpha = self._flake()
         return Reflection(self.reflectance, share, alpha, self.eta, self.k)
+
+    def _flake(self) -> tuple[float, float]:
+        """Return share and roughness of the metal flake."""
+        share, alpha = flake_lobe(self.specularity, self.scattering)
+        return share, alpha if self.roughness is None else self.roughness
 
     def in_words(self) -> str:
         """Return its specularity as text, with its scattering law if that is not the default."""
@@ -72,7 +91,7 @@ class Coating(CoatingModel):
 
     def consequences(self) -> list[str]:
         """Return the shares of paint and flake."""
-        share, alpha = flake_lobe(self.specularity, self.scattering)
+        share, alpha = self._flake()
         return [
             f"{100 * (1 - share):.0f} % diffuse paint and "
             f"{100 * share:.0f} % metal flake of roughness {alpha:.2g}"
