@@ -130,3 +130,19 @@ def _home(thing: object) -> str:
     """Return the place of definition of a function or class: "module:name"."""
     name = getattr(thing, "__qualname__", type(thing).__qualname__)
     return f"{getattr(thing, '__module__', '')}:{name}"
+
+
+def must_be(kind: type, error: type[OptiSenseError], noun: str) -> Callable[[str, object], None]:
+    """Return a check for a `Registry` that refuses objects of other classes.
+
+    Args:
+        kind: the class.
+        error: the error to raise.
+        noun: what the registry holds, as messages call it.
+    """
+
+    def check(name: str, given: object) -> None:
+        if not isinstance(given, kind):
+            raise error(f"the {noun} '{name}' is no {kind.__name__}")
+
+    return check

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError, OutputError
-from optisense.registry import Registry
+from optisense.registry import Registry, must_be
 from optisense.robots.body import SensorBody, sensor_body
 from optisense.robots.mjcf import mjcf
 from optisense.robots.urdf import urdf
@@ -38,17 +37,12 @@ MJCF = RobotFormat(".xml", mjcf)
 URDF = RobotFormat(".urdf", urdf)
 
 
-def _check(name: str, given: Any) -> None:
-    if not isinstance(given, RobotFormat):
-        raise OutputError(f"the robot format '{name}' is no RobotFormat")
-
-
 ROBOT_FORMATS: Registry[RobotFormat] = Registry(
     "robot format",
     "optisense.robot_formats",
     OutputError,
     {"mujoco": "optisense.robots.formats:MJCF", "urdf": "optisense.robots.formats:URDF"},
-    _check,
+    must_be(RobotFormat, OutputError, "robot format"),
 )
 """Registry of all formats; other packages add theirs under the entry-point group
 `optisense.robot_formats`.

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from optisense.errors import OutputError
 from optisense.geometry.mesh_files import obj_text
-from optisense.registry import Registry
+from optisense.registry import Registry, must_be
 from optisense.workshop.mesh_formats import stl_bytes, three_mf_bytes
 from optisense.workshop.shapes import Shape
 from optisense.workshop.step_format import require_step, write_step
@@ -57,11 +56,6 @@ STEP = ShapeFormat(
 )
 
 
-def _check(name: str, given: Any) -> None:
-    if not isinstance(given, ShapeFormat):
-        raise OutputError(f"the file format '{name}' is no ShapeFormat")
-
-
 FORMATS: Registry[ShapeFormat] = Registry(
     "file format",
     "optisense.formats",
@@ -72,7 +66,7 @@ FORMATS: Registry[ShapeFormat] = Registry(
         "3mf": "optisense.workshop.formats:THREE_MF",
         "step": "optisense.workshop.formats:STEP",
     },
-    _check,
+    must_be(ShapeFormat, OutputError, "file format"),
 )
 """Registry of all formats; other packages add theirs under the entry-point group
 `optisense.formats`.

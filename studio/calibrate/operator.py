@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.engine import EngineError
 from ..core.vary import listed
@@ -66,6 +66,23 @@ class OPTISENSE_PG_calibration(bpy.types.PropertyGroup):
         name="Trust Labels", options={"SKIP_SAVE"},
         description="Use the contact positions of presses.csv unchanged; otherwise each contact "
         "is searched for near its position",
+    )  # fmt: skip
+    rounds: IntProperty(
+        name="Rounds", min=1, max=20, default=4, options={"SKIP_SAVE"},
+        description="Number of rounds of rendering and fitting",
+    )  # fmt: skip
+    photons: FloatProperty(
+        name="Photons (M)", min=0.01, soft_max=50.0, max=10_000.0, default=3.0, precision=2,
+        options={"SKIP_SAVE"},
+        description="Millions of photons of the last round; the others have 0.3 times as many",
+    )  # fmt: skip
+    seed: IntProperty(
+        name="Seed", min=0, max=2**31 - 1, options={"SKIP_SAVE"},
+        description="Seed of the photons: the same seed gives the same light",
+    )  # fmt: skip
+    shows_more: BoolProperty(
+        name="More Options", options={"SKIP_SAVE"},
+        description="Show the options that few calibrations need",
     )  # fmt: skip
     result: StringProperty(
         description="Summary of the calibration, one statement a line", options={"SKIP_SAVE"}
@@ -127,7 +144,8 @@ class OPTISENSE_OT_calibrate(polls.Checked, bpy.types.Operator):
         return start_with_design(
             self, context, TITLE, "calibrate", _take, photos=str(photos), to=str(to),
             keep=sorted(values.kept), also=sorted(values.added), fit=listed(values.fit),
-            hold_out=listed(values.hold_out), as_labelled=values.as_labelled, **ball,
+            hold_out=listed(values.hold_out), as_labelled=values.as_labelled, rounds=values.rounds,
+            photons=round(values.photons * 1e6), seed=values.seed, **ball,
         )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..engine import catalogue
-from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
+from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome, shows_more
 from .operator import TITLE
 
 
@@ -40,9 +40,10 @@ class OPTISENSE_PT_calibrate(SidebarPanel, bpy.types.Panel):
                     "optisense.keep_family", text=row["name"].capitalize(), depress=may,
                     icon="CHECKBOX_HLT" if may else "CHECKBOX_DEHLT",
                 ).family = row["name"]  # fmt: skip
-        column = labelled(layout)
-        column.prop(values, "fit")
-        column.prop(values, "hold_out")
+        if shows_more(layout, values):
+            column = labelled(layout)
+            for name in ("fit", "hold_out", "rounds", "photons", "seed"):
+                column.prop(values, name)
         if not show_job(layout, TITLE):
             layout.operator("optisense.calibrate", icon="CAMERA_DATA")
         show_outcome(layout, TITLE)

@@ -143,3 +143,12 @@ def show_messages(layout: bpy.types.UILayout) -> None:
             paragraph(box, now.hint, "BLANK1", boxed=True)
     elif now.note:
         paragraph(layout, now.note, "INFO")
+
+
+def shows_more(layout: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> bool:
+    """Draw the triangle that folds seldom-used options out; return whether they are shown."""
+    row = layout.row()
+    row.alignment = "LEFT"
+    icon = "DISCLOSURE_TRI_DOWN" if values.shows_more else "DISCLOSURE_TRI_RIGHT"
+    row.prop(values, "shows_more", icon=icon, emboss=False)
+    return bool(values.shows_more)

@@ -51,6 +51,28 @@ class OPTISENSE_OT_report(polls.Checked, ChoosingFile, bpy.types.Operator):
         return start(self, "Writing", "report", written, image=image, file=str(path))
 
 
+def _export(
+    operator: Any, context: bpy.types.Context, request: str, formats: list[str], **fields: Any
+) -> set[str]:
+    """Let the engine write files in these formats into the folder that the operator names."""
+    if not formats:
+        return refuse(operator, "Choose a format")
+    target = chosen(operator, "a folder")
+    if target is None:
+        return {"CANCELLED"}
+    folder = str(target)
+
+    def written(result: dict[str, Any]) -> None:
+        session.state().note = "; ".join(
+            [f"{len(result['files'])} files in {folder}", *result.get("notes", [])]
+        )
+        session.state().written = folder
+
+    return start_with_design(
+        operator, context, "Writing", request, written, to=folder, formats=formats, **fields
+    )
+
+
 class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
     """Write shapes, places of lights and a bill of materials for the workshop"""
 
@@ -82,27 +104,7 @@ class OPTISENSE_OT_export(polls.Asking, ChoosingFile, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         wanted = {"stl": self.stl, "obj": self.obj, "3mf": self.three_mf, "step": self.step}
         formats = [name for name, is_wanted in wanted.items() if is_wanted]
-        if not formats:
-            return refuse(self, "Choose a format")
-        target = chosen(self, "a folder")
-        if target is None:
-            return {"CANCELLED"}
-        folder = str(target)
-
-        def written(result: dict[str, Any]) -> None:
-            session.state().note = f"{len(result['files'])} files in {folder}"
-            session.state().written = folder
-
-        return start_with_design(
-            self,
-            context,
-            "Writing",
-            "export",
-            written,
-            to=folder,
-            formats=formats,
-            moulds=self.moulds,
-        )
+        return _export(self, context, "export", formats=formats, moulds=self.moulds)
 
 
 class OPTISENSE_OT_export_robot(polls.Asking, ChoosingFile, bpy.types.Operator):
@@ -139,25 +141,5 @@ class OPTISENSE_OT_export_robot(polls.Asking, ChoosingFile, bpy.types.Operator):
         formats = [name for name in ("mujoco", "urdf") if getattr(self, name)]
         if not formats:
             return refuse(self, "Choose a format")
-        target = chosen(self, "a folder")
-        if target is None:
-            return {"CANCELLED"}
-        folder = str(target)
-
-        def written(result: dict[str, Any]) -> None:
-            session.state().note = "; ".join(
-                [f"{len(result['files'])} files in {folder}", *result["notes"]]
-            )
-            session.state().written = folder
-
         mass = {"mass": self.mass} if self.mass > 0.0 else {}
-        return start_with_design(
-            self,
-            context,
-            "Writing",
-            "export_robot",
-            written,
-            to=folder,
-            formats=formats,
-            **mass,
-        )
+        return _export(self, context, "export_robot", formats=formats, **mass)

@@ -5,7 +5,14 @@ from __future__ import annotations
 import bpy
 
 from ..engine import catalogue, session
-from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
+from ..engine.layout import (
+    SidebarPanel,
+    labelled,
+    paragraph,
+    show_job,
+    show_outcome,
+    shows_more,
+)
 from ..simulate.picture import icon
 from .advising import is_flat
 from .following import CURVE, has_trials, known_scores
@@ -48,11 +55,7 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
             column.prop(search, name)
         for name in ("coarse_first", "go_on"):
             layout.prop(search, name)  # their names are longer than half a line
-        shown = "DISCLOSURE_TRI_DOWN" if search.shows_more else "DISCLOSURE_TRI_RIGHT"
-        row = layout.row()
-        row.alignment = "LEFT"
-        row.prop(search, "shows_more", icon=shown, emboss=False)
-        if search.shows_more:
+        if shows_more(layout, search):
             column = labelled(layout)
             for name in ("errors", "samples", "rules", "options", "settings"):
                 column.prop(search, name)
