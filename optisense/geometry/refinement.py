@@ -34,7 +34,8 @@ def refine(
     Args:
         vertices: (n, 3) vertices, mm; all faces that meet at a place share one vertex.
         faces: (m, 3) rows of ``vertices``.
-        corner_normals: (m, 3, 3) shading normals of the corners of each face, not normalised again.
+        corner_normals: (m, 3, k) shading normals of the corners of each face, not normalised again;
+            further columns are interpolated as well.
         wanted: function that returns the greatest edge length (k,), mm, at places (k, 3).
         max_faces: number of faces; refinement ends if the next pass could exceed it.
 

@@ -45,6 +45,25 @@ class SkinState(IntEnum):
 
 
 @dataclass(frozen=True, eq=False)
+class _Origin:
+    """Where the triangles of a deformed skin come from on the undeformed one.
+
+    Attributes:
+        near: (k,) mask of the undeformed faces that were refined.
+        face: (m,) number, among these, of the face that each refined face lies in.
+        shares: (m, 3, 3) barycentric coordinates of the corners of each refined face in it.
+        displacement: (n, 3) displacements of the vertices, mm.
+        tilt: (m, 3, 3) vectors that tilt the normals of the corners.
+    """
+
+    near: NDArray[np.bool_]
+    face: NDArray[np.int64]
+    shares: FloatArray
+    displacement: FloatArray
+    tilt: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
 class SkinMesh:
     """A deformed sensing surface.
 
@@ -53,12 +72,37 @@ class SkinMesh:
         faces: (m, 3) rows of ``vertices``, wound like those of the sensing surface.
         corner_normals: (m, 3, 3) unit shading normals of the corners, into the gel.
         state: (m,) the `SkinState` of each face.
+        origin: where its triangles come from; None if that is not known.
     """
 
     vertices: FloatArray
     faces: NDArray[np.int64]
     corner_normals: FloatArray
     state: NDArray[np.uint8]
+    origin: _Origin | None = None
+
+    def carried(self, skin: TriangleMesh) -> SkinMesh:
+        """Return the mesh on a sensing surface that was moved since, with the same displacements.
+
+        Args:
+            skin: the undeformed surface in its new shape, with the same faces.
+
+        Raises:
+            ValueError: the origin of the mesh is not known.
+        """
+        origin = self.origin
+        if origin is None:
+            raise ValueError("the origin of this mesh on the undeformed skin is not known")
+        smooth = skin.vertex_normals()
+        assert smooth.normals is not None
+        corners = np.concatenate([skin.triangles, smooth.normals[smooth.faces]], axis=2)
+        fine = np.einsum("fcb,fbk->fck", origin.shares, corners[origin.near][origin.face])
+        whole = np.concatenate([corners[~origin.near], fine])
+        vertices, normals = np.zeros_like(self.vertices), whole[..., 3:]
+        vertices[self.faces] = whole[..., :3]
+        normals[-len(fine) :] += origin.tilt
+        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+        return SkinMesh(vertices + origin.displacement, self.faces, normals, self.state, origin)
 
     def part(self, *states: SkinState) -> TriangleMesh | None:
         """Return the triangles in any of the given states, with shading normals; None if there are
@@ -86,15 +130,24 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
     assert smooth.normals is not None
     normals = smooth.normals[smooth.faces]
     whole = skin.welded()
-    if len(whole.faces) != len(normals):  # welding dropped faces without area
+    same_faces = len(whole.faces) == len(normals)
+    if not same_faces:  # welding dropped faces without area
         smooth = whole.vertex_normals()
         assert smooth.normals is not None
         normals = smooth.normals[smooth.faces]
     faces = whole.faces.astype(np.int64)
     near = _near(whole, pressed)
-    vertices, fine, fine_normals = refine(
-        whole.vertices, faces[near], normals[near], lambda p: _wanted(p, pressed), MAX_FACES
+    count = int(near.sum())
+    own = np.broadcast_to(np.arange(count)[:, None, None], (count, 3, 1))
+    corners = np.broadcast_to(np.eye(3), (count, 3, 3))
+    vertices, fine, traits = refine(
+        whole.vertices,
+        faces[near],
+        np.concatenate([normals[near], corners, own], axis=2),
+        lambda p: _wanted(p, pressed),
+        MAX_FACES,
     )
+    fine_normals = traits[..., :3]
     used = np.unique(fine)
     inward = np.zeros_like(vertices)
     np.add.at(inward, fine.ravel(), fine_normals.reshape(-1, 3))
@@ -116,6 +169,10 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
         SkinState.TOUCHING,
         np.where(bent[fine].any(axis=1), SkinState.BENT, SkinState.RESTING),
     )
+    origin = None
+    if same_faces:
+        face = traits[:, 0, 6].astype(np.int64)
+        origin = _Origin(near, face, traits[..., 3:6], displacement, tilt[fine])
     fine_normals = fine_normals + tilt[fine]
     all_normals = np.concatenate([normals[~near], fine_normals])
     all_normals /= np.linalg.norm(all_normals, axis=2, keepdims=True)
@@ -125,6 +182,7 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
         np.concatenate([faces[~near], fine]),
         all_normals,
         np.concatenate([resting, state]).astype(np.uint8),
+        origin,
     )
 
 

@@ -7,7 +7,8 @@ of a design does not depend on those scored before it.
 
 from __future__ import annotations
 
-from optisense.optics.drafts import DRAFT_CELL_SCALE, DraftView
+from optisense.optics.draft_light import DRAFT_CELL_SCALE, DRAFT_PILOT_PHOTONS
+from optisense.optics.drafts import DraftView
 from optisense.optics.model import OpticalModel
 from optisense.optics.radiance_cache.store import CELL_SIZE, CacheStore
 
@@ -18,7 +19,7 @@ class CoarseCacheStore(CacheStore):
     cell_size = DRAFT_CELL_SCALE * CELL_SIZE
     tells_curved = False
     uses_pilot = False
-    pilot_photons = 60_000  # a fifth of the usual; the guide's noise costs few of the photons
+    pilot_photons = DRAFT_PILOT_PHOTONS
 
 
 class CoarseModel(OpticalModel):

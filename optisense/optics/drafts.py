@@ -8,8 +8,8 @@ out) and only becomes less efficient. Contacts are pressed in coarsely and get f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -19,27 +19,17 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
+from optisense.mechanics import ELASTIC
+from optisense.optics.draft_light import CELL_TOLERANCE, DraftCacheStore, KeptView
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel, Sight
 from optisense.optics.radiance_cache.lit_scene import LitScene
-from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore
 from optisense.optics.scene.assembly import assemble
-from optisense.optics.scene.emitters import emitter_table
-from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.media import same_faces
 from optisense.optics.scene.sensor_scenes import SensorScenes
-from optisense.optics.scene.surfaces import SurfaceKind
 from optisense.optics.skin_view import VIEW_RESOLUTION, SkinView
+from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays
 from optisense.quality import photons_of
-
-DRAFT_CELL_SCALE = 2.4
-"""Ratio of a draft's cell size to that of a full image. With the few photons of a draft, wider
-cells give a smaller error against the full image: 9 % instead of 14 % with cells half as wide. They
-also take much less time to smooth."""
-
-
-DRAFT_PILOT_PHOTONS = 60_000
-"""Number of photons of a draft's pilot pass, a fifth of that of a full image, as no more than a
-draft's photons follow the emission guide."""
 
 DRAG_PHOTONS = 0.5
 """Share of a draft's photons that are traced while something moves; a draft of all photons follows
@@ -48,15 +38,6 @@ at rest."""
 PLACED_CONTACTS = 64
 """Number of contacts whose placed meshes a draft keeps: more than the presses of any objective, and
 about 10 MB of meshes."""
-
-GUIDE_TOLERANCE = 0.5 * VIEW_MARGIN
-"""Largest displacement of a vertex (mm) up to which a draft keeps the emission guide that was
-learned before the shapes changed: half of `VIEW_MARGIN`."""
-
-CELL_TOLERANCE = 0.25
-"""Largest displacement of a vertex (mm) up to which a draft keeps the surface cells of the shape
-before: a fifth of the side of a draft's cells. A GelSight Mini bent by 0.225 mm has an error of
-7.0 % with them and of 6.6 % with cells of its own."""
 
 
 @dataclass(frozen=True)
@@ -69,97 +50,6 @@ class _Shown:
     design: SensorDesign
     image: TactileImage
     kept: bool
-
-
-@dataclass
-class _Kept:
-    """What drafts keep while only lights move: the camera's view of the sensor, and the sensor
-    without the windows of the lights that move.
-    """
-
-    sight: Sight
-    unlit: tuple[list[Piece], RayScene] | None = None
-
-    def lit_by(self, moved: frozenset[int], scenes: SensorScenes) -> LitScene:
-        """Return the sensor with the light groups ``moved`` alone, without their windows.
-
-        The groups are numbered from 0 in the order of their numbers; the others get the numbers
-        that follow.
-        """
-        order = sorted(moved)
-        emitters = scenes.assembly.emitters
-        numbers = [
-            number
-            for number, piece in enumerate(scenes.pieces)
-            if piece.surface.kind is not SurfaceKind.LIGHT
-            or emitters[piece.surface.light].group not in moved
-        ]
-        pieces = [scenes.pieces[number] for number in numbers]
-        if self.unlit is None or not _same(self.unlit[0], pieces):
-            self.unlit = pieces, RayScene(pieces, numbers, scenes.table)
-        place = {group: number for number, group in enumerate(order)}
-        renamed = [replace(e, group=place.get(e.group, len(order))) for e in emitters]
-        return LitScene(
-            self.unlit[1].with_table(scenes.table),
-            scenes.opaque,
-            emitter_table(renamed, len(order)),
-            scenes.coloured,
-            scenes.roughness,
-        )
-
-
-class DraftCacheStore(CacheStore):
-    """Store of radiance caches in coarse cells that reuses data of the store before it."""
-
-    cell_size = DRAFT_CELL_SCALE * CELL_SIZE
-    thorough = False
-    pilot_photons = DRAFT_PILOT_PHOTONS
-    uses_pilot = False  # saves half of the tracing time, for some per cent on flanks of contacts
-
-    def __init__(
-        self,
-        lit: LitScene,
-        seen: NDArray[np.floating],
-        before: DraftCacheStore | None,
-        groups: Iterable[int] | None = None,
-    ) -> None:
-        """Create an empty store.
-
-        Args:
-            lit: the sensor.
-            seen: (n, 3) points (mm) that the camera sees.
-            before: the store of the previous design, if there is one.
-            groups: the light groups whose light is traced; all groups if None.
-        """
-        super().__init__(lit, seen)
-        self.groups = None if groups is None else frozenset(groups)
-        self.seen = seen
-        self.has_old_cells = False
-        """Whether the surface cells are those of a shape before."""
-        self._learned_on = self._divided = lit.opaque
-        self.most_groups = lit.table.groups
-        """Number of light groups for which the surface cells are large enough."""
-        if before is None:
-            return
-        off = _apart(lit.opaque, before._divided)
-        same_view = seen is before.seen or np.array_equal(seen, before.seen)
-        # Cells are larger for more groups, and those of all groups do for some of them.
-        if off < CELL_TOLERANCE and same_view and lit.table.groups <= before.most_groups:
-            self._cells, self._kernels = before._cells, before._kernels
-            self._divided, self.has_old_cells = before._divided, off > 0.0
-            self.most_groups = before.most_groups
-        if before.has_guide_for(lit):
-            self._guide, self._learned_on = before._guide, before._learned_on
-
-    def forget_cells(self) -> None:
-        """Drop the surface cells, so that the next store divides its surfaces anew."""
-        self._cells = self._kernels = None
-        self._divided = []
-
-    def has_guide_for(self, lit: LitScene) -> bool:
-        """Return whether the store has an emission guide for the lights of this sensor."""
-        known = self._guide is not None and lit.table.count == self._lit.table.count
-        return known and _apart(lit.opaque, self._learned_on) < GUIDE_TOLERANCE
 
 
 class DraftView(SkinView):
@@ -194,9 +84,12 @@ class DraftModel(OpticalModel):
         self._bent: dict[str, TriangleMesh] = {}
         self._before: DraftCacheStore | None = None
         self._moved: frozenset[int] | None = None
-        self._kept: _Kept | None = None
+        self._kept: KeptView | None = None
         self._faint: dict[str, NDArray[np.float32]] = {}
         """The faint light (`KnownView.faint`) of each group that drafts reuse."""
+        self._last_sight: Sight | None = None
+        self._pressed_on: TriangleMesh | None = None
+        """The undeformed skin when contacts were pressed in last."""
         self._shown: _Shown | None = None
         super().__init__(self._straightened(design), variant)
 
@@ -233,6 +126,7 @@ class DraftModel(OpticalModel):
         if moved != self._moved and self._caches is not None:  # of other light groups
             self._before, self._caches = self._draft_store, None
         self._moved = moved
+        self._last_sight = None if self._kept is None else self._kept.sight
         if moved is None:
             self._kept = None
         if before is None or not _same_picture(before.design, self.design) or still:
@@ -264,12 +158,38 @@ class DraftModel(OpticalModel):
         self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
     ) -> Sight:
         if self._moved is None or self._kept is None:
-            self._kept = _Kept(super()._sight(contacts, resolution, skin))
+            sight = self._carried_sight(contacts, resolution, skin)
+            self._kept = KeptView(sight or super()._sight(contacts, resolution, skin))
+            if sight is None:
+                self._pressed_on = self.sensing
         known = self._kept.sight.known
         known.faint = None
         if self._faint:
             known.faint = np.stack([self._faint[name] for name in self._traced_groups])
         return self._kept.sight
+
+    def _carried_sight(
+        self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
+    ) -> Sight | None:
+        """Return the sight with the skin as the contacts deformed it in an earlier draft, moved
+        along with a cage by little; None if there is none.
+        """
+        old, now = self._pressed_on, self.sensing
+        if not self._faint or self._last_sight is None or old is None or skin != ELASTIC:
+            return None
+        last, pressed = self._last_sight, self._last_sight.pressed
+        mesh = last.skin
+        if pressed is None or mesh is None or mesh.origin is None or not same_faces(old, now):
+            return None
+        if np.abs(old.vertices - now.vertices).max(initial=0.0) > CELL_TOLERANCE:
+            return None
+        camera = self.camera(resolution)
+        mesh = mesh.carried(now)
+        scenes = self.scenes.deformed(mesh, pressed)
+        rays = trace_chief_rays(scenes.full, camera)
+        if not rays.hit.any():
+            raise sees_nothing(rays)
+        return Sight(camera, last.placed, pressed, scenes, rays, mesh)
 
     @property
     def _draft_store(self) -> DraftCacheStore | None:
@@ -366,24 +286,3 @@ def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
         for k, (a, b) in enumerate(pairs)
         if (a.model, a.emitter, a.lights) != (b.model, b.emitter, b.lights)
     )
-
-
-def _same(one: list[Piece], other: list[Piece]) -> bool:
-    """Return whether lists hold the same objects."""
-    return len(one) == len(other) and all(a is b for a, b in zip(one, other, strict=True))
-
-
-def _apart(one: list[Piece], other: list[Piece]) -> float:
-    """Return the largest distance (mm) between corresponding vertices; infinite if the faces
-    differ.
-    """
-    if len(one) != len(other):
-        return np.inf
-    farthest = 0.0
-    for a, b in zip(one, other, strict=True):
-        if a is b:
-            continue
-        if len(a.vertices) != len(b.vertices) or not np.array_equal(a.faces, b.faces):
-            return np.inf
-        farthest = max(farthest, float(np.abs(a.vertices - b.vertices).max(initial=0.0)))
-    return farthest

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
-from optisense.mechanics import ELASTIC, SKINS, PressedSkin
+from optisense.mechanics import ELASTIC, SKINS, PressedSkin, SkinMesh
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import bound_memory
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
@@ -73,6 +73,7 @@ class Sight:
         pressed: the elastic skin under the contacts; None without one.
         scenes: the sensor with its contacts.
         rays: the chief rays.
+        skin: the mesh of the elastic skin under the contacts; None without one.
         known: parts of the image that drafts reuse.
     """
 
@@ -81,6 +82,7 @@ class Sight:
     pressed: PressedSkin | None
     scenes: ContactScenes
     rays: ChiefRays
+    skin: SkinMesh | None = None
     known: KnownView = field(default_factory=KnownView)
 
 
@@ -296,16 +298,17 @@ class OpticalModel(RayModel):
         """Press the contacts, and trace the chief rays of an image; see `render`."""
         camera = self.camera(resolution)
         placed = [self.place(contact) for contact in contacts]
-        pressed = None
+        pressed = mesh = None
         if contacts and skin == ELASTIC:
             pressed = self.pressed(contacts, placed)
-            scenes = self._deformed_scenes(contacts, placed)
+            mesh = self._view.gel.mesh(contacts)
+            scenes = self.scenes.deformed(mesh, pressed)
         else:
             scenes = self.scenes.touched(contacts, placed)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)
-        return Sight(camera, placed, pressed, scenes, rays)
+        return Sight(camera, placed, pressed, scenes, rays, mesh)
 
     @property
     def _traced_groups(self) -> list[str]:

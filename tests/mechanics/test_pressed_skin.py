@@ -254,3 +254,18 @@ def test_silicones_of_the_library_have_elastic_constants(name):
 def test_the_librarys_solaris_follows_from_its_hardness():
     modulus = library.material("silicone-solaris").elasticity.youngs_modulus
     assert modulus == pytest.approx(youngs_modulus_of_shore_a(15.0), rel=1e-3)
+
+
+def test_a_pressed_skin_is_carried_along_with_the_skin():
+    top = TriangleMesh.grid((20.0, 20.0)).flipped()
+    body = TriangleMesh.box((-10.0, -10.0, -4.25), (10.0, 10.0, 0.0))
+    surface = SensingSurface(top, (0, 0, 0), (1, 0, 0), (0, 1, 0))
+    gel = Gel(surface, top, [body], GEL, lambda contact: place(contact, surface, body))
+    mesh = skin_mesh(top, gel.pressed([Contact(Sphere(1.5), at=(0, 0), depth=0.3)]))
+    still = mesh.carried(top)
+    np.testing.assert_allclose(still.vertices, mesh.vertices, atol=1e-12)
+    np.testing.assert_allclose(still.corner_normals, mesh.corner_normals, atol=1e-12)
+    step = np.array([0.3, -0.2, 0.1])
+    aside = mesh.carried(top.with_vertices(top.vertices + step))
+    np.testing.assert_allclose(aside.vertices, mesh.vertices + step, atol=1e-12)
+    assert aside.faces is mesh.faces and aside.state is mesh.state

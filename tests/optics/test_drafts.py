@@ -199,3 +199,17 @@ def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
     assert draft._store.cells is not cells, "those of the shape before were kept until then"
     a, b = blocks(bent.radiance), blocks(again.radiance)
     np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+
+
+def test_frosted_faces_move_along_with_a_cage_as_if_cut_anew() -> None:
+    mini = ots.load("gelsight-mini")
+    drafts = DraftModel(mini)
+    names = [piece.name for piece in drafts.scenes.pieces]
+    assert any(":" in name for name in names), "the Mini has frosted faces"
+    bent = ots.set_value(mini, "cages.skin.points[14].z", 0.2)
+    drafts.set_design(bent)
+    anew = OpticalModel(bent)
+    assert [piece.name for piece in drafts.scenes.pieces] == names
+    for moved, cut in zip(drafts.scenes.pieces, anew.scenes.pieces, strict=True):
+        box = [np.stack([p.vertices.min(axis=0), p.vertices.max(axis=0)]) for p in (moved, cut)]
+        np.testing.assert_allclose(box[0], box[1], atol=0.01, err_msg=moved.name)

@@ -144,6 +144,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
             pieces.append(kept.piece(name, mesh, _refracting_sheet(medium, design), old))
         elif part.role is not Role.INDENTER:
             sheets.append(Sheet(name, mesh, part.role.value))
+    kept.finishes.bend = bend
     frosts, paints = finishes_of(design, meshes, sheets, kept.finishes, old.finishes)
     covers = {sheet.name: design.parts[sheet.name].material for sheet in sheets}
     covers |= {paint.sheet.name: paint.material for paint in paints}
