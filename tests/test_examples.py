@@ -12,7 +12,7 @@ EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.py"))
 
 
 def test_the_examples_are_numbered() -> None:
-    assert [file.name[:3] for file in EXAMPLES] == ["01_", "02_", "03_", "04_"]
+    assert [file.name[:3] for file in EXAMPLES] == ["01_", "02_", "03_", "04_", "05_"]
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda file: file.stem)
