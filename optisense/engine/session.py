@@ -107,7 +107,7 @@ class Renderer:
 
         raise_problems(unit_slips(design), f"design '{design.name}'")
         if self._model is None:
-            self._model = OpticalModel(design, self.variant)
+            self._model = OpticalModel(design, self.variant, self._drafts)
         elif _is_another(self._model.design, design):
             self._model.set_design(design)
             self._leave(design)
@@ -127,7 +127,7 @@ class Renderer:
 
         raise_problems(unit_slips(design), f"design '{design.name}'")
         if self._drafts is None:
-            self._drafts = DraftModel(design, self.variant)
+            self._drafts = DraftModel(design, self.variant, self._model)
         else:
             self._drafts.set_design(design)
         made: Usual = self._drafts

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheS
 from optisense.optics.scene.emitters import emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.scene.surface_cells import SurfaceCells, cells_near
 from optisense.optics.scene.surfaces import SurfaceKind
 
 DRAFT_CELL_SCALE = 2.4
@@ -114,6 +116,13 @@ class DraftCacheStore(CacheStore):
             self.most_groups = before.most_groups
         if before.has_guide_for(lit):
             self._guide, self._learned_on = before._guide, before._learned_on
+
+    @cached_property
+    def _target(self) -> tuple[SurfaceCells, NDArray[np.bool_]]:
+        """The cells of the light, which are coarse enough, and the mask of those in or near the
+        view.
+        """
+        return self.cells, cells_near(self.cells, self._seen, VIEW_MARGIN)
 
     def forget_cells(self) -> None:
         """Drop the surface cells, so that the next store divides its surfaces anew."""

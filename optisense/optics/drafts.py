@@ -24,6 +24,7 @@ from optisense.optics.draft_light import CELL_TOLERANCE, DraftCacheStore, KeptVi
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel, Sight
 from optisense.optics.radiance_cache.lit_scene import LitScene
+from optisense.optics.ray_model import RayModel
 from optisense.optics.scene.assembly import assemble
 from optisense.optics.scene.media import same_faces
 from optisense.optics.scene.sensor_scenes import SensorScenes
@@ -78,7 +79,9 @@ class DraftModel(OpticalModel):
     bends_media = True
     view_type = DraftView
 
-    def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
+    def __init__(
+        self, design: SensorDesign, variant: str = "auto", before: RayModel | None = None
+    ) -> None:
         """See `OpticalModel`."""
         self._rest: dict[str, TriangleMesh] = {}
         self._bent: dict[str, TriangleMesh] = {}
@@ -91,7 +94,7 @@ class DraftModel(OpticalModel):
         self._pressed_on: TriangleMesh | None = None
         """The undeformed skin when contacts were pressed in last."""
         self._shown: _Shown | None = None
-        super().__init__(self._straightened(design), variant)
+        super().__init__(self._straightened(design), variant, before)
 
     def set_design(self, design: SensorDesign) -> None:
         """Adopt another design; see `RayModel.set_design`."""

@@ -42,7 +42,9 @@ class RayModel:
     view_type: type[SkinView] = SkinView
     """The class of the camera's view of a shape."""
 
-    def __init__(self, design: SensorDesign, variant: str = "auto") -> None:
+    def __init__(
+        self, design: SensorDesign, variant: str = "auto", before: RayModel | None = None
+    ) -> None:
         """Resolve media and build the scene.
 
         Args:
@@ -50,6 +52,7 @@ class RayModel:
                 ``update``).
             variant: "auto" (the variant selected before, else CUDA if there is a GPU), "llvm" or
                 "cuda".
+            before: a model of the same or a similar design, whose media and shapes are reused.
 
         Raises:
             SetupError: the variant is not available on this machine.
@@ -60,8 +63,10 @@ class RayModel:
         refuse_no_design(design)
         self.variant = use_variant(variant)
         self.design = design.copy()
-        assembly = assemble(self.design, None, self.bends_media)
-        self.scenes = SensorScenes(assembly, self.design.coating)
+        known = None if before is None else before.scenes
+        shapes = None if known is None else known.assembly
+        assembly = assemble(self.design, shapes, self.bends_media)
+        self.scenes: SensorScenes = SensorScenes(assembly, self.design.coating, known)
         self._view = self.view_type(self.design, self.scenes)
         self._chain: PictureChain | None = None
 
