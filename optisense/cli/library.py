@@ -209,6 +209,11 @@ def add_entry(
         "--source": source,
     }  # fmt: skip
     if tuning is None:
+        if str(file) == "camera" and not file.exists():
+            raise typer.BadParameter(
+                "name the tuning file: library add camera --tuning FILE.json --like CAMERA",
+                param_hint="--tuning",
+            )
         for option, value in (("--like", like), ("--temperature", temperature)):
             if value is not None:
                 raise typer.BadParameter("is for --tuning only", param_hint=option)

@@ -90,8 +90,11 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
         except LibraryError as error:
             raise LibraryError(error.message, where=f"{path}: rpi.{name}", hint=NO_TUNING) from None
         except (KeyError, TypeError, ValueError, IndexError, ArithmeticError) as error:
+            wrong = "a list has another length, or a field another type"
+            if isinstance(error, KeyError):
+                wrong = f"it has no {error}"
             raise LibraryError(
-                f"'rpi.{name}' is not as in a tuning file ({type(error).__name__}: {error})",
+                f"'rpi.{name}' is not as in a tuning file: {wrong}",
                 where=str(path),
                 hint=NO_TUNING,
             ) from None
@@ -233,13 +236,13 @@ def _add_crosstalk(values: dict[str, Any], derived: dict[str, str]) -> None:
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise TypeError(f"{value!r} is no number")
+        raise LibraryError(f"{value!r} is no number")
     return float(value)
 
 
 def _numbers(values: Any) -> FloatArray:
     if not isinstance(values, list) or not values:
-        raise TypeError("a list of numbers is missing")
+        raise LibraryError("a list of numbers is missing")
     return np.array([_number(each) for each in values])
 
 
