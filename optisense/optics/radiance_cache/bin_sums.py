@@ -19,9 +19,12 @@ from optisense.optics.radiance_cache.angular_variance import (
 )
 from optisense.optics.radiance_cache.cache import BinnedLight
 from optisense.optics.radiance_cache.irradiance import irradiance
-from optisense.optics.radiance_cache.raised_plane import RAISED_HEIGHT, sampled_plane
+from optisense.optics.radiance_cache.raised_plane import (
+    RAISED_HEIGHT,
+    below_crossing,
+    sampled_plane,
+)
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
-from optisense.optics.radiance_cache.tally import MIN_COSINE
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene
@@ -91,7 +94,7 @@ def sum_bins(
     while active & (k < bins):
         there = mi.UInt32(at.cell)
         if upper is None:
-            there = first + _place(light, scenes.fixed, at, k, level)
+            there = _place(light, scenes.fixed, at, k, level, first)
         for g in range(groups):
             entry = (there * bins + k) * groups + g
             value = dr.gather(mi.Vector4f, moments, entry, active)
@@ -193,7 +196,12 @@ def _shorter_path_factor(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) 
 
 @dr.syntax
 def _place(
-    light: BinnedLight, fixed: RayScene, at: ShadingPoints, k: mi.UInt32, level: mi.Float
+    light: BinnedLight,
+    fixed: RayScene,
+    at: ShadingPoints,
+    k: mi.UInt32,
+    level: mi.Float,
+    first: mi.UInt32,
 ) -> mi.UInt32:
     """Return the number of the cell in which bin ``k`` is looked up for each point.
 
@@ -207,16 +215,10 @@ def _place(
     cells, point = light.cells, at.seen.point
     middle = dr.gather(mi.Vector4f, light.centres, k)
     towards = mi.Vector3f(middle.x, middle.y, middle.z)
-    there = mi.UInt32(at.cell)
     exists = at.active & at.raised
-    for _ in range(2 if fixed.smooth else 1):
-        normal, offset = plane_of(cells, there, exists)
-        facing = dr.dot(normal, towards)
-        exists &= facing > MIN_COSINE
-        way = (dr.dot(normal, point) - offset - level) / dr.maximum(facing, MIN_COSINE)
-        foot = point - towards * way - normal * level
-        there, found = cell_at(cells, foot + at.shift, exists)
-        exists &= found
+    there, exists = below_crossing(
+        cells, at.cell, point, towards, level, exists, fixed.smooth, at.shift
+    )
     if dr.hint(fixed.smooth, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
         if at.active & at.raised & ~exists:
             below = fixed.scene.ray_intersect_preliminary(
@@ -225,4 +227,5 @@ def _place(
             reached = below.is_valid()
             landing = point - towards * dr.select(reached, below.t, 0)
             there, exists = cell_at(cells, landing + at.shift, reached)
-    return dr.select(exists, there, at.cell)
+            first = mi.UInt32(0)
+    return first + dr.select(exists, there, at.cell)

@@ -1,4 +1,4 @@
-"""The raised plane: light that passes through a plane above a flat surface.
+"""The raised plane: light that passes through a plane above a surface.
 
 A direction bin is looked up where the line along its middle direction, through a point on an
 indenter, meets the undeformed surface. Near a lamp this is several millimetres away, so that the
@@ -7,13 +7,20 @@ therefore also tallied where they cross a plane above the surface, each along it
 Points between both planes look up either of them, at random in proportion to the distance from the
 other. What a bin's width shifts one way in the one plane, it shifts the other way in the other, and
 the mean of many camera samples is right to first order.
+
+Above a curved surface the plane is the offset surface at a constant height. It has another area,
+and a photon crosses it at another angle than that at which it lands. On the dome of GelSight Mini,
+whose radius is 26 mm, the area is smaller by 6 %, and the flux density of grazing red light would
+be 15 % too low if it were computed with the angles of the landings.
 """
 
 from __future__ import annotations
 
 import drjit as dr
 import mitsuba as mi
+import numpy as np
 
+from optisense.optics.backend.arrays import floats
 from optisense.optics.backend.sequences import GOLDEN_BITS, unit_float
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.transport.camera_paths import VisiblePoints
@@ -22,33 +29,98 @@ RAISED_HEIGHT = 0.8
 """Height (mm) of the raised plane, about the depth of usual contacts. In a contact of this depth
 near the lamps of GelSight Mini, means over patches are 3.0 % off; with 0.5 mm it is 3.5 %, and with
 1.1 mm 4.3 %. A third plane at 0.4 mm makes no difference."""
+STEPS = 2
+"""Number of planes of cells that a line is intersected with in turn, where the surface is curved.
+With 8, the light in a contact of the spherical GelSight Mini is the same within 0.2 %."""
+LEAST_AREA = 0.25
+"""Smallest area of the raised plane over that of the surface, as in hollows whose radius is little
+larger than the height of the plane."""
 MIN_COSINE = 0.02
 """Cosine of incidence below which a photon is not tallied in the raised plane, as the place where
 it crosses it is too uncertain."""
 
 
-def crossed_cell(
+def areas(cells: SurfaceCells) -> mi.Float:
+    """Return the area of the raised plane above each cell over the area of the cell."""
+    growth = cells.spread @ (RAISED_HEIGHT, RAISED_HEIGHT**2)
+    return floats(np.maximum(1 + growth, LEAST_AREA))
+
+
+def crossings(
     cells: SurfaceCells,
     cell: mi.UInt32,
     point: mi.Point3f,
     direction: mi.Vector3f,
+    cosine: mi.Float,
     active: mi.Bool,
-) -> tuple[mi.UInt32, mi.Bool]:
-    """Return the cell below the place where each photon crosses the raised plane, and whether there
-    is one.
+    areas: mi.Float | None = None,
+) -> tuple[mi.UInt32, mi.Float, mi.Bool]:
+    """Return where photons cross the raised plane.
 
     Args:
-        cells: the cells of a flat surface.
+        cells: the cells of the surface.
         cell: the cell that each photon lands in.
         point: where it lands, mm.
         direction: unit vector along which it travels.
+        cosine: cosine of incidence at which it lands.
         active: mask of the photons that land in a cell.
+        areas: the areas of the raised plane (see `areas`), if surfaces are curved.
+
+    Returns:
+        The cell below the place where each photon crosses the plane; its flux density there,
+        relative to that in the cell where it lands; and whether it crosses the plane.
     """
-    normal, offset = plane_of(cells, cell, active)
-    cosine = -dr.dot(normal, direction)
-    crosses = active & (cosine > MIN_COSINE)
-    way = (RAISED_HEIGHT + offset - dr.dot(normal, point)) / dr.maximum(cosine, MIN_COSINE)
-    return cell_at(cells, point - direction * way - normal * RAISED_HEIGHT, crosses)
+    there, crosses = below_crossing(
+        cells,
+        cell,
+        point,
+        -direction,
+        dr.opaque(mi.Float, RAISED_HEIGHT),
+        active,
+        areas is not None,
+    )
+    if areas is None:
+        return there, mi.Float(1), crosses
+    crossing = -dr.dot(plane_of(cells, there, crosses)[0], direction)
+    crosses &= crossing > MIN_COSINE
+    area = dr.gather(mi.Float, areas, there, crosses)
+    flatter = dr.maximum(cosine, MIN_COSINE) / dr.maximum(crossing, MIN_COSINE)
+    return there, flatter / dr.select(crosses, area, 1), crosses
+
+
+def below_crossing(
+    cells: SurfaceCells,
+    cell: mi.UInt32,
+    point: mi.Point3f,
+    towards: mi.Vector3f,
+    level: mi.Float,
+    active: mi.Bool,
+    curved: bool,
+    shift: mi.Vector3f | None = None,
+) -> tuple[mi.UInt32, mi.Bool]:
+    """Return the cell below the place where a line crosses a plane, and whether there is one.
+
+    Args:
+        cells: the cells of the surface.
+        cell: the cell that each line starts above.
+        point: a point of each line, mm.
+        towards: its unit direction away from the surface.
+        level: height (mm) of the plane above the surface.
+        active: mask of the lines that count.
+        curved: whether surfaces are curved; the planes of several cells are then intersected in
+            turn.
+        shift: vector (mm) by which the place is shifted before its cell is looked up.
+    """
+    there, exists = mi.UInt32(cell), mi.Bool(active)
+    for _ in range(STEPS if curved else 1):
+        normal, offset = plane_of(cells, there, exists)
+        facing = dr.dot(normal, towards)
+        exists &= facing > MIN_COSINE
+        way = (dr.dot(normal, point) - offset - level) / dr.maximum(facing, MIN_COSINE)
+        foot = point - towards * way - normal * level
+        there, found = cell_at(cells, foot if shift is None else foot + shift, exists)
+        exists &= found
+    return there, exists
 
 
 def sampled_plane(points: VisiblePoints, rise: mi.Float, raised: mi.Bool) -> mi.Bool:

@@ -27,7 +27,7 @@ from optisense.optics.radiance_cache.direction_bins import (
 from optisense.optics.radiance_cache.irradiance import irradiance_table
 from optisense.optics.radiance_cache.noise import noise_of_worst_places, relative_noise
 from optisense.optics.radiance_cache.power_rounding import PowerRounding
-from optisense.optics.radiance_cache.raised_plane import crossed_cell
+from optisense.optics.radiance_cache.raised_plane import areas, crossings
 from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, smooth
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
@@ -59,6 +59,7 @@ class CacheTally:
         flux_layer: FluxLayer | None = None,
         directions: DirectionBins = COARSE_BINS,
         planes: int = 1,
+        curved: bool = False,
     ) -> None:
         """Prepare empty tables.
 
@@ -71,9 +72,11 @@ class CacheTally:
             layer.
             directions: the direction bins.
             planes: 2 to tally the light in the raised plane as well (see `raised_plane`), else 1.
+            curved: whether surfaces are curved.
         """
         self.directions = directions
         self.planes = planes
+        self.raised_areas = areas(kernels.cells) if planes > 1 and curved else None
         self.flux_layer = flux_layer
         self.roughness = roughness
         self.kernels = kernels
@@ -138,27 +141,31 @@ class CacheTally:
         kept = across * in_quanta.kept(scalar * across)
         flux = scalar * kept
         height = dr.dot(direction, bin_axis(self.cells, 2))
-        rows = [(cell, found)]
+        rows = [(cell, mi.Float(1), found)]
         if self.planes > 1:
-            crossed, crosses = crossed_cell(self.cells, cell, point, direction, found)
-            rows.append((crossed + dr.opaque(mi.UInt32, self.cells.cells), crosses))
-        for row, counts in rows:
+            crossed, relative, crosses = crossings(
+                self.cells, cell, point, direction, travel.w, found, self.raised_areas
+            )
+            rows.append((crossed + dr.opaque(mi.UInt32, self.cells.cells), relative, crosses))
+        for row, relative, counts in rows:
             entry = (row * count + bin_) * self.groups + group
             if self.coloured:
                 for k in range(3):
-                    value = in_quanta(power[k] * kept)
+                    value = in_quanta(power[k] * kept * relative)
                     dr.scatter_add(tables.colours, value, entry * 4 + k, counts)
             for k in range(3):
-                value = in_quanta(-direction[k] * flux)
+                value = in_quanta(-direction[k] * flux * relative)
                 dr.scatter_add(tables.moments, value, entry * 4 + k, counts)
-            dr.scatter_add(tables.moments, in_quanta(flux), entry * 4 + 3, counts)
-            dr.scatter_add(tables.heights, in_quanta(dr.square(height) * flux), entry, counts)
+            dr.scatter_add(tables.moments, in_quanta(flux * relative), entry * 4 + 3, counts)
+            dr.scatter_add(
+                tables.heights, in_quanta(dr.square(height) * flux * relative), entry, counts
+            )
         if flux_layer is not None:
             return
         half = (bits >> HALF_SHIFT) & 1
-        for plane, (row, counts) in enumerate(rows):
+        for plane, (row, relative, counts) in enumerate(rows):
             place = row + (half + plane) * dr.opaque(mi.UInt32, self.cells.cells)
-            value = mi.Float64(in_quanta(scalar))
+            value = mi.Float64(in_quanta(scalar * relative))
             dr.scatter_add(self.halves, value, place * self.groups + group, counts)
 
     def noise(self) -> float:

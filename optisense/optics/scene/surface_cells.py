@@ -44,6 +44,9 @@ class SurfaceCells:
         centres: (cells, 3) centre of the surface in each cell, mm.
         normals: (cells, 3) mean unit normal of the surface in each cell.
         areas: (cells,) area of the surface in each cell, mm^2.
+        spread: (cells, 2) coefficients of the area of an offset surface: at the height h (mm) along
+            the normals, it is 1 + spread[:, 0] h + spread[:, 1] h^2 times that of the surface
+            (Steiner's formula with minus twice the mean curvature, and the Gaussian curvature).
         axes: (3, 3) frame of the direction bins, as rows.
     """
 
@@ -58,6 +61,7 @@ class SurfaceCells:
     centres: FloatArray
     normals: FloatArray
     areas: FloatArray
+    spread: FloatArray
     axes: FloatArray
 
 
@@ -97,10 +101,24 @@ def _twice_areas(vertices: FloatArray, faces: NDArray[np.integer]) -> tuple[Floa
     return cross, np.linalg.norm(cross, axis=1)
 
 
-def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -> SurfaceCells:
-    """Divide a mesh into cells of side ``size`` (mm)."""
+def build_cells(
+    vertices: FloatArray,
+    faces: NDArray[np.integer],
+    size: float,
+    normals: FloatArray | None = None,
+) -> SurfaceCells:
+    """Divide a mesh into cells.
+
+    Args:
+        vertices: (n, 3) mm.
+        faces: (m, 3) indices of vertices.
+        size: side (mm) of a cell.
+        normals: (m, 3, 3) unit normals of the surface at the corners of each face, on the side of
+            the normal of the face; None if all facets are flat.
+    """
     vertices = np.asarray(vertices, dtype=np.float64)
-    faces = faces[_twice_areas(vertices, faces)[1] > 0.0]  # others would give cells without area
+    solid = _twice_areas(vertices, faces)[1] > 0.0  # others would give cells without area
+    faces = faces[solid]
     points, face, areas = surface_samples(vertices, faces, size / SAMPLES_ACROSS)
     # The offset is not a round number, so that a plane of the design does not coincide with a
     # border between cells.
@@ -110,10 +128,15 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
     place = x + counts[0] * (y + counts[1] * z)
     used, owner = np.unique(place, return_inverse=True)
     cross, length = _twice_areas(vertices, faces)
-    normals = (cross / np.maximum(length, 1e-30)[:, None])[face]
-    owner, other = _divided(np.asarray(owner).reshape(-1), points, normals, areas)
+    upright = cross / np.maximum(length, 1e-30)[:, None]
+    owner, other = _divided(np.asarray(owner).reshape(-1), points, upright[face], areas)
     cells = len(other)
-    area, centre, normal = _means(owner, cells, points, normals, areas)
+    area, centre, normal = _means(owner, cells, points, upright[face], areas)
+    spread = np.zeros((cells, 2))
+    if normals is not None:
+        growth = _growth(vertices[faces], normals[solid], upright)[face] * areas[:, None]
+        spread = np.stack([np.bincount(owner, each, cells) for each in growth.T], axis=1)
+        spread /= np.maximum(area, 1e-30)[:, None]
     index = _index(used, counts)
 
     lower3, counts3 = mi.Point3f(*lower.tolist()), mi.Vector3u(*counts.tolist())
@@ -133,8 +156,27 @@ def build_cells(vertices: FloatArray, faces: NDArray[np.integer], size: float) -
         centres=centre,
         normals=normal,
         areas=area,
+        spread=spread,
         axes=_frame(normal.sum(axis=0)),
     )
+
+
+def _growth(corners: FloatArray, normals: FloatArray, upright: FloatArray) -> FloatArray:
+    """Return the coefficients of the areas of offset faces (m, 2), as `SurfaceCells.spread`.
+
+    Args:
+        corners: (m, 3, 3) corners, mm.
+        normals: (m, 3, 3) unit normals of the surface at the corners.
+        upright: (m, 3) unit normals of the faces.
+    """
+    side, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
+    turn, other_turn = (normals[:, k] - normals[:, 0] for k in (1, 2))
+
+    def area(one: FloatArray, two: FloatArray) -> FloatArray:
+        return np.asarray(np.einsum("mi,mi->m", np.cross(one, two), upright))
+
+    linear = area(side, other_turn) + area(turn, other)
+    return np.stack([linear, area(turn, other_turn)], axis=1) / area(side, other)[:, None]
 
 
 def _means(
