@@ -171,32 +171,42 @@ def _score(row: dict[str, Any]) -> str:
     return f"{row['score']:.4g} ± {row['deviation']:.2g}"
 
 
+def _load(row: dict[str, Any]) -> str:
+    return f"{row['machine']['load_at_start']:.1f}"
+
+
 def _table(found: dict[str, Any]) -> str:
     lines = [
         "# Searches by coarse scores first",
         "",
         "| search | trials | full scores in the coarse search | processor time, s: full, coarse "
-        "| share | score of the best with three new seeds: full, coarse |",
-        "|---|---|---|---|---|---|",
+        "| share | load of the machine: full, coarse "
+        "| score of the best with three new seeds: full, coarse |",
+        "|---|---|---|---|---|---|---|",
     ]
     for name, case in CASES.items():
         full, coarse = found.get(f"{name}-full"), found.get(f"{name}-coarse")
         if coarse is None:
             continue
         times, scores, share = ["not measured"], ["not measured"], ""
+        loads = ["not measured"]
         if full is not None:
             times, scores = [f"{full['processor_seconds']:.0f}"], [_score(full)]
+            loads = [_load(full)]
             share = f"{100 * coarse['processor_seconds'] / full['processor_seconds']:.0f} %"
         times.append(f"{coarse['processor_seconds']:.0f}")
         scores.append(_score(coarse))
+        loads.append(_load(coarse))
         lines.append(
             f"| {name}, `{case.goal}`, {case.method} | {coarse['trials']} "
-            f"| {coarse['full_scores']} | {', '.join(times)} | {share} | {', '.join(scores)} |"
+            f"| {coarse['full_scores']} | {', '.join(times)} | {share} | {', '.join(loads)} "
+            f"| {', '.join(scores)} |"
         )
     lines += [
         "",
         "Lower values of `reading` are better; its scores are negative here. ± is the standard "
-        "deviation over the seeds.",
+        "deviation over the seeds. Processor times are longer on a busy machine (load at the start "
+        "of the part above 1), so shares of searches under different loads are rough.",
         "",
     ]
     if "powers" in found:
