@@ -20,7 +20,7 @@ from optisense.design import SensorDesign
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.mechanics import ELASTIC
-from optisense.optics.draft_light import CELL_TOLERANCE, DraftCacheStore, KeptView
+from optisense.optics.draft_light import DraftCacheStore, KeptView
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel, Sight
 from optisense.optics.radiance_cache.lit_scene import LitScene
@@ -35,6 +35,11 @@ from optisense.quality import photons_of
 DRAG_PHOTONS = 0.5
 """Share of a draft's photons that are traced while something moves; a draft of all photons follows
 at rest."""
+
+CARRY_TOLERANCE = 2.0
+"""Largest displacement of the undeformed skin (mm) up to which a draft moves a pressed skin along
+with it. In a contact on a GelSight Mini bent by 2 mm, the error against the full picture is then
+7.6 %, and 7.3 % if the contact is pressed anew."""
 
 PLACED_CONTACTS = 64
 """Number of contacts whose placed meshes a draft keeps: more than the presses of any objective, and
@@ -184,7 +189,7 @@ class DraftModel(OpticalModel):
         mesh = last.skin
         if pressed is None or mesh is None or mesh.origin is None or not same_faces(old, now):
             return None
-        if np.abs(old.vertices - now.vertices).max(initial=0.0) > CELL_TOLERANCE:
+        if np.abs(old.vertices - now.vertices).max(initial=0.0) > CARRY_TOLERANCE:
             return None
         camera = self.camera(resolution)
         mesh = mesh.carried(now)
