@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,11 @@ FloatArray = NDArray[np.float64]
 _ARRIVED = 1e-9
 """Remaining distance (mm) below which a walk over the surface has arrived; a margin for
 rounding."""
+
+
+KEPT_POINTS = 256
+"""Number of places that a surface keeps with their coordinates: a press asks for the same place
+several times, and the walk to it takes some milliseconds on a curved surface."""
 
 
 class SurfacePoint(NamedTuple):
@@ -59,6 +64,7 @@ class SensingSurface:
         normal = self.mesh.face_normals[self._origin_face]
         self.u_axis = _in_plane(np.asarray(u_axis, dtype=np.float64), [normal], "u")
         self.v_axis = _in_plane(np.asarray(v_axis, dtype=np.float64), [normal, self.u_axis], "v")
+        self._points = lru_cache(maxsize=KEPT_POINTS)(self._point_found)
 
     def point_at(self, u: float, v: float) -> SurfacePoint:
         """Return the place with surface coordinates (u, v), mm.
@@ -66,6 +72,9 @@ class SensingSurface:
         Raises:
             ContactError: the path to it crosses the edge of the surface.
         """
+        return self._points(u, v)
+
+    def _point_found(self, u: float, v: float) -> SurfacePoint:
         way = u * self.u_axis + v * self.v_axis
         length = float(np.hypot(u, v))
         if length == 0.0:

@@ -28,11 +28,17 @@ ODD = {
 class GridResponse:
     """The response of a bonded layer to loads that are uniform on each square of a grid.
 
-    The grid is not periodic: transforms are padded to twice its size.
+    The grid is not periodic: transforms are padded so far that no square acts on another one from
+    the other side.
     """
 
     def __init__(
-        self, shape: tuple[int, int], pitch: float, thickness: float, elasticity: Elasticity
+        self,
+        shape: tuple[int, int],
+        pitch: float,
+        thickness: float,
+        elasticity: Elasticity,
+        farthest: tuple[int, int] | None = None,
     ) -> None:
         """Set the grid.
 
@@ -41,13 +47,18 @@ class GridResponse:
             pitch: side of a square, mm.
             thickness: thickness of the layer, mm.
             elasticity: elastic constants of the layer.
+            farthest: largest number of rows and of columns between a loaded square and any square
+                of the grid; without it, all squares may be loaded.
         """
         self.shape, self.pitch = shape, pitch
         self._load = SquareLoad(
             pitch, thickness, elasticity.shear_modulus, elasticity.poisson_ratio
         )
-        # An odd number of offsets, -(n - 1) to n - 1, fits twice the size.
-        self._padded = fft.next_fast_len(2 * shape[0]), fft.next_fast_len(2 * shape[1], real=True)
+        rows, columns = (
+            max(size, 2 * (far + 1))  # an odd number of offsets, -far to far, and one more
+            for size, far in zip(shape, farthest or (shape[0] - 1, shape[1] - 1), strict=True)
+        )
+        self._padded = fft.next_fast_len(rows), fft.next_fast_len(columns, real=True)
 
     def _quadrant(self) -> tuple[FloatArray, FloatArray]:
         """Return the non-negative offsets (mm) along x and y; kernels are even or odd in each."""

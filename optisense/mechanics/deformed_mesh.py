@@ -16,8 +16,13 @@ from optisense.mechanics.pressed_skin import PressedSkin
 FloatArray = NDArray[np.float64]
 
 EDGE_IN_CONTACT = 1.5
-"""Greatest edge length in a contact, in units of the pitch of its grid. Shading normals vary
-smoothly over triangles, so that facets are not visible."""
+"""Smallest value of the greatest edge length in a contact, in units of the pitch of its grid."""
+SMOOTH_EDGE = 3.0
+"""Largest value of the greatest edge length in a contact, in units of the pitch of its grid."""
+FACET_TILT = 0.01
+"""Error of slopes between the corners of a triangle in a contact, above which triangles are
+smaller. Shading normals vary linearly over triangles, so that facets of this error, half a degree,
+are not visible: on smooth indenters triangles may be larger than on textures."""
 EDGE_AT_RIM = 0.6
 """Greatest edge length within `RIM` of a contact's rim, in units of the grid's pitch. Slopes jump
 at the rim, and larger triangles would make it jagged."""
@@ -211,8 +216,11 @@ def _wanted(points: FloatArray, pressed: PressedSkin) -> FloatArray:
     for contact in pressed.contacts:
         place = contact.place
         local = place.local(points)
-        away, from_rim = contact.field.distances(local[:, 0], local[:, 1])
-        finest = np.where(from_rim < RIM * place.pitch, EDGE_AT_RIM, EDGE_IN_CONTACT) * place.pitch
+        away, from_rim, bend = contact.field.nearby(local[:, 0], local[:, 1])
+        # Slopes of second difference b deviate by b n^2 / 8 from a straight line over n pitches.
+        straight = np.sqrt(8.0 * FACET_TILT / np.maximum(bend, FACET_TILT / SMOOTH_EDGE**2))
+        inside = np.clip(straight, EDGE_IN_CONTACT, SMOOTH_EDGE)
+        finest = np.where(from_rim < RIM * place.pitch, EDGE_AT_RIM, inside) * place.pitch
         length = np.minimum(finest + GROWTH * away, LONGEST_EDGE * place.thickness)
         result = np.minimum(result, np.where(away < DECAY * place.thickness, length, np.inf))
     return result

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, map_coordinates, spline_filter
+from scipy.ndimage import (
+    binary_erosion,
+    distance_transform_edt,
+    map_coordinates,
+    maximum_filter,
+    spline_filter,
+)
 
 from optisense.mechanics.convolution import GridResponse
 from optisense.mechanics.elasticity import Elasticity
@@ -25,6 +31,9 @@ the gel's thickness; displacements vary slowly farther out."""
 DECAY = 6.0
 """Distance from a footprint, in thicknesses, beyond which displacements are neglected. They are
 less than 0.3 % there of those at half a thickness, for any Poisson ratio."""
+BEND_REACH = 2
+"""Distance, in pitches of a contact's grid, within which the largest second difference of
+the slopes counts: about half of the longest triangle."""
 COARSE_POINTS = 20
 """Number of points of the coarse grid per thickness of the gel; the grid resolves bulges, which are
 as wide as the gel is thick."""
@@ -34,6 +43,21 @@ similar sizes share its kernels."""
 MAX_COARSE = 400
 """Largest number of points of the coarse grid along a side, which bounds the time of its
 transform."""
+
+
+class Nearby(NamedTuple):
+    """Points in and beside a contact.
+
+    Attributes:
+        away: (n,) distance (mm) from the contact, 0 inside it, accurate to about a pitch.
+        from_rim: (n,) distance (mm) from its rim, on either side of it.
+        bend: (n,) greatest second difference of the indenter's slopes on the contact's grid within
+            `BEND_REACH`; 0 beside the contact.
+    """
+
+    away: FloatArray
+    from_rim: FloatArray
+    bend: FloatArray
 
 
 class DisplacementField:
@@ -74,7 +98,9 @@ class DisplacementField:
         rows, columns = place.overlap.shape
         ring = int(np.ceil(RING * min(rows, columns, thickness / pitch)))
         shape = rows + 2 * ring, columns + 2 * ring
-        response = grid_response(shape, pitch, thickness, elasticity)
+        # Only the middle of either grid is loaded.
+        farthest = rows + ring - 1, columns + ring - 1
+        response = grid_response(shape, pitch, thickness, elasticity, farthest)
         x0, y0 = place.x[0] - ring * pitch, place.y[0] - ring * pitch
         self._around = GridArea(shape, x0, y0, pitch)
         self._touching, self._pressure = pressure > 0.0, pressure
@@ -85,7 +111,9 @@ class DisplacementField:
         needed = [int(np.ceil((b - a) / step)) + 1 for a, b in ends]
         counts = [COARSE_STEP * int(np.ceil(n / COARSE_STEP)) for n in needed]
         coarse = binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
-        wide = grid_response((counts[1], counts[0]), step, thickness, elasticity)
+        border = int(reach / step) - 1  # squares in front of the first one that is loaded
+        farthest = counts[1] - 1 - border, counts[0] - 1 - border
+        wide = grid_response((counts[1], counts[0]), step, thickness, elasticity, farthest)
         # What follows from these is computed when it is asked for: other contacts need the coarse
         # grid only, and few calls need displacements along the skin.
         self.shear: FloatArray | None = None
@@ -217,14 +245,26 @@ class DisplacementField:
         by_x, by_y = slopes(known, self.place.pitch)
         return np.nan_to_num(by_x), np.nan_to_num(by_y)
 
+    @cached_property
+    def _bends(self) -> FloatArray:
+        """Return `Nearby.bend` on the contact's grid."""
+        found = np.zeros(self._touching.shape)
+        for slope in self._indenter_slopes:
+            for axis in (0, 1):
+                inner = [slice(1, -1) if k == axis else slice(None) for k in (0, 1)]
+                bend = np.abs(np.diff(slope, 2, axis=axis))
+                np.maximum(found[tuple(inner)], bend, out=found[tuple(inner)])
+        whole = binary_erosion(self._touching, np.ones((3, 3)))  # slopes jump at the rim
+        return np.asarray(maximum_filter(np.where(whole, found, 0.0), 2 * BEND_REACH + 1))
+
     def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
         """Return a mask of the points of the tangent plane that lie in the contact."""
         rows, columns, inside = self._cells(x, y)
         return inside & self._touching[rows, columns]
 
-    def distances(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the distances (mm) of points of the tangent plane from the contact, 0 inside it,
-        and from its rim, on either side of it; accurate to about a pitch.
+    def nearby(self, x: FloatArray, y: FloatArray) -> Nearby:
+        """Return where points of the tangent plane lie in or beside the contact, and how smooth the
+        contact is there.
         """
         rows, columns, inside = self._cells(x, y)
         away = self._away[rows, columns]
@@ -233,7 +273,8 @@ class DisplacementField:
             x[outside] - self.place.x[columns[outside]], y[outside] - self.place.y[rows[outside]]
         )
         away[outside] += np.where(beyond > self.place.pitch, beyond, 0.0)
-        return away, np.maximum(away, self._depth[rows, columns])
+        rim = np.maximum(away, self._depth[rows, columns])
+        return Nearby(away, rim, self._bends[rows, columns])
 
     @cached_property
     def _depth(self) -> FloatArray:
@@ -336,12 +377,16 @@ class GridSpline(GridArea):
 
 @lru_cache(maxsize=48)
 def grid_response(
-    shape: tuple[int, int], pitch: float, thickness: float, elasticity: Elasticity
+    shape: tuple[int, int],
+    pitch: float,
+    thickness: float,
+    elasticity: Elasticity,
+    farthest: tuple[int, int] | None = None,
 ) -> GridResponse:
     """Return the response of a grid; equal arguments share one object, which keeps its kernels (16
     bytes per grid point).
     """
-    return GridResponse(shape, pitch, thickness, elasticity)
+    return GridResponse(shape, pitch, thickness, elasticity, farthest)
 
 
 def binned(

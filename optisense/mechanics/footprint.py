@@ -144,7 +144,7 @@ def _overlap(body: TriangleMesh, skin: TriangleMesh, x: FloatArray, y: FloatArra
 
 def outer_faces(skin: TriangleMesh, x: FloatArray, y: FloatArray) -> TriangleMesh:
     """Return the faces of a skin that face outward and lie in the rectangle of a grid."""
-    low, high = skin.triangles.min(axis=1), skin.triangles.max(axis=1)
+    low, high = skin.face_bounds
     near = (high[:, 0] >= x[0]) & (low[:, 0] <= x[-1]) & (high[:, 1] >= y[0]) & (low[:, 1] <= y[-1])
     near &= skin.face_normals[:, 2] < 0.0  # face normals of sensing surfaces point into the gel
     return TriangleMesh(skin.vertices, skin.faces[near], skin.normals)

@@ -331,8 +331,7 @@ class GelPatch:
             normals: (faces, 4, 3) outward normals, times each point's share of the area.
         """
         offsets = self._offsets(points.reshape(-1, 3), new)
-        stress = point_load.stresses(offsets, self._nu, axis)
         out = normals.reshape(-1, 3) @ self._frames[new]
-        push = self._in_frame(np.einsum("snij,snj->sni", stress, out), new)
+        push = self._in_frame(point_load.tractions(offsets, out, self._nu, axis), new)
         push[(offsets**2).sum(axis=2) < (BLIND * self.columns.pitch) ** 2] = 0.0
         return push

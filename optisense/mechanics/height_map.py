@@ -41,7 +41,7 @@ def heights(mesh: TriangleMesh, x: FloatArray, y: FloatArray, highest: bool = Fa
     result = np.full(len(x) * len(y), np.inf)
     corners = mesh.triangles
     pitch_x, pitch_y = x[1] - x[0], y[1] - y[0]
-    low, high = corners.min(axis=1), corners.max(axis=1)
+    low, high = mesh.face_bounds
     first_x = np.ceil((low[:, 0] - x[0]) / pitch_x - 1e-9).clip(0, len(x)).astype(np.int64)
     last_x = np.floor((high[:, 0] - x[0]) / pitch_x + 1e-9).clip(-1, len(x) - 1).astype(np.int64)
     first_y = np.ceil((low[:, 1] - y[0]) / pitch_y - 1e-9).clip(0, len(y)).astype(np.int64)

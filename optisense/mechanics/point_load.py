@@ -64,21 +64,32 @@ def gradients(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> Fl
     if axis == 0:
         return _gradients_along(offsets, poisson_ratio)
     x, y, z = np.moveaxis(offsets, -1, 0)
-    r = np.sqrt(np.maximum(x**2 + y**2 + z**2, NEAREST_SQUARE))
-    nu = poisson_ratio
-    loss = 1.0 - 2.0 * nu
-    g = _inverse_product(r, z)
-    # g = 1 / (r (r + z)); its derivatives are -x (2 r + z) g^2 / r, the like by y, and -1 / r^3.
-    common = z / r**3 - loss * g
-    slope = -3.0 * z / r**5 + loss * (2.0 * r + z) * g**2 / r
-    by_z = 1.0 / r**3 - 3.0 * z**2 / r**5 + loss / r**3
+    common, slope, by_z, inward, along_z = _gradient_into(x, y, z, poisson_ratio)
     rows = [
         [common + x * x * slope, x * y * slope, x * by_z],
         [x * y * slope, common + y * y * slope, y * by_z],
+        [x * inward, y * inward, along_z],
     ]
-    inward = -3.0 * z**2 / r**5 - 2.0 * (1.0 - nu) / r**3
-    rows.append([x * inward, y * inward, 2.0 * z / r**3 + z * inward])
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2) / (4.0 * np.pi)
+
+
+def _gradient_into(
+    x: FloatArray, y: FloatArray, z: FloatArray, nu: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the functions of position in the gradients by a force into the half-space; see
+    `gradients`.
+    """
+    r = np.sqrt(np.maximum(x * x + y * y + z * z, NEAREST_SQUARE))
+    loss = 1.0 - 2.0 * nu
+    g = _inverse_product(r, z)
+    cubed = 1.0 / (r * r * r)
+    fifth = 3.0 * z * cubed / (r * r)
+    # g = 1 / (r (r + z)); its derivatives are -x (2 r + z) g^2 / r, the like by y, and -1 / r^3.
+    common = z * cubed - loss * g
+    slope = loss * (2.0 * r + z) * g * g / r - fifth
+    by_z = (1.0 + loss) * cubed - z * fifth
+    inward = -z * fifth - 2.0 * (1.0 - nu) * cubed
+    return common, slope, by_z, inward, 2.0 * z * cubed + z * inward
 
 
 def _gradients_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
@@ -107,15 +118,37 @@ def _gradients_along(offsets: FloatArray, poisson_ratio: float) -> FloatArray:
     return np.asarray(result / (4.0 * np.pi))
 
 
-def stresses(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
-    """Return the stresses (..., 3, 3), MPa, by a force of 1 N along an axis, for any shear
+def tractions(
+    offsets: FloatArray, normals: FloatArray, poisson_ratio: float, axis: int = INTO
+) -> FloatArray:
+    """Return the tractions (..., 3), MPa, on planes, by a force of 1 N along an axis, for any shear
     modulus.
+
+    Args:
+        offsets: (..., 3) positions relative to the load, mm; z points into the half-space.
+        normals: (..., 3) normals of the planes.
+        poisson_ratio: Poisson's ratio of the half-space.
+        axis: axis of the force.
     """
-    slopes = gradients(offsets, poisson_ratio, axis)
-    strains = slopes + np.swapaxes(slopes, -1, -2)  # twice the strains
-    dilatation = np.trace(slopes, axis1=-2, axis2=-1)
     share = 2.0 * poisson_ratio / (1.0 - 2.0 * poisson_ratio)
-    return np.asarray(strains + share * dilatation[..., None, None] * np.eye(3))
+    if axis != INTO:
+        slopes = gradients(offsets, poisson_ratio, axis)
+        dilatation = share * np.trace(slopes, axis1=-2, axis2=-1)
+        strains = slopes + np.swapaxes(slopes, -1, -2)  # twice the strains
+        found = np.einsum("...ij,...j->...i", strains, normals)
+        return np.asarray(found + dilatation[..., None] * normals)
+    # The same without the matrices, in a third of the time.
+    x, y, z = np.ascontiguousarray(np.moveaxis(offsets, -1, 0))
+    nx, ny, nz = np.ascontiguousarray(np.moveaxis(normals, -1, 0))
+    common, slope, by_z, inward, along_z = _gradient_into(x, y, z, poisson_ratio)
+    sideways = x * nx + y * ny
+    shear = by_z + inward
+    dilatation = share * (2.0 * common + slope * (x * x + y * y) + along_z)
+    towards = 2.0 * slope * sideways + shear * nz
+    level = 2.0 * common + dilatation
+    found = [x * towards + level * nx, y * towards + level * ny]
+    found.append(shear * sideways + (2.0 * along_z + dilatation) * nz)
+    return np.stack(found, axis=-1) / (4.0 * np.pi)
 
 
 def _inverse_product(r: FloatArray, z: FloatArray) -> FloatArray:

@@ -40,11 +40,12 @@ UNSETTLED = 1e-3
 sixtieth of a pixel of GelSight Mini. Below it, an iteration may stall at the tolerance of the
 pressure; that under a plate as large as the gel ends at 1.3e-4."""
 FIRST_TOLERANCE = 0.01
-"""Tolerance of the first pressure, solved before the correction for the gel's shape is known; see
-`normal_contact.TOLERANCE`."""
+"""Tolerance of the first pressure, solved before the correction for the gel's shape and the
+displacements due to other contacts are known; see `normal_contact.TOLERANCE`."""
 ROUGH_SHARE = 0.02
-"""Ratio of a pressure's tolerance to the last change (mm) of the correction for the gel's shape, so
-that each iteration is solved somewhat better than the next one changes it."""
+"""Ratio of a pressure's tolerance to the last change (mm) of the correction for the gel's shape or
+of the displacements due to other contacts, so that each iteration is solved somewhat better than
+the next one changes it."""
 MAX_TURNS = 40
 """Number of iterations of the pressure, or the shear, and the correction for the gel's shape after
 which the solver fails. Most contacts take 2 to 5, a plate over a whole gel 8."""
@@ -233,6 +234,7 @@ def press(
     """
     contacts: list[Pressed | None] = [None] * len(places)
     overlaps = [place.overlap for place in places]
+    tolerances = [FIRST_TOLERANCE if len(places) > 1 else TOLERANCE] * len(places)
     neighbours = Neighbours(places)
     for _ in range(MAX_SWEEPS):
         change = 0.0
@@ -240,14 +242,17 @@ def press(
             overlap = place.overlap - neighbours.at(i)
             before = contacts[i]
             if before is not None:
-                change = max(change, float(np.abs(overlap - overlaps[i]).max()))
-                if np.abs(overlap - overlaps[i]).max() < SETTLED:
+                moved = float(np.abs(overlap - overlaps[i]).max())
+                change = max(change, moved)
+                if moved < SETTLED and tolerances[i] == TOLERANCE:
                     continue
+                tolerances[i] = _tolerance(moved, overlap)
             else:
                 change = max(change, SETTLED)
             overlaps[i] = overlap
             patch = None if patches is None else patches[i]
-            solved = contacts[i] = _pressed(place, overlap, elasticity, patch, before)
+            solved = _pressed(place, overlap, elasticity, patch, before, tolerances[i])
+            contacts[i] = solved
             neighbours.set_field(i, solved.field)
         if change < SETTLED or len(places) == 1:
             break
@@ -326,11 +331,12 @@ def _pressed(
     elasticity: Elasticity,
     patch: GelPatch | None,
     before: Pressed | None,
+    tolerance: float,
 ) -> Pressed:
     """Solve one contact; pressure and the correction for the gel's shape are iterated in turn."""
     pressure = None if before is None else before.pressure
     if patch is None:
-        solved = _solve(place, overlap, elasticity, pressure, TOLERANCE)
+        solved = _solve(place, overlap, elasticity, pressure, tolerance)
         field = DisplacementField(place, overlap, solved.pressure, elasticity)
         return Pressed(place, solved.pressure, field)
     x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
@@ -344,7 +350,6 @@ def _pressed(
     beyond = GridSpline(values, *start, pitch).value(x, y).reshape(overlap.shape)
     solved = _solve(place, overlap - beyond, elasticity, pressure, FIRST_TOLERANCE)
     relaxation = Relaxation(values)
-    deepest = float(overlap.max())
     change = np.inf
     for _ in range(MAX_TURNS):
         last = change
@@ -354,7 +359,7 @@ def _pressed(
         values = relaxation.next(found)
         spline = GridSpline(values, *start, pitch)
         beyond = spline.value(x, y).reshape(overlap.shape)
-        rough = max(TOLERANCE, min(FIRST_TOLERANCE, ROUGH_SHARE * change / deepest))
+        rough = max(tolerance, _tolerance(change, overlap))
         solved = _solve(place, overlap - beyond, elasticity, solved.pressure, rough)
         stalled = last <= change < UNSETTLED
         if change < SETTLED or stalled:
@@ -363,6 +368,12 @@ def _pressed(
         _refuse_unsettled("the pressure under an indenter", MAX_TURNS, change)
     field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline, patch)
     return Pressed(place, solved.pressure, field, beyond=values)
+
+
+def _tolerance(change: float, overlap: FloatArray) -> float:
+    """Return the tolerance of a pressure while its overlap still changes by some mm."""
+    deepest = max(float(overlap.max()), SETTLED)  # others may move the skin out of reach
+    return max(TOLERANCE, min(FIRST_TOLERANCE, ROUGH_SHARE * change / deepest))
 
 
 def _solve(

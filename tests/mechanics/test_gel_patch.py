@@ -72,10 +72,13 @@ def unit_forces(patch, offsets):
 def test_a_point_load_is_carried_by_every_plane_below_it(nu):
     x = np.linspace(-60.0, 60.0, 1201)
     grid = np.stack([*np.meshgrid(x, x), np.full((1201, 1201), 1.5)], axis=2)
-    total = point_load.stresses(grid, nu)[:, :, :, 2].sum(axis=(0, 1)) * 0.1**2
+    down = np.array([0.0, 0.0, 1.0])
+    total = point_load.tractions(grid, np.broadcast_to(down, grid.shape), nu)
+    total = total.sum(axis=(0, 1)) * 0.1**2
     assert total == pytest.approx([0.0, 0.0, -1.0], abs=2e-3)
-    surface = point_load.stresses(np.array([[0.3, -0.2, 0.0], [2.0, 1.0, 0.0]]), nu)
-    assert surface[:, :, 2] == pytest.approx(0.0, abs=1e-12)
+    places = np.array([[0.3, -0.2, 0.0], [2.0, 1.0, 0.0]])
+    surface = point_load.tractions(places, np.stack([down, down]), nu)
+    assert surface == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -92,8 +95,15 @@ def test_derivatives_of_a_point_load_are_its_differences(axis):
     )
     found = point_load.gradients(points, 0.45, axis)
     assert found == pytest.approx(differences / 2e-5, abs=1e-6)
-    surface = point_load.stresses(np.array([[0.3, -0.2, 0.0], [2.0, 1.0, 0.0]]), 0.45, axis)
-    assert surface[:, :, 2] == pytest.approx(0.0, abs=1e-12)
+    strains = found + np.swapaxes(found, -1, -2)
+    share = 2.0 * 0.45 / (1.0 - 2.0 * 0.45)
+    stress = strains + share * np.trace(found, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    normals = np.random.default_rng(1).uniform(-1.0, 1.0, (20, 3))
+    push = point_load.tractions(points, normals, 0.45, axis)
+    assert push == pytest.approx(np.einsum("nij,nj->ni", stress, normals), abs=1e-9)
+    places, down = np.array([[0.3, -0.2, 0.0], [2.0, 1.0, 0.0]]), [[0.0, 0.0, 1.0]] * 2
+    surface = point_load.tractions(places, np.array(down), 0.45, axis)
+    assert surface == pytest.approx(0.0, abs=1e-12)
 
 
 def test_elements_resist_strains_and_nothing_else():
