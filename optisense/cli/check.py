@@ -39,7 +39,9 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         from optisense.optics import OpticalModel
 
         model = OpticalModel(sensor)
-        model.pressed(contacts, [model.place(each) for each in contacts])
+        pressed = model.pressed(contacts, [model.place(each) for each in contacts])
+        for warning in pressed.warnings:
+            output.print(f"odd: {warning}", markup=False, style="yellow")
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")
@@ -66,7 +68,7 @@ def _describe(design: SensorDesign) -> None:
     """Print the contents of the design, and the share of the skin that the camera sees."""
     from optisense.design.camera_checks import view_shares
     from optisense.design.parts import Role
-    from optisense.mechanics import elasticity_in_words, is_attached
+    from optisense.mechanics import elasticity_in_words, is_attached, rims_in_words
 
     output.print(design.name, style="bold", markup=False)
     if design.description:
@@ -108,6 +110,8 @@ def _describe(design: SensorDesign) -> None:
         if not is_attached(design):
             sentence = "odd: the gel is attached to nothing; its elastic skin can't be pressed"
             output.print(sentence, style="yellow")
+        elif limits := rims_in_words(design):
+            output.print(f"            {limits}", markup=False)
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

@@ -220,5 +220,7 @@ def _say_what_came(image: TactileImage, folder: Path) -> None:
         facts.append(f"{worst:.2g} % and more in the worst 5 %")
     facts.append(f"{settings['seconds']['total']:.2g} s")
     output.print(", ".join(facts), style="dim")
+    for warning in image.pressed.warnings if image.pressed is not None else ():
+        output.print(f"odd: {warning}", markup=False, style="yellow")
     output.print(f"picture: {folder / PICTURE}", markup=False)
     output.print(f"report:  {folder / REPORT_FILE}", markup=False)

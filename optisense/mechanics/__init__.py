@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from optisense.mechanics.elasticity import Elasticity, youngs_modulus_of_shore_a
     from optisense.mechanics.gel import Gel, elasticity_in_words, elasticity_of
     from optisense.mechanics.pressed_skin import Pressed, PressedSkin, SkinMaps
+    from optisense.mechanics.rims import rims_in_words
     from optisense.mechanics.skins import CONFORMING, ELASTIC, SKINS
 
 _HOMES = {
@@ -33,6 +34,7 @@ _HOMES = {
     "elasticity_of": ".gel",
     "is_attached": ".attachment",
     "refuse_loose_gel": ".attachment",
+    "rims_in_words": ".rims",
     "skin_mesh": ".deformed_mesh",
     "youngs_modulus_of_shore_a": ".elasticity",
 }
@@ -52,6 +54,7 @@ __all__ = [
     "elasticity_of",
     "is_attached",
     "refuse_loose_gel",
+    "rims_in_words",
     "skin_mesh",
     "youngs_modulus_of_shore_a",
 ]

@@ -22,6 +22,7 @@ from optisense.mechanics.elasticity import Elasticity
 from optisense.mechanics.footprint import DOES_NOT_REACH, POINTS_ACROSS, Footprint, footprint
 from optisense.mechanics.gel_patches import GelPatches
 from optisense.mechanics.pressed_skin import PressedSkin, press
+from optisense.mechanics.rims import Rims
 from optisense.mechanics.tangential_contact import Drag
 
 USUAL_GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49, friction=1.0)
@@ -150,6 +151,7 @@ class Gel:
         self._last: tuple[tuple[Contact, ...], PressedSkin] | None = None
         self._mesh: tuple[PressedSkin, SkinMesh] | None = None
         self._depths = lru_cache(maxsize=KEPT_DEPTHS)(self._depth_found)
+        self._rims = Rims(surface.mesh)
         self._patches = GelPatches(skin, () if coarse else elastomers, elasticity.poisson_ratio)
 
     def pressed(
@@ -205,7 +207,11 @@ class Gel:
                 _drag(contact, self._surface, place)
                 for contact, place in zip(contacts, places, strict=True)
             ]
-            self._last = asked, press(places, self._elasticity, patches, drags)
+            pressed = press(places, self._elasticity, patches, drags)
+            warned = tuple(
+                replace(each, warning=self._rims.warning(each.place)) for each in pressed.contacts
+            )
+            self._last = asked, replace(pressed, contacts=warned)
         return self._last[1]
 
     def mesh(self, contacts: Sequence[Contact]) -> SkinMesh:

@@ -66,6 +66,7 @@ class Pressed:
             dragged.
         beyond: (rows, columns) normal displacement (mm) of the gel in addition to that of a flat
             layer, on the grid of the gel's patch, if it has one.
+        warning: a sentence about the error of the force, if it is large.
     """
 
     place: Footprint
@@ -73,6 +74,7 @@ class Pressed:
     field: DisplacementField
     shear: FloatArray | None = None
     beyond: FloatArray | None = None
+    warning: str = ""
 
     @property
     def force(self) -> float:
@@ -143,11 +145,17 @@ class PressedSkin:
     contacts: tuple[Pressed, ...]
     elasticity: Elasticity
 
-    def in_numbers(self) -> list[dict[str, float]]:
+    @property
+    def warnings(self) -> list[str]:
+        """Sentences about the errors of forces that are inaccurate."""
+        return [contact.warning for contact in self.contacts if contact.warning]
+
+    def in_numbers(self) -> list[dict[str, float | str]]:
         """Return depth (mm), force (N), area (mm^2) and greatest pressure (MPa) of each contact,
         for JSON.
 
-        For an indenter that was dragged or turned, shear force (N) and torque (N mm) are included.
+        For an indenter that was dragged or turned, shear force (N) and torque (N mm) are included;
+        a warning is, if there is one.
         """
         return [
             {
@@ -156,6 +164,7 @@ class PressedSkin:
                 "area_mm2": round(contact.area, 6),
                 "greatest_pressure_mpa": round(float(contact.pressure.max()), 6),
                 **_shear_in_numbers(contact),
+                **({"warning": contact.warning} if contact.warning else {}),
             }
             for contact in self.contacts
         ]

@@ -104,6 +104,8 @@ def presses(result: dict[str, Any], names: list[str]) -> str:
         )
         if "shear_force_n" in row:
             text += f"; dragged with {row['shear_force_n']:.3g} N, {row['torque_nmm']:.3g} N mm"
+        if "warning" in row:
+            text += f"; {row['warning']}"
         lines.append(text)
     return "\n".join(lines)
 
