@@ -73,12 +73,14 @@ def contact_rows(
             "force": "" if contact.force is None else f"{contact.force:g} N",
             "area": "",
             "pressure": "",
+            "warning": "",
         }
         if number < len(presses):
             press = presses[number]
             row["depth"] = row["depth"] or f"{press['depth_mm']:.2f} mm"
             row["force"] = f"{press['force_n']:.2f} N"
             row["area"] = f"{press['area_mm2']:.1f} mm²"
+            row["warning"] = press.get("warning", "")
             row["pressure"] = f"{press['greatest_pressure_mpa']:.3f} MPa"
         rows.append(row)
     return rows

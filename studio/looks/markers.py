@@ -134,7 +134,7 @@ class OPTISENSE_OT_set_markers(polls.Designing, ChoosingProperties, bpy.types.Op
     )  # fmt: skip
     radius: FloatProperty(
         name="Radius (mm)", min=0.001, max=1000.0, default=0.4, precision=3,
-        description="Diameter of a dot, mm",
+        description="Radius of a dot, mm",
     )  # fmt: skip
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
