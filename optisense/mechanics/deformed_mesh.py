@@ -23,9 +23,10 @@ FACET_TILT = 0.01
 """Error of slopes between the corners of a triangle in a contact, above which triangles are
 smaller. Shading normals vary linearly over triangles, so that facets of this error, half a degree,
 are not visible: on smooth indenters triangles may be larger than on textures."""
-EDGE_AT_RIM = 0.6
+EDGE_AT_RIM = 0.8
 """Greatest edge length within `RIM` of a contact's rim, in units of the grid's pitch. Slopes jump
-at the rim, and larger triangles would make it jagged."""
+at the rim, and larger triangles would make it jagged. With half of it, the light at the rim of a
+ball changes by 0.9 % (RMS) in a picture 640 pixels wide."""
 RIM = 1.5
 """Distance from the rim, in units of the grid's pitch, within which triangles are finer."""
 GROWTH = 0.3

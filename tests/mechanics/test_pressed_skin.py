@@ -164,7 +164,7 @@ def test_the_mesh_is_fine_in_contacts_and_joins_the_rest(ball):
     assert mesh.vertices[:, 2].min() == pytest.approx(-0.8, abs=2e-3)
     # Normals agree with the facets but at the rim of the contact, where the slope jumps.
     angle = np.einsum("fi,fci->fc", whole.face_normals, mesh.corner_normals).min(axis=1)
-    assert np.quantile(np.degrees(np.arccos(np.clip(angle, -1, 1))), 0.9) < 5.0
+    assert np.quantile(np.degrees(np.arccos(np.clip(angle, -1, 1))), 0.9) < 6.0
     assert np.linalg.norm(mesh.corner_normals, axis=2) == pytest.approx(1.0)
 
 
