@@ -56,7 +56,7 @@ def setting_rows(settings: Mapping[str, Any], unit: str = "") -> list[Row]:
 
 
 def contact_rows(
-    contacts: Sequence[Contact], presses: Sequence[Mapping[str, float]] = ()
+    contacts: Sequence[Contact], presses: Sequence[Mapping[str, Any]] = ()
 ) -> list[dict[str, str]]:
     """Return the contacts with place and depth, and force and area if they are known.
 
