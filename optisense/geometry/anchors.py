@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
@@ -51,6 +50,8 @@ def anchored(
         The anchors, and a mask (n,) of the points that were found; the anchors of others are
         arbitrary.
     """
+    from scipy.spatial import cKDTree  # takes a tenth of a second to load
+
     distance, vertex = cKDTree(mesh.vertices).query(points)
     corners = np.repeat(vertex[:, None], 3, axis=1).astype(np.int64)
     weights = np.tile([1.0, 0.0, 0.0], (len(points), 1))

@@ -13,7 +13,6 @@ import manifold3d
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from optisense.geometry.box_pairs import meeting_boxes
 from optisense.geometry.mesh import FloatArray, TriangleMesh
@@ -201,6 +200,8 @@ def _twins(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> Pairs
     kept = np.flatnonzero(_in_reach(first, second, tolerance))
     if len(kept) == 0:
         return np.zeros((0, 2), dtype=np.int64)
+    from scipy.spatial import cKDTree  # takes a tenth of a second to load
+
     tree = cKDTree(second.triangles.mean(axis=1))
     triangles = first.triangles[kept]
     distance, other = tree.query(triangles.mean(axis=1), distance_upper_bound=tolerance)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import manifold3d
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from optisense.geometry.linked import linked_groups
 from optisense.geometry.mesh import TriangleMesh
 
 SAME_DIRECTION = 1e-10
@@ -55,10 +54,7 @@ def _patches(mesh: TriangleMesh) -> NDArray[np.int64]:
     flat = (np.einsum("ij,ij->i", normals[one], normals[other]) > 1 - SAME_DIRECTION) & (
         np.abs(offsets[one] - offsets[other]) < SAME_PLANE
     )
-    graph = coo_matrix(
-        (np.ones(int(flat.sum())), (one[flat], other[flat])), shape=(len(faces), len(faces))
-    )
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    return linked_groups(len(faces), one[flat], other[flat])
 
 
 def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.int64] | None:

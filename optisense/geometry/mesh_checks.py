@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import MeshError
+from optisense.geometry.linked import linked_groups
 
 if TYPE_CHECKING:
     from optisense.geometry.mesh import TriangleMesh
@@ -107,9 +108,6 @@ def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
 
     A shell without a consistent winding (a Moebius strip) is not changed.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     forward, size = _directed_edges(mesh)
     first, second = forward // size, forward % size
     edge = np.minimum(first, second) * size + np.maximum(first, second)
@@ -125,8 +123,7 @@ def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
     turns = count * disagree
     starts = np.concatenate([one, one + count])
     ends = np.concatenate([other + turns, other + count - turns])
-    links = coo_matrix((np.ones(len(starts)), (starts, ends)), shape=(2 * count, 2 * count))
-    _, label = connected_components(links, directed=False)
+    label = linked_groups(2 * count, starts, ends)
     as_is, over = label[:count], label[count:]
     # The two halves of a shell are the same pair of labels; its first face stays as it is.
     _, leader, shell = np.unique(np.minimum(as_is, over), return_index=True, return_inverse=True)

@@ -6,9 +6,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
+from optisense.geometry.linked import linked_groups
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 Faces = NDArray[np.int64]
@@ -42,7 +41,7 @@ def smoothly_joined(mesh: TriangleMesh, start: Faces, sharp: float = SHARP) -> F
     one, other = neighbours(mesh)
     cosine = np.einsum("ij,ij->i", mesh.face_normals[one], mesh.face_normals[other])
     smooth = cosine >= np.cos(np.radians(sharp)) - 1e-12
-    label = _components(len(mesh.faces), one[smooth], other[smooth])
+    label = linked_groups(len(mesh.faces), one[smooth], other[smooth])
     return np.flatnonzero(np.isin(label, label[start]))
 
 
@@ -55,7 +54,7 @@ def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
     chosen = np.zeros(len(mesh.faces), dtype=bool)
     chosen[faces] = True
     both = chosen[one] & chosen[other]
-    label = _components(len(mesh.faces), one[both], other[both])[faces]
+    label = linked_groups(len(mesh.faces), one[both], other[both])[faces]
     groups = [faces[label == number] for number in np.unique(label)]
 
     def order(group: Faces) -> tuple[float, ...]:
@@ -89,8 +88,3 @@ def mean_normal(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
     """
     chosen = np.arange(len(mesh.faces)) if faces is None else faces
     return np.asarray(mesh.face_vectors[chosen].sum(axis=0) / 2.0 / mesh.face_areas[chosen].sum())
-
-
-def _components(count: int, one: Faces, other: Faces) -> Faces:
-    graph = coo_matrix((np.ones(len(one), dtype=np.int8), (one, other)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from optisense.errors import MeshError
 from optisense.geometry.containment import inside
 from optisense.geometry.crossings import self_crossings
+from optisense.geometry.linked import linked_groups
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 from optisense.geometry.mesh_checks import with_consistent_winding
 from optisense.geometry.welding import merged_vertices
@@ -78,10 +77,8 @@ def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
 
 def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
     """Return the number (m,) int64 of the connected shell that each face belongs to."""
-    count = len(mesh.vertices)
     ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
-    _, group = connected_components(graph, directed=False)
+    group = linked_groups(len(mesh.vertices), ends[:, 0], ends[:, 1])
     _, labels = np.unique(group[mesh.faces[:, 0]], return_inverse=True)
     return np.asarray(labels.reshape(-1), dtype=np.int64)
 
@@ -116,9 +113,7 @@ def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
 
 def _hole(mesh: TriangleMesh, edges: NDArray[np.int64], where: str) -> MeshError:
     """Return the error for open edges, with the number of holes and the place of the widest one."""
-    count = len(mesh.vertices)
-    graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
-    _, group = connected_components(graph, directed=False)
+    group = linked_groups(len(mesh.vertices), edges[:, 0], edges[:, 1])
     rims = np.unique(group[edges[:, 0]])
     sizes, middles = [], []
     for rim in rims:

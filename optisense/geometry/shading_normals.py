@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 FloatArray = NDArray[np.float64]
 
@@ -69,6 +68,8 @@ def _averaged(
     """Return each corner's mean normal (c, 3) over the corners of its vertex within the crease
     angle.
     """
+    from scipy import sparse  # takes a tenth of a second to load
+
     count = len(vertex)
     incidence = sparse.csr_matrix(
         (np.ones(count, np.int8), vertex, np.arange(count + 1)),

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
+from optisense.geometry.linked import linked_groups
 from optisense.geometry.mesh import TriangleMesh
 
 
@@ -16,10 +14,10 @@ def merged_vertices(mesh: TriangleMesh, distance: float) -> TriangleMesh:
     Unlike `TriangleMesh.welded`, which compares coordinates rounded to a grid and is faster, this
     merges all such vertices. Shading normals are dropped.
     """
+    from scipy.spatial import cKDTree  # takes a tenth of a second to load
+
     pairs = cKDTree(mesh.vertices).query_pairs(distance, output_type="ndarray")
-    count = len(mesh.vertices)
-    graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    _, group = connected_components(graph, directed=False)
+    group = linked_groups(len(mesh.vertices), pairs[:, 0], pairs[:, 1])
     _, first = np.unique(group, return_index=True)
     faces = group[mesh.faces]
     whole = (faces != np.roll(faces, 1, axis=1)).all(axis=1)

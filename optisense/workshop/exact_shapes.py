@@ -10,12 +10,11 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from optisense.design import Cage
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import bernstein, deformed
+from optisense.geometry.linked import linked_groups
 from optisense.geometry.step import triangles
 from optisense.workshop.domes import Dome, dome
 from optisense.workshop.occ import SEWN, array_of, compound, numbers, point, sewn, wire
@@ -101,10 +100,8 @@ def _apart(sheet: Shape) -> list[Shape]:
     """Return the pieces of a sheet that do not touch one another."""
     mesh = sheet.mesh
     ends = np.concatenate([mesh.faces[:, :2], mesh.faces[:, 1:]])
-    size = len(mesh.vertices)
-    links = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (size, size))
-    number, labels = connected_components(links, directed=False)
-    if number == 1:
+    labels = linked_groups(len(mesh.vertices), ends[:, 0], ends[:, 1])
+    if not labels.any():
         return [sheet]
     owner = labels[mesh.faces[:, 0]]
     return [

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from optisense.geometry import TriangleMesh
+from optisense.geometry.linked import linked_groups
 from optisense.geometry.patches import smoothly_joined
 
 FloatArray = NDArray[np.float64]
@@ -117,16 +118,10 @@ def _axis_place(vertices: FloatArray, axis: int, k: int) -> float:
 
 def _joined(points: FloatArray, distance: float) -> NDArray[np.int64]:
     """Return the group number of each point; points nearer than `distance` belong to one group."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     grid = np.unique(np.round(points / distance).astype(np.int64), axis=0, return_inverse=True)
     cells, inverse = grid[0], np.asarray(grid[1]).reshape(-1)
     pairs = cKDTree(cells).query_pairs(1.5, output_type="ndarray")
-    shape = (len(cells), len(cells))
-    matrix = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape)
-    labels = connected_components(matrix, directed=False)[1]
-    return np.asarray(labels[inverse], dtype=np.int64)
+    return linked_groups(len(cells), pairs[:, 0], pairs[:, 1])[inverse]
 
 
 def _walk(sides: NDArray[np.int64], count: int) -> list[int] | None:
@@ -215,14 +210,10 @@ def extruded_along(mesh: TriangleMesh, axis: int) -> Extrusion | None:
 
 def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:
     """Return outlines by their corners; None if more than two sides meet."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     sides = np.unique(np.sort(sides, axis=1), axis=0)
-    matrix = coo_matrix((np.ones(len(sides)), (sides[:, 0], sides[:, 1])), (count, count))
-    number, labels = connected_components(matrix, directed=False)
+    labels = linked_groups(count, sides[:, 0], sides[:, 1])
     loops = []
-    for label in range(number):
+    for label in range(int(labels.max(initial=-1)) + 1):
         members = np.flatnonzero(labels == label)
         rows = sides[np.isin(sides[:, 0], members)]
         order = _walk(np.searchsorted(members, rows), len(members))

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError
@@ -113,4 +112,6 @@ def blurred(
 def _spread(levels: FloatArray, width: float) -> FloatArray:
     if width < LEAST_WIDTH:
         return levels
+    from scipy.ndimage import gaussian_filter  # takes a third of a second to load
+
     return np.asarray(gaussian_filter(levels, (width, width, 0.0), truncate=REACH, mode="nearest"))

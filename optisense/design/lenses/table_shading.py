@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.ndimage import map_coordinates
 
 from optisense.design.fields import Fraction, InconsistentValueError, Number
 from optisense.design.lenses.film import FilmPlaces
@@ -74,6 +73,8 @@ class TableShading(LensShading):
 
     def transmission(self, places: FilmPlaces) -> FloatArray:
         """Return the inverse of the gains."""
+        from scipy.ndimage import map_coordinates  # takes a third of a second to load
+
         rows, columns = len(self.gain), len(self.gain[0])
         at = np.array([places.down * rows - 0.5, places.across * columns - 0.5])
 

@@ -19,7 +19,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from optisense.design.fields import Colour, PositiveRGB
 from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurred, reach_of
@@ -62,6 +61,8 @@ class SoftFocus:
 
     def in_pixels(self, window: PictureWindow) -> FloatArray:
         """Return the standard deviation (h, w), in pixels, for a window of a picture."""
+        from scipy.ndimage import map_coordinates  # takes a third of a second to load
+
         rows, columns = self.deviation.shape
         down = (np.arange(window.height)[window.rows] + 0.5) / window.height * rows - 0.5
         across = (np.arange(window.width)[window.columns] + 0.5) / window.width * columns - 0.5

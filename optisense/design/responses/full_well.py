@@ -13,7 +13,6 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.ndimage import gaussian_filter
 
 from optisense.design.colour import encode
 from optisense.design.fields import NonNegative, Positive
@@ -62,6 +61,8 @@ class FullWellResponse(CameraResponse):
         exposed = np.asarray(exposed, dtype=np.float32)
         excess = np.clip(brightest(exposed) - self.full_well, 0.0, MAX_EXCESS)
         if excess.any():
+            from scipy.ndimage import gaussian_filter  # takes a third of a second to load
+
             blur = self.blur * (width or exposed.shape[1])
             mask = np.clip(gaussian_filter(excess, blur), 0.0, 1.0)
             exposed = exposed + mask[:, :, None] * (

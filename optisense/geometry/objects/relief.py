@@ -9,7 +9,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from optisense.geometry.mesh import TriangleMesh, grid_faces
 
@@ -65,6 +64,8 @@ class Relief:
 
 @lru_cache(maxsize=32)
 def _mesh(relief: Relief) -> TriangleMesh:
+    from scipy.ndimage import gaussian_filter  # takes a third of a second to load
+
     half = [0.5 * side + BORDER for side in relief.size]
     pitch = 2.0 * max(half) / CELLS
     x, y = (np.linspace(-each, each, math.ceil(2.0 * each / pitch) + 1) for each in half)

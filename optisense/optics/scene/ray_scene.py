@@ -16,9 +16,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from optisense.geometry.linked import linked_groups
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.bsdf import SMOOTH_ALPHA, surface_table
 from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
@@ -87,11 +86,9 @@ class Piece:
         if self.normals is None:
             way = np.round(self.rows[:, :3] / SAME_WAY).astype(np.int64)
             return np.unique(way, axis=0, return_inverse=True)[1].reshape(-1)
-        count = len(self.vertices)
         faces = np.asarray(self.faces, dtype=np.int64)
         ends = np.concatenate([faces[:, :2], faces[:, 1:]])
-        joined = coo_array((np.ones(len(ends), dtype=bool), ends.T), shape=(count, count))
-        _, number = connected_components(joined, directed=False)
+        number = linked_groups(len(self.vertices), *ends.T)
         return np.unique(number[faces[:, 0]], return_inverse=True)[1].reshape(-1)
 
 
