@@ -26,9 +26,9 @@ SHAPES = {
 OBJECTIVES = {"rgb2normal": "RGB2Normal", "normdiff": "NormDiff"}
 
 CYLINDER_BEST = 0.2
+"""Specularity (0 to 1) near which the paper finds the cylinder best."""
 SPHERE_MOST = 0.4
-"""Specularities that the paper finds best: about the one for the cylinder, up to the other for the
-sphere."""
+"""Specularity (0 to 1) up to which the paper finds the sphere best."""
 
 SIMILAR = {"rgb2normal": 0.05, "normdiff": 0.1}
 """What counts as a performance similar to the flat sensor's: so much of its score below it."""

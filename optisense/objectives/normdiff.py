@@ -31,9 +31,11 @@ LEAST_NOISE = 1.0 / 255.0
 distinguish black from nearly black; a real GelSight Mini has noise of 1 to 2 levels everywhere."""
 
 THETA_WEIGHT = 1.0
+"""Weight of the range of tilts, without a unit; equal to `PHI_WEIGHT`."""
 PHI_WEIGHT = 1.0
-"""Weight of the range of azimuths. The paper adds both ranges with weights that it does not state.
-Here both are degrees on the sphere of normals (see `azimuth_on_sphere`) and have equal weights."""
+"""Weight of the range of azimuths, without a unit. The paper adds both ranges with weights that it
+does not state. Here both are degrees on the sphere of normals (see `azimuth_on_sphere`) and have
+equal weights."""
 
 LEAST_TILT = 1.0
 """Smallest change (degrees) of a pixel's normal with which the pixel counts as indented."""

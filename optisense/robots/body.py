@@ -24,7 +24,7 @@ from optisense.workshop.shapes import Shape, is_air, shapes
 FloatArray = NDArray[np.float64]
 
 METRES = 1e-3
-"""Length of one mm, m."""
+"""Length of one mm, m: robot files are in metres, designs in mm."""
 KILOGRAMS = 1e-6
 """Mass of one mm^3 of a density of 1 g/cm^3, kg."""
 USUAL_FRICTION = 1.0

@@ -47,6 +47,7 @@ from optisense.sensors.tip_shape import TipShape
 SENSOR = "gelsight360"
 GEL, EPOXY, BLACK = "silicone-xp565", "epoxy", "black-absorber"
 GROUPS = 2 * BOARDS
+"""Number of light groups: one on each of the two faces of every board."""
 DESIGNS = 10.0
 """Last number of both shape families; the first is 0."""
 

@@ -25,8 +25,6 @@ STEPS = _steps(4)
 """Steps of the four-dimensional sequence, in units of 2^-32."""
 STEPS_2D = _steps(2)
 """Steps of the two-dimensional sequence, in units of 2^-32."""
-STEPS_3D = _steps(3)
-"""Steps of the three-dimensional sequence, in units of 2^-32."""
 RICHTMYER_STEPS = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
 """Fractional parts of the square roots of primes (Richtmyer's sequence), in units of 2^-32. They
 are not close to simple fractions, so that a few elements are spread evenly in each single dimension
