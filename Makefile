@@ -63,9 +63,9 @@ demo: setup
 
 # Each of these runs whatever becomes of the others, two at a time; a summary at the end says what
 # failed. Those that take longest begin first.
-LOTS := search optics tasks objectives
-CHECKS := $(LOTS:%=pytest-%) studio-tests pytest-docs pytest-rest types lint import-rules docs \
-    bare-pytest
+LOTS := optics search cli tasks objectives
+CHECKS := pytest-rest pytest-docs studio-tests $(LOTS:%=pytest-%) types bare-pytest docs lint \
+    import-rules
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
@@ -110,9 +110,9 @@ QUICK := tests/test_environment.py tests/test_package.py tests/test_errors.py te
     tests/optics/test_closed_forms.py tests/objectives/test_registry.py tests/search/test_space.py \
     tests/search/test_methods.py tests/cli/test_render.py tests/engine/test_conversation.py
 # Without the optional dependencies, as for a user who installed no extra.
-BARE := tests/test_package.py tests/geometry/test_step.py tests/workshop tests/sensors/from_meshes \
-    tests/search/test_executors.py tests/search/test_run.py tests/cli/test_export.py \
-    tests/cli/test_commands.py
+BARE := tests/test_package.py tests/geometry/test_step.py tests/workshop/test_shapes.py \
+    tests/workshop/test_moulds.py tests/sensors/from_meshes/test_building.py \
+    tests/search/test_executors.py tests/cli/test_export.py tests/cli/test_commands.py
 bare-pytest: setup
 	PYTHONPATH=tests/helpers $(BIN)/python -m pytest -p without_optional $(BARE)
 
