@@ -122,8 +122,8 @@ def test_stopped_amid_a_sample_it_continues_to_the_same(
     else:
         assert child.returncode == -number
     assert 2 <= len(Dataset.load(stopped)) < 4
-    again = [sys.executable, "-m", "optisense.cli", *command]
-    subprocess.run(again, check=True, capture_output=True)
+    code, said = run(*command[1:])
+    assert code == 0, said
     assert rows.read_bytes() == (whole / "metadata.csv").read_bytes()
     for one, other in zip(Dataset.load(stopped), Dataset.load(whole), strict=True):
         assert same_pictures(one.image, other.image)

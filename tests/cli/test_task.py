@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from optisense.cli import app
 
-SMALL = ("--resolution", "32x24", "--photons", "60000", "--seed", "5")
+SMALL = ("--resolution", "32x24", "--photons", "60000", "--seed", "5", "--skin", "conforming")
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -47,7 +47,8 @@ def test_misalignment_prints_writes_and_continues(tmp_path: Path) -> None:
 
 
 def test_snr_runs_both_tasks(tmp_path: Path) -> None:
-    options = ("--samples", "10", "--photons", "60000", "--neighbours", "3", "--resolution")
+    options = ("--samples", "10", "--photons", "60000", "--neighbours", "3")
+    options += ("--skin", "conforming", "--resolution")
     code, text = run(
         "snr", "gelsight-mini-ideal", *options, "48x36", "--out", str(tmp_path), "--json"
     )

@@ -30,6 +30,8 @@ from paper.objects import OBJECTS
 from paper.timing import image_times
 
 IMAGES = {"resolution": [160, 120], "photons": 60_000, "seed": 3}
+COARSE = {"resolution": [160, 120], "photons": 60_000, "places": [[0.0, 0.0], [4.0, 3.0]]}
+PRESSES = {**COARSE, "seed": 3}
 SAME = 1e-6
 """Sums over threads differ by rounding."""
 
@@ -46,13 +48,13 @@ def test_a_design_is_its_dimensions_and_what_is_set_in_it() -> None:
 
 @pytest.mark.slow
 def test_scores_are_those_of_evaluate_whatever_was_asked_before(tmp_path: Path) -> None:
-    asked = {"objectives": GOALS, "settings": IMAGES}
+    asked = {"objectives": GOALS, "settings": PRESSES}
     shiny = sensor("gelsight-mini-ideal", {"coating.specularity": 0.3})
     found = [
         scores({"design": design, **asked}, tmp_path).values["scores"]
         for design in (shiny, sensor("gelsight-mini-ideal"), shiny)
     ]
-    plain = ots.evaluate(ots.load("gelsight-mini-ideal"), GOALS, **_tuples(IMAGES))
+    plain = ots.evaluate(ots.load("gelsight-mini-ideal"), GOALS, **_tuples(PRESSES))
     assert found[1] == pytest.approx({name: score.value for name, score in plain.items()}, rel=SAME)
     assert found[0] == pytest.approx(found[2], rel=SAME)
     assert found[0]["normdiff"] != pytest.approx(found[1]["normdiff"], rel=1e-3)
@@ -60,7 +62,7 @@ def test_scores_are_those_of_evaluate_whatever_was_asked_before(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_an_objective_that_fails_leaves_a_gap_with_its_reason(tmp_path: Path) -> None:
-    settings = {**IMAGES, "exposure": 1e6}
+    settings = {**PRESSES, "exposure": 1e6}
     design = sensor("gelsight-mini-ideal")
     found = scores({"design": design, "objectives": GOALS, "settings": settings}, tmp_path).values
     assert found["scores"] == dict.fromkeys(GOALS)
@@ -70,7 +72,7 @@ def test_an_objective_that_fails_leaves_a_gap_with_its_reason(tmp_path: Path) ->
 @pytest.mark.slow
 def test_relit_scores_are_those_of_a_design_with_these_colours(tmp_path: Path) -> None:
     groups = ["red", "green", "blue"]
-    asked = {"objectives": ["normdiff"], "settings": IMAGES}
+    asked = {"objectives": ["normdiff"], "settings": PRESSES}
     relit = relit_scores(
         {
             "design": sensor("gelsight-mini-ideal"),
@@ -177,7 +179,7 @@ def test_all_colourings_are_told_by_their_letters(tmp_path: Path) -> None:
         "objectives": GOALS,
         "method": "light-colours",
         "seed": 0,
-        "settings": {"resolution": [160, 120], "photons": 60_000, "least_pixels": 5},
+        "settings": {**COARSE, "least_pixels": 5},
         "all": True,
     }
     record = Record("all", searched(asked, tmp_path).values, None, 0.0, 0.0)

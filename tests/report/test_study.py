@@ -209,7 +209,7 @@ class TestInfluence:
 
 def test_the_command_renders_the_best_trials(tmp_path: Path) -> None:
     folder = tmp_path / "study"
-    space = {"camera.fov": (45.0, 55.0, 3)}
+    space = {"camera.fov": (45.0, 55.0, 2)}
     search(
         ots.load("gelsight-mini-ideal"),
         space,
@@ -218,8 +218,8 @@ def test_the_command_renders_the_best_trials(tmp_path: Path) -> None:
         settings={"ray_resolution": (64, 48)},
         out=folder,
     ).study.close()
-    options = ["--trial-pictures", "2", "--photons", "20000"]
+    options = ["--trial-pictures", "1", "--photons", "20000"]
     done = CliRunner().invoke(app, ["report", str(folder), *options])
     assert done.exit_code == 0, done.output
     page = (folder / "report.html").read_text()
-    assert page.count("data:image/") >= 4  # before, after, and two trials
+    assert page.count("data:image/") >= 3  # before, after, and a trial

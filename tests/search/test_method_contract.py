@@ -15,7 +15,7 @@ from optisense.search import Around, CagePoints
 from optisense.search.methods.registry import METHODS
 from optisense.search.space.search_space import BoundSpace
 from optisense.search.testing import Landscape, MethodContract, general_spaces
-from optisense.sensors import load
+from optisense.sensors import gelsight_svelte
 
 COLOURS = ["red", "green", "blue"]
 
@@ -137,7 +137,7 @@ class TestGradient(MethodContract):
 
 @cache
 def svelte() -> SensorDesign:
-    return load("gelsight-svelte")
+    return gelsight_svelte(tessellation=1.0, m1_grid=(60, 15))
 
 
 def test_no_method_of_the_package_goes_without_the_contract() -> None:
