@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import drjit as dr
 import numpy as np
 
 from optisense.optics import TactileImage
@@ -23,6 +24,20 @@ def image(*groups: str) -> TactileImage:
 
 def files(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_files_are_written_on_one_processor_too(tmp_path: Path) -> None:
+    """Mitsuba waits for other threads of Dr.Jit; on one processor there are none."""
+    before = dr.thread_count()
+    dr.set_thread_count(1)
+    try:
+        image("red").save(tmp_path / "all")
+        image("red").save_radiance(tmp_path / "radiance.exr")
+        assert dr.thread_count() == 1
+    finally:
+        dr.set_thread_count(before)
+    for file in ("all/radiance.exr", "all/layers/red.exr", "radiance.exr"):
+        assert (tmp_path / file).stat().st_size > 200
 
 
 def test_another_image_takes_away_what_was_written_about_the_first(tmp_path: Path) -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from optisense.optics.backend.variant import import_renderer, select_variant
 
 
@@ -13,3 +16,21 @@ def use_threads(count: int) -> None:
     """
     select_variant("auto")  # libLLVM is checked before Dr.Jit is imported
     import_renderer("drjit").set_thread_count(count)
+
+
+@contextmanager
+def threads_that_compress() -> Iterator[None]:
+    """Give Dr.Jit a second thread, if it has only one, while Mitsuba writes EXR files.
+
+    Mitsuba compresses them in tasks for Dr.Jit's threads and waits for these without working on
+    them itself. On one processor Dr.Jit has no other thread than the waiting one.
+    """
+    dr = import_renderer("drjit")
+    count = dr.thread_count()
+    if count < 2:
+        dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        if count < 2:
+            dr.set_thread_count(count)

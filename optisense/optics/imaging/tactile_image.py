@@ -19,6 +19,7 @@ from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import OutputError, RenderError
 from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMaps
+from optisense.optics.backend.threads import threads_that_compress
 from optisense.optics.camera.response import picture
 from optisense.optics.imaging.markers import MarkerPlaces
 from optisense.untrusted_files import read_json
@@ -143,7 +144,8 @@ class TactileImage:
         Raises:
             OSError: the file cannot be written.
         """
-        _bitmap(self.radiance, path)
+        with threads_that_compress():
+            _bitmap(self.radiance, path)
 
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
         """Write the image to a folder.
@@ -164,7 +166,8 @@ class TactileImage:
         bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
         with written_together("the results") as stage:
             paths = [stage(inside(out, name)) for name in bitmaps]
-            with ThreadPoolExecutor() as pool:  # compresses outside Python's lock
+            # Files are compressed outside Python's lock.
+            with threads_that_compress(), ThreadPoolExecutor() as pool:
                 list(pool.map(_bitmap, bitmaps.values(), paths))
             np.save(stage(out / "normals.npy"), self.normals)
             np.save(stage(out / "contact_mask.npy"), self.contact_mask)
