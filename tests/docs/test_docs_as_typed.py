@@ -41,6 +41,7 @@ CLONED = (
     "Makefile",
     "README.md",
     "docs",
+    "examples",
     "paper",
     "pyproject.toml",
     "requirements*.lock",
