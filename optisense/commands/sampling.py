@@ -29,8 +29,10 @@ GelSight Mini.
 """
 
 CameraNoise = Annotated[float, Ge(0.0), Le(255.0), OptionNotation("LEVELS")]
-NOISE_HELP = "Camera noise to add to the pictures: its standard deviation in levels of "
-"255; a real GelSight Mini has 1.1 to 1.9."
+NOISE_HELP = (
+    "Camera noise to add to the pictures: its standard deviation in levels of 255; a real GelSight "
+    "Mini has 1.1 to 1.9."
+)
 
 
 class PictureOptions(CommandOptions):

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
+import click
 import pytest
+import typer
 from typer.testing import CliRunner
 
 import optisense
@@ -40,6 +44,24 @@ def test_each_command_explains_itself(command: str) -> None:
     for line, following in pairwise(lines):
         first, _, _ = following.partition(" ")
         assert not first or not line or len(f" {line} {first}") > 78, line
+
+
+def options(command: Any, name: str = "optisense") -> Iterator[tuple[str, str]]:
+    """The name and the help text of each option and argument of a command and those below it."""
+    for parameter in command.params:
+        yield f"{name} {parameter.name}", getattr(parameter, "help", None) or ""
+    if hasattr(command, "list_commands"):
+        context = click.Context(command)
+        for below in command.list_commands(context):
+            yield from options(command.get_command(context, below), f"{name} {below}")
+
+
+def test_each_help_text_is_whole() -> None:
+    """A text that ends within a sentence has lost a line."""
+    texts = dict(options(typer.main.get_command(app)))
+    assert len(texts) > 200
+    cut = [name for name, text in texts.items() if not text.strip().endswith((".", "?", ")", "]"))]
+    assert not cut
 
 
 def test_help_does_not_load_the_renderer_or_numpy() -> None:
