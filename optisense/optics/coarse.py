@@ -17,7 +17,7 @@ class CoarseCacheStore(CacheStore):
     """Store of radiance caches in wide cells."""
 
     cell_size = DRAFT_CELL_SCALE * CELL_SIZE
-    tells_curved = False
+    thorough = False
     uses_pilot = False
     pilot_photons = DRAFT_PILOT_PHOTONS
 
