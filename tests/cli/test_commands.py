@@ -146,7 +146,7 @@ def test_new_keeps_off_folders_with_something_in_them(tmp_path: Path) -> None:
 def test_a_misspelt_sensor_gets_the_near_match(tmp_path: Path) -> None:
     code, text = run("new", "gelsight-minni", str(tmp_path / "new"))
     assert code == 2
-    assert "gelsight-mini-ideal" in text
+    assert "Did you mean 'gelsight-mini'?" in text
     assert not (tmp_path / "new").exists()
 
 

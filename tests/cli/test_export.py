@@ -61,7 +61,7 @@ def test_the_command_offers_what_can_be_written() -> None:
     ("arguments", "complaint"),
     [
         (("gelsight-mini-ideal", "--format", "dxf"), "none of stl, obj, 3mf, step"),
-        (("gelsight-minni",), "gelsight-mini-ideal"),
+        (("gelsight-minni",), "Did you mean 'gelsight-mini'?"),
         (("gelsight-mini-ideal", "--for", "gazebo"), "none of mujoco, urdf"),
         (("gelsight-mini-ideal", "--for", "urdf", "--moulds"), "for the workshop"),
         (("gelsight-mini-ideal", "--mass", "20"), "add --for"),

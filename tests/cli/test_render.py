@@ -53,7 +53,7 @@ def written(folder: Path) -> set[str]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished render of a ball on a GelSight Mini."""
     path = tmp_path_factory.mktemp("render") / "not" / "there" / "yet"
-    code, text = render(*SMALL, *BALL, "--seed", "7", "--out", str(path))
+    code, text = render(*SMALL, *BALL, "--seed", "7", "--out", str(path), design="gelsight-mini")
     assert code == 0, text
     assert str(path / "image.png") in text
     assert str(path / "report.html") in text
@@ -75,8 +75,8 @@ def test_the_files_have_the_wanted_size(folder: Path) -> None:
 def test_the_pressure_adds_up_to_the_force(folder: Path) -> None:
     pressure = np.load(folder / "pressure.npy")
     press = json.loads((folder / "run.json").read_text())["presses"][0]
-    # Pixels of 18.6 mm / 40 on a flat gel; the contact is five of them across.
-    assert pressure.sum() * (18.6 / 40) ** 2 == pytest.approx(press["force_n"], rel=0.15)
+    # Pixels of 20.3 mm / 40 on a flat gel; the contact is five of them across.
+    assert pressure.sum() * (20.3 / 40) ** 2 == pytest.approx(press["force_n"], rel=0.15)
     assert 0.6 < pressure.max() / press["greatest_pressure_mpa"] <= 1.0
 
 
@@ -89,7 +89,7 @@ def test_the_ball_is_in_the_middle_of_the_picture(folder: Path) -> None:
 def test_run_json_says_how_it_was_made(folder: Path) -> None:
     run = json.loads((folder / "run.json").read_text())
     assert run["seed"] == 7
-    assert run["design"] == "gelsight-mini-ideal"
+    assert run["design"] == "gelsight-mini"
     assert run["contacts"] == ["sphere:1.5@0,0:0.8"]
 
 

@@ -63,7 +63,7 @@ def test_two_designs_are_compared() -> None:
 
 
 def test_one_design_alone_is_refused() -> None:
-    code, _, told = run("gelsight-mini-ideal")
+    code, _, told = run("gelsight-mini")
     assert code == 2
     assert "name a second design" in told
 

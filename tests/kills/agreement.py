@@ -13,6 +13,8 @@ import mitsuba as mi
 import numpy as np
 from PIL import Image
 
+from optisense.optics.backend.threads import threads_for_exr_files
+
 TOLERANCE = 1e-3
 """Mean difference of two arrays, of the largest value, that rounding makes at most. Rays that it
 sends another way change some pixels; pictures of two seeds differ a hundred times more."""
@@ -72,7 +74,8 @@ def _arrays(suffix: str, data: bytes) -> dict[str, Any]:
         stream = mi.MemoryStream()
         stream.write(data)
         stream.seek(0)
-        return {"": np.array(mi.Bitmap(stream), dtype=float)}
+        with threads_for_exr_files():
+            return {"": np.array(mi.Bitmap(stream), dtype=float)}
     return {}
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from optisense.errors import OutputError, TaskError
 from optisense.optics import OpticalModel
+from optisense.optics.backend.threads import threads_for_exr_files
 from optisense.tasks import DatasetSettings, generate
 from optisense.tasks.dataset import Dataset
 
@@ -99,5 +100,6 @@ def test_radiance_tells_its_unit(mini: OpticalModel, tmp_path: Path) -> None:
 
     mini.render(resolution=(24, 18), photons=20_000).save(tmp_path)
     assert json.loads((tmp_path / "run.json").read_text())["units"]["radiance"] == "mW/(mm^2 sr)"
-    for file in (tmp_path / "radiance.exr", *(tmp_path / "layers").iterdir()):
-        assert mi.Bitmap(str(file)).metadata()["unit"] == "mW/(mm^2 sr)"
+    with threads_for_exr_files():
+        for file in (tmp_path / "radiance.exr", *(tmp_path / "layers").iterdir()):
+            assert mi.Bitmap(str(file)).metadata()["unit"] == "mW/(mm^2 sr)"

@@ -19,11 +19,11 @@ def use_threads(count: int) -> None:
 
 
 @contextmanager
-def threads_that_compress() -> Iterator[None]:
-    """Give Dr.Jit a second thread, if it has only one, while Mitsuba writes EXR files.
+def threads_for_exr_files() -> Iterator[None]:
+    """Give Dr.Jit a second thread, if it has only one, while Mitsuba writes or reads EXR files.
 
-    Mitsuba compresses them in tasks for Dr.Jit's threads and waits for these without working on
-    them itself. On one processor Dr.Jit has no other thread than the waiting one.
+    Mitsuba compresses and expands them in tasks for Dr.Jit's threads and waits for these without
+    working on them itself. On one processor Dr.Jit has no other thread than the waiting one.
     """
     dr = import_renderer("drjit")
     count = dr.thread_count()

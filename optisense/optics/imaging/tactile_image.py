@@ -19,7 +19,7 @@ from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import OutputError, RenderError
 from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMaps
-from optisense.optics.backend.threads import threads_that_compress
+from optisense.optics.backend.threads import threads_for_exr_files
 from optisense.optics.camera.response import picture
 from optisense.optics.imaging.markers import MarkerPlaces
 from optisense.untrusted_files import read_json
@@ -144,7 +144,7 @@ class TactileImage:
         Raises:
             OSError: the file cannot be written.
         """
-        with threads_that_compress():
+        with threads_for_exr_files():
             _bitmap(self.radiance, path)
 
     def save(self, folder: str | Path, exposure: float | str = "auto") -> None:
@@ -167,7 +167,7 @@ class TactileImage:
         with written_together("the results") as stage:
             paths = [stage(inside(out, name)) for name in bitmaps]
             # Files are compressed outside Python's lock.
-            with threads_that_compress(), ThreadPoolExecutor() as pool:
+            with threads_for_exr_files(), ThreadPoolExecutor() as pool:
                 list(pool.map(_bitmap, bitmaps.values(), paths))
             np.save(stage(out / "normals.npy"), self.normals)
             np.save(stage(out / "contact_mask.npy"), self.contact_mask)
