@@ -66,6 +66,7 @@ def full_data() -> dict[str, object]:
             "k": [7.5, 6.4, 5.6],
             "specularity": 0.25,
             "scattering": "conductor",
+            "roughness": 0.3,
         },
         "materials": {
             "gel": {

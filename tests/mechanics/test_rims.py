@@ -14,7 +14,7 @@ BALL = Sphere(1.5)
     ("name", "near", "far", "word"),
     [
         ("digit", (9.0, 0.0), (6.0, 0.0), "not reliable"),
-        ("gelsight-mini", (0.0, 9.8), (0.0, 9.0), "too small"),
+        ("gelsight-mini-ideal", (0.0, 9.8), (0.0, 9.0), "too small"),
     ],
 )
 def test_contacts_near_a_rim_are_warned_of(name, near, far, word):

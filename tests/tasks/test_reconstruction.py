@@ -60,7 +60,8 @@ def test_true_depth_and_normals_are_those_of_the_ball(lambertian: Any) -> None:
     each = reconstruct(
         lambertian, ReconstructionSettings(**(LAMBERTIAN | {"presses": 2})), ball
     ).objects["ball"]
-    assert each.true_depth.max() == pytest.approx(0.6, abs=2e-3)
+    # The triangles of the pressed skin are within 4 um of the ball.
+    assert each.true_depth.max() == pytest.approx(0.6, abs=4e-3)
     inside = binary_erosion(each.mask)  # at the rim the slope jumps
     height = -each.true_normals[..., 2][inside]
     assert each.true_depth[inside] == pytest.approx(0.6 - 3 * (1 - height), abs=4e-3)
