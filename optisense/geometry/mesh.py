@@ -170,6 +170,13 @@ class TriangleMesh:
         return float(np.einsum("ij,ij->", corners[:, 0], self.face_vectors) / 6.0)
 
     @cached_property
+    def open_edges(self) -> IntArray:
+        """The edges (n, 2) that belong to a single face, by their vertices."""
+        ends = np.sort(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges, times = np.unique(ends, axis=0, return_counts=True)
+        return np.asarray(edges[times == 1])
+
+    @cached_property
     def is_closed(self) -> bool:
         """Whether each edge is traversed equally often in both directions."""
         from optisense.geometry.mesh_checks import unmatched_edges

@@ -54,9 +54,7 @@ def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
         ContactError: an edge of a single face lies inside the undeformed skin.
     """
     whole = indenter.welded()
-    ends = np.sort(whole.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    edges, times = np.unique(ends, axis=0, return_counts=True)
-    corners = place.local(whole.vertices)[edges[times == 1]]
+    corners = place.local(whole.vertices)[whole.open_edges]
     height = corners[:, :, 2] + SHALLOWEST
     corners, height = corners[height.min(axis=1) < 0.0], height[height.min(axis=1) < 0.0]
     # Of an edge that crosses the skin, the part inside the gel is tested.

@@ -94,9 +94,7 @@ class Rims:
     @cached_property
     def _border(self) -> FloatArray:
         """Return the ends (n, 2, 3) of the edges of single faces, mm."""
-        ends = np.sort(self._skin.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, times = np.unique(ends, axis=0, return_counts=True)
-        return np.asarray(self._skin.vertices[edges[times == 1]], dtype=np.float64)
+        return np.asarray(self._skin.vertices[self._skin.open_edges], dtype=np.float64)
 
 
 def _distance_from_edges(point: FloatArray, edges: FloatArray) -> float:

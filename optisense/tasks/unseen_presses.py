@@ -268,9 +268,7 @@ def _inside(points: FloatArray, models: Sequence[OpticalModel], rim: float) -> N
 
 def _border(mesh: TriangleMesh) -> FloatArray:
     """Return points (n, 3), mm, along the edges that belong to a single triangle."""
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    each, count = np.unique(edges, axis=0, return_counts=True)
-    start, end = mesh.vertices[each[count == 1]].transpose(1, 0, 2)
+    start, end = mesh.vertices[mesh.open_edges].transpose(1, 0, 2)
     shares = np.linspace(0.0, 1.0, 9)[:, None, None]
     points: FloatArray = (start + shares * (end - start)).reshape(-1, 3)
     return points

@@ -227,13 +227,7 @@ def rims(mesh: TriangleMesh) -> list[list[int]] | None:
     """Return the loops of edges with only one face, by their vertices, the first again at the
     end.
     """
-    edges = np.sort(
-        np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]]),
-        axis=1,
-    )
-    found, counts = np.unique(edges, axis=0, return_counts=True)
-    free = found[counts == 1]
-    used, numbered = np.unique(free, return_inverse=True)
+    used, numbered = np.unique(mesh.open_edges, return_inverse=True)
     loops = _loops(numbered.reshape(-1, 2), len(used))
     if loops is None or any(loop[0] != loop[-1] for loop in loops):
         return None
