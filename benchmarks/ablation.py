@@ -128,7 +128,7 @@ def ablations() -> list[Ablation]:
         return mi.Float(0), mi.Float(0)
 
     def no_interreflection(field: Any, *rest: Any) -> list[Any]:
-        return [mi.Color3f(0) for _ in range(field.groups)]
+        return [mi.Color3f(0) for _ in range(field.binned.groups)]
 
     def always_doubtful(balls: Any, count: Any, point: Any, *rest: Any) -> Any:
         return dr.zeros(mi.Float, dr.width(point)) + 2

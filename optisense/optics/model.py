@@ -20,7 +20,7 @@ from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
-from optisense.optics.imaging.cached import ImageLayers, PixelImportance, render_cached
+from optisense.optics.imaging.cached import Effort, ImageLayers, PixelImportance, render_cached
 from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
@@ -235,11 +235,8 @@ class OpticalModel(RayModel):
                 camera,
                 rays,
                 store.emitters,
-                self.scenes.assembly.light_areas,
                 seed,
-                only_contacts,
-                pixel_importance,
-                self.is_draft,
+                Effort(only_contacts, pixel_importance, self.is_draft),
                 sight.known if self.is_draft else None,
             )
             layers.light_seconds = lit - built

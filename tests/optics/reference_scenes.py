@@ -105,8 +105,7 @@ class ReferenceScene:
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
         scenes = ContactScenes(scene, fixed, None, mi.Float())
-        areas = [emitter.area for emitter in self.emitters]
-        layers = render_cached(light, scenes, self.camera, rays, self.emitters, areas, seed)
+        layers = render_cached(light, scenes, self.camera, rays, self.emitters, seed)
         return self._scaled(layers.radiance)
 
     def path(self, samples: int, seed: int = 0, max_depth: int = PATH_DEPTH) -> FloatArray:

@@ -43,14 +43,14 @@ def test_no_light_is_lost_in_merging() -> None:
     model.render(resolution=(16, 12), photons=100_000)
     field = field_of(model)
     # The entries of the surface come before those of the raised plane.
-    size = field.planes, field.cells.cells, -1, field.groups
-    moments = np.asarray(field.moments).reshape(*size, 4)[0]
+    size = field.binned.planes, field.binned.cells.cells, -1, field.binned.groups
+    moments = np.asarray(field.binned.tables.moments).reshape(*size, 4)[0]
     starts = np.asarray(field.beams.starts)
     ways = np.asarray(field.beams.ways).reshape(-1, 4)
     fluxes = np.asarray(field.beams.fluxes).reshape(-1, 4)
     entry = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
     groups = np.ascontiguousarray(fluxes[:, 3]).view(np.uint32) & GROUP_MASK
-    np.testing.assert_array_equal(groups, entry % field.groups)
+    np.testing.assert_array_equal(groups, entry % field.binned.groups)
     flux = np.bincount(entry, fluxes[:, 0], len(starts) - 1)
     np.testing.assert_allclose(flux, moments[..., 3].sum(axis=1).ravel(), rtol=1e-4)
     for k in range(3):
@@ -58,7 +58,7 @@ def test_no_light_is_lost_in_merging() -> None:
         np.testing.assert_allclose(
             vector, moments[..., k].sum(axis=1).ravel(), rtol=1e-3, atol=1e-4 * flux.max()
         )
-    squares = np.asarray(field.heights).reshape(size)[0]
+    squares = np.asarray(field.binned.tables.heights).reshape(size)[0]
     along = np.bincount(entry, fluxes[:, 0] * np.asarray(field.beams.heights), len(starts) - 1)
     np.testing.assert_allclose(
         along, squares.sum(axis=1).ravel(), rtol=1e-3, atol=1e-4 * flux.max()

@@ -84,7 +84,7 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
     rays = trace_chief_rays(full, CAMERA)
     light = store(fixed, LAMP, rays.points[rays.hit])
     field = light.field(0, PHOTONS, None, None, PHOTONS, 0.0, lambda *told: None)
-    image = render_cached(field, scenes, CAMERA, rays, [LAMP], [0.0], 0).radiance[0, ..., 0]
+    image = render_cached(field, scenes, CAMERA, rays, [LAMP], 0).radiance[0, ..., 0]
 
     normals, points = rays.normals.astype(float), rays.points.astype(float)
     flank = (rays.region == Region.INDENTER) & (normals[..., 0] > 0.3)
@@ -98,4 +98,4 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
 def test_only_light_that_grazes_is_followed_above_the_surface(lamp: Emitter, grazes: bool) -> None:
     light = store(RayScene([skin()]), lamp, np.zeros((1, 3)))
     field, _ = light.field(0, 50_000, None, None, 50_000, 0.0, lambda *told: None)
-    assert (field.above_surface is not None) == grazes
+    assert (field.binned.above is not None) == grazes

@@ -52,12 +52,6 @@ class Window:
     shape: Literal["disc", "rectangle"]
     size: tuple[float, float]
 
-    @property
-    def area(self) -> float:
-        """Area of the face, mm^2."""
-        filled = np.pi / 4 if self.shape == "disc" else 1.0
-        return float(self.size[0] * self.size[1] * filled)
-
 
 class LightModel(KindModel):
     """Emission of a lamp; each kind of lamp is a subclass.

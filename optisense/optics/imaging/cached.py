@@ -163,17 +163,34 @@ def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.
     return np.where(where[..., None], values, np.nan).astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Effort:
+    """The pixels that are shaded, and their camera samples.
+
+    Attributes:
+        only_contacts: whether all pixels that do not see an indenter stay dark.
+        importance: function that gives, with ``only_contacts``, the share of the samples of each
+            pixel; a pixel gets at least `MIN_PIXEL_SAMPLES`.
+        draft: whether few samples are taken in contacts and grain is not resampled.
+    """
+
+    only_contacts: bool = False
+    importance: PixelImportance | None = None
+    draft: bool = False
+
+
+EVERYWHERE = Effort()
+"""Full number of samples in all pixels."""
+
+
 def render_cached(
     light: tuple[RadianceCache, bool],
     scenes: ContactScenes,
     camera: RayCamera,
     rays: ChiefRays,
     emitters: list[Emitter],
-    areas: list[float],
     seed: int,
-    only_contacts: bool = False,
-    pixel_importance: PixelImportance | None = None,
-    draft: bool = False,
+    effort: Effort = EVERYWHERE,
     known: KnownView | None = None,
 ) -> ImageLayers:
     """Shade an image from a radiance cache: one sample per pixel, more in and around contacts.
@@ -184,25 +201,24 @@ def render_cached(
         camera: the camera.
         rays: chief rays through the same scene and camera.
         emitters: the lights, whose windows may be in view.
-        areas: areas of their windows, mm^2.
         seed: seed of the camera samples.
-        only_contacts: whether all pixels that do not see an indenter stay dark.
-        pixel_importance: function that gives, with ``only_contacts``, the share of the samples of
-            each pixel; a pixel gets at least `MIN_PIXEL_SAMPLES`.
-        draft: whether few samples are taken in contacts and grain is not resampled.
+        effort: the pixels that are shaded, and their samples.
         known: parts of an earlier draft that are reused, to which those that are missing are added.
     """
     began = time.perf_counter()
     field, interrupted = light
+    draft, only_contacts = effort.draft, effort.only_contacts
     width, height = camera.width, camera.height
     # Interfaces reflect little light towards the camera, so their reflections are sampled once in a
     # pixel or in its neighbours. Lamps are so bright that the rare path (one in a thousand) that
     # meets one would be a speck.
-    film, between, mirrored, glints = (Film(width * height, field.groups) for _ in range(4))
+    film, between, mirrored, glints = (Film(width * height, field.binned.groups) for _ in range(4))
 
     culled_beams = field.beams
     if scenes.indenters is not None:
-        culled_beams = cull_beams(field.beams, field.cells, field.groups, scenes.balls)
+        culled_beams = cull_beams(
+            field.beams, field.binned.cells, field.binned.groups, scenes.balls
+        )
 
     def sample(
         pixel: mi.UInt32,
@@ -240,10 +256,10 @@ def render_cached(
                     between.add(main, exchanged)
             else:
                 film.add(main, shade(field, scenes, culled_beams, main, False))
-            film.add_light(main, emitters, areas)
+            film.add_light(main, emitters)
             if reflected is not None:
                 mirrored.add(reflected, shade(field, scenes, culled_beams, reflected, True))
-                glints.add_light(reflected, emitters, areas)
+                glints.add_light(reflected, emitters)
 
     sparse = False
     faint_known = known is not None and known.faint is not None
@@ -262,7 +278,7 @@ def render_cached(
         if draft:
             inner, outer = DRAFT_SAMPLES
         if only_contacts:
-            part = np.ones_like(mask) if pixel_importance is None else pixel_importance(rays)
+            part = np.ones_like(mask) if effort.importance is None else effort.importance(rays)
             counts = np.maximum(
                 np.round(inner * np.clip(part, 0, 1)), min(inner, MIN_PIXEL_SAMPLES)
             )
@@ -278,7 +294,7 @@ def render_cached(
         dr.eval(pixel, number, count)
         sample(pixel, number, True, count=count)
         samples = [1, outer, inner]
-        if not (draft or only_contacts or field.narrow_lobes):
+        if not (draft or only_contacts or field.binned.narrow_lobes):
             skin = region_image == Region.SENSING
             ring = skin & ~near & (distance <= BESIDE_RANGE * width)
             beside = beside_layers(field, scenes, camera, ring, seed)
@@ -292,7 +308,7 @@ def render_cached(
     if far.any() and not only_contacts:
         # The number of beams to sum. If it is large, only every second pixel is shaded where its
         # neighbours are similar.
-        beams = dr.width(field.beams.ways) / 4 / field.cells.cells
+        beams = dr.width(field.beams.ways) / 4 / field.binned.cells.cells
         most = SPARSE_METALLIC_BEAMS if field.metallic else SPARSE_SHADING_BEAMS
         sparse = int(far.sum()) * beams > most
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
@@ -338,7 +354,7 @@ def render_cached(
     main_light = None if known is None else layers - reflections
     if near.any() and not faint_known:
         reach = 1
-        if field.metallic and not field.narrow_lobes:
+        if field.metallic and not field.binned.narrow_lobes:
             reach = round(BETWEEN_REACH * width) | 1
         layers = layers + between.spread_layers(width, height, [(mask, reach)])
     if known is not None and main_light is not None:

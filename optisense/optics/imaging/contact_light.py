@@ -63,15 +63,15 @@ def mirrored_contact_layers(
     interfaces to the pixels ``where``, averaged over ``skin`` and over the contacts; None if there
     is none.
     """
-    least = MIRRORED_RAYS if field.narrow_lobes else BROAD_MIRRORED_RAYS
+    least = MIRRORED_RAYS if field.binned.narrow_lobes else BROAD_MIRRORED_RAYS
     rays = max(least, round(least * (REFERENCE_WIDTH / camera.width) ** 2))
 
     def light(points: VisiblePoints) -> PointLight | None:
         return mirrored_contacts(field, scenes, points, rays)
 
-    inside = NARROW_MIRRORED_REACH if field.narrow_lobes else MIRRORED_REACH
+    inside = NARROW_MIRRORED_REACH if field.binned.narrow_lobes else MIRRORED_REACH
     over = [(skin, MIRRORED_REACH), (where & ~skin, inside)]
-    return _averaged_layers(field.groups, scenes, camera, where, over, (seed, 9), light)
+    return _averaged_layers(field.binned.groups, scenes, camera, where, over, (seed, 9), light)
 
 
 def beside_layers(
@@ -91,7 +91,7 @@ def beside_layers(
         return points, beside_contacts(field, scenes, points, directions)
 
     over = [(where, MIRRORED_REACH)]
-    return _averaged_layers(field.groups, scenes, camera, where, over, (seed, 10), light)
+    return _averaged_layers(field.binned.groups, scenes, camera, where, over, (seed, 10), light)
 
 
 def _averaged_layers(

@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.scene.bsdf import CoatingBsdf, coating_of, evaluate_coating
+from optisense.optics.scene.bsdf import coating_of, evaluate_coating
 from optisense.optics.transport.camera_paths import VisiblePoints
 from optisense.optics.transport.photon_map import GROUP_MASK, PhotonMap
 
@@ -90,18 +90,18 @@ def build_grid(
 
 
 @dr.syntax
-def _gather(
+def estimate_radiance(
     grid: PhotonGrid,
-    coating: CoatingBsdf,
-    point: mi.Point3f,
-    normal: mi.Vector3f,
-    face_normal: mi.Vector3f,
-    towards_eye: mi.Vector3f,
-    active: mi.Bool,
+    surfaces: mi.Float,
+    points: VisiblePoints,
     radius: mi.Float,
     groups: int,
 ) -> list[mi.Color3f]:
-    centre = _cell(point, grid.lower, grid.inverse_size, grid.counts)
+    """Return the radiance of each visible point towards the camera for each light group, with
+    lights of 1 mW.
+    """
+    coating = coating_of(surfaces, points.surface, points.valid)
+    centre = _cell(points.point, grid.lower, grid.inverse_size, grid.counts)
     r2 = radius * radius
     totals = [mi.Color3f(0) for _ in range(groups)]
     step = mi.UInt32(0)
@@ -111,7 +111,7 @@ def _gather(
     span = high - low + 1
     # Cells along x are neighbours in memory, so that each (y, z) has one contiguous range of
     # photons.
-    rows = dr.select(active, span.y * span.z, 0)
+    rows = dr.select(points.valid, span.y * span.z, 0)
     while step < rows:
         y = low.y + step % span.y
         z = low.z + step // span.y
@@ -120,14 +120,17 @@ def _gather(
         end = dr.gather(mi.UInt32, grid.starts, base + high.x + 1)
         while j < end:
             place = dr.gather(mi.Vector4f, grid.place, j)
-            offset = mi.Point3f(place.x, place.y, place.z) - point
+            offset = mi.Point3f(place.x, place.y, place.z) - points.point
             distance2 = dr.squared_norm(offset)
             if distance2 < r2:
                 travel = dr.gather(mi.Vector4f, grid.travel, j)
                 direction = mi.Vector3f(travel.x, travel.y, travel.z)
                 kernel = 2 * (1 - distance2 / r2) / dr.maximum(travel.w, MIN_COSINE)
-                value = evaluate_coating(coating, normal, -direction, towards_eye) * kernel
-                value = dr.select(dr.dot(face_normal, direction) < 0, value, 0)
+                value = (
+                    evaluate_coating(coating, points.normal, -direction, points.towards_eye)
+                    * kernel
+                )
+                value = dr.select(dr.dot(points.face_normal, direction) < 0, value, 0)
                 if dr.hint(grid.coloured, mode="scalar"):
                     power = dr.gather(mi.Vector4f, grid.power, j)
                     value *= mi.Color3f(power.x, power.y, power.z)
@@ -139,27 +142,3 @@ def _gather(
             j += 1
         step += 1
     return [total / (dr.pi * r2) for total in totals]
-
-
-def gather_pairwise(
-    grid: PhotonGrid,
-    surfaces: mi.Float,
-    points: VisiblePoints,
-    radius: mi.Float,
-    groups: int,
-) -> list[mi.Color3f]:
-    """Return the radiance of each visible point towards the camera for each light group, with
-    lights of 1 mW.
-    """
-    coating = coating_of(surfaces, points.surface, points.valid)
-    return _gather(
-        grid,
-        coating,
-        points.point,
-        points.normal,
-        points.face_normal,
-        points.towards_eye,
-        points.valid,
-        radius,
-        groups,
-    )

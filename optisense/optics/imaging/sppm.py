@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.density_estimation import build_grid, gather_pairwise
+from optisense.optics.imaging.density_estimation import build_grid, estimate_radiance
 from optisense.optics.imaging.film import Film
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
@@ -74,7 +74,6 @@ def render_sppm(
     width, height = camera.width, camera.height
     pixel = dr.arange(mi.UInt32, width * height)
     halves = np.zeros((2, table.groups, height, width, 3), dtype=np.float64)
-    areas = [emitter.area for emitter in table.emitters]
     done = emitted = 0
     for number in range(passes):
         sent = replace(emission, first=number * emission.per_light)
@@ -91,11 +90,11 @@ def render_sppm(
                 for channel in scene.channels
             ]
             for points in (end for pair in ways for end in pair if end is not None):
-                light = gather_pairwise(
+                light = estimate_radiance(
                     grid, scene.table, points, dr.opaque(mi.Float, reach), table.groups
                 )
                 image.add(points, light)
-                image.add_light(points, table.emitters, areas)
+                image.add_light(points, table.emitters)
         halves[number % 2] += image.layers(width, height)
         done, emitted = number + 1, emitted + photons.emitted
         if stop is not None and stop(done):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.radiance_cache.angular_variance import angular_variance, passes_near
-from optisense.optics.radiance_cache.direction_bins import FINE_BINS
+from optisense.optics.radiance_cache.direction_bins import FINE_BINS, Tables
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
 
 STRONG_SHARE = 0.03
@@ -56,55 +56,78 @@ class Beams:
     heights: mi.Float
 
 
+@dataclass
+class BlocksOfBins:
+    """The light of a cache in blocks of four neighbouring direction bins.
+
+    Attributes:
+        tables, groups, coloured: as in `BinnedLight`.
+        four: indices of each block's bins among the bins that hold light; `NO_SLOT` for others.
+        numbers: number of each block.
+        blocks: number of blocks.
+        used: number of bins that hold light.
+        total: flux density of each cell and group.
+        sparse_cosine: upper bound on the mean cosine of a weak beam (see `SPARSE_SHARE`).
+    """
+
+    tables: Tables
+    groups: int
+    coloured: bool
+    four: mi.UInt32
+    numbers: mi.UInt32
+    blocks: mi.UInt32
+    used: mi.UInt32
+    total: mi.Float
+    sparse_cosine: mi.Float
+
+
 def collect_beams(
-    moments: mi.Float,
-    heights: mi.Float,
-    colours: mi.Float,
-    coloured: bool,
-    used: NDArray[np.integer],
-    bands: int,
-    sectors: int,
-    entries: int,
-    groups: int,
+    tables: Tables, coloured: bool, used: NDArray[np.integer], across: int, cells: int, groups: int
 ) -> Beams:
     """Merge the direction bins of a cache into beams.
 
     Args:
-        moments, heights, colours, coloured: as in `RadianceCache`.
+        tables, coloured: as in `BinnedLight`.
         used: ascending numbers of the direction bins that the cache holds.
-        bands, sectors: number of bands, and of sectors in each band; both even.
-        entries: number of cells times number of light groups.
+        across: number of bands, and of sectors in each band; even.
+        cells: number of cells.
         groups: number of light groups.
     """
-    slots = np.full(bands * sectors, NO_SLOT, dtype=np.uint32)
+    slots = np.full(across**2, NO_SLOT, dtype=np.uint32)
     slots[used] = np.arange(len(used))
-    block = np.arange(bands * sectors // 4)
-    corner = (block // (sectors // 2)) * 2 * sectors + (block % (sectors // 2)) * 2
-    four = slots[corner[:, None] + np.array([0, 1, sectors, sectors + 1])]
+    block = np.arange(across**2 // 4)
+    corner = (block // (across // 2)) * 2 * across + (block % (across // 2)) * 2
+    four = slots[corner[:, None] + np.array([0, 1, across, across + 1])]
     # Blocks without any light are skipped.
     lit = (four != NO_SLOT).any(axis=1)
     four = four[lit]
-    field = (moments, heights, colours, indices(four), indices(block[lit]))
-    sizes = (dr.opaque(mi.UInt32, len(four)), dr.opaque(mi.UInt32, len(used)))
-    nowhere = dr.zeros(mi.Float, 4)
+    entries = cells * groups
     lane = dr.arange(mi.UInt32, entries)
-    total = _total(moments, sizes[1], groups, lane)
-    zero = dr.zeros(mi.UInt32, entries)
     # A disc of the solid angle of 16 bins has R^2 = 64 / bins, and a mean cosine of 1 - R^2 / 4.
-    fine = bands * sectors >= FINE_BINS.count
-    widest = dr.opaque(mi.Float, 1 - 16 / (bands * sectors) if fine else 1.0)
-    rest = (groups, coloured, total, widest, lane)
-    count = _collect(*field, *sizes, *rest, zero, *[nowhere] * 3, False)
+    fine = across**2 >= FINE_BINS.count
+    count_used = dr.opaque(mi.UInt32, len(used))
+    light = BlocksOfBins(
+        tables=tables,
+        groups=groups,
+        coloured=coloured,
+        four=indices(four),
+        numbers=indices(block[lit]),
+        blocks=dr.opaque(mi.UInt32, len(four)),
+        used=count_used,
+        total=_total(tables.moments, count_used, groups, lane),
+        sparse_cosine=dr.opaque(mi.Float, 1 - 16 / across**2 if fine else 1.0),
+    )
+    nowhere = Beams(dr.zeros(mi.UInt32, entries + 1), *(dr.zeros(mi.Float, 4) for _ in range(3)))
+    count = _collect(light, lane, nowhere, False)
     padded = dr.zeros(mi.UInt32, entries + 1)
     dr.scatter(padded, count, lane)
     starts = dr.prefix_sum(padded)
     dr.eval(starts)
-    beams = max(int(starts[entries]), 1)
-    ways, fluxes, squares = (dr.zeros(mi.Float, count * beams) for count in (4, 4, 1))
-    first = dr.gather(mi.UInt32, starts, lane)
-    _collect(*field, *sizes, *rest, first, ways, fluxes, squares, True)
-    dr.eval(ways, fluxes, squares)
-    return Beams(starts, ways, fluxes, squares)
+    number = max(int(starts[entries]), 1)
+    found = Beams(starts, *(dr.zeros(mi.Float, count * number) for count in (4, 4, 1)))
+    _collect(light, lane, found, True)
+    dr.eval(found.ways, found.fluxes, found.heights)
+    return found
 
 
 @dr.syntax
@@ -119,50 +142,31 @@ def _total(moments: mi.Float, used: mi.UInt32, groups: int, lane: mi.UInt32) -> 
 
 
 @dr.syntax
-def _collect(
-    moments: mi.Float,
-    heights: mi.Float,
-    colours: mi.Float,
-    four: mi.UInt32,
-    names: mi.UInt32,
-    blocks: mi.UInt32,
-    used: mi.UInt32,
-    groups: int,
-    coloured: bool,
-    total: mi.Float,
-    sparse_cosine: mi.Float,
-    lane: mi.UInt32,
-    first: mi.UInt32,
-    ways: mi.Float,
-    fluxes: mi.Float,
-    squares: mi.Float,
-    write: bool,
-) -> mi.UInt32:
-    """Count the beams of each lane's cell and group, or write them from index ``first`` on.
-
-    ``names`` are the numbers of the blocks of four bins; ``sparse_cosine`` is the upper bound on
-    the mean cosine of a weak beam (see `SPARSE_SHARE`).
-    """
+def _collect(light: BlocksOfBins, lane: mi.UInt32, beams: Beams, write: bool) -> mi.UInt32:
+    """Count the beams of each lane's cell and group, or write them from its start on."""
+    groups, used, total = light.groups, light.used, light.total
+    coloured = light.coloured
     cell, group = lane // groups, lane % groups
+    first = dr.gather(mi.UInt32, beams.starts, lane)
     slot = mi.UInt32(first)
     k = mi.UInt32(0)
-    while k < blocks:
+    while k < light.blocks:
         values = []
         tall = []
         inks = []
         whole = mi.Vector4f(0)
         ink = mi.Vector4f(0)
         for i in range(4):
-            bin_slot = dr.gather(mi.UInt32, four, k * 4 + i)
+            bin_slot = dr.gather(mi.UInt32, light.four, k * 4 + i)
             there = bin_slot != NO_SLOT
             entry = (cell * used + bin_slot) * groups + group
-            value = dr.gather(mi.Vector4f, moments, entry, there)
+            value = dr.gather(mi.Vector4f, light.tables.moments, entry, there)
             values.append(value)
             whole += value
             if dr.hint(write, mode="scalar"):
-                tall.append(dr.gather(mi.Float, heights, entry, there))
+                tall.append(dr.gather(mi.Float, light.tables.heights, entry, there))
             if dr.hint(write and coloured, mode="scalar"):
-                inks.append(dr.gather(mi.Vector4f, colours, entry, there))
+                inks.append(dr.gather(mi.Vector4f, light.tables.colours, entry, there))
                 ink += inks[i]
         strong = dr.abs(whole.w) > STRONG_SHARE * total
         if dr.hint(not (write and coloured), mode="scalar"):
@@ -181,15 +185,15 @@ def _collect(
                 scale = dr.sign(value.w) * dr.rcp(dr.maximum(length, 1e-30))
                 cosine = dr.minimum(length / dr.maximum(dr.abs(value.w), 1e-30), 1.0)
                 sparse = dr.abs(value.w) < SPARSE_SHARE * total
-                cosine = dr.select(sparse, dr.minimum(cosine, sparse_cosine), cosine)
+                cosine = dr.select(sparse, dr.minimum(cosine, light.sparse_cosine), cosine)
                 way = mi.Vector4f(value.x * scale, value.y * scale, value.z * scale, cosine)
-                dr.scatter(ways, way, slot, chosen[i])
-                number = dr.gather(mi.UInt32, names, k) * 5 + i
+                dr.scatter(beams.ways, way, slot, chosen[i])
+                number = dr.gather(mi.UInt32, light.numbers, k) * 5 + i
                 tag = dr.reinterpret_array(mi.Float, group | (number << NUMBER_SHIFT))
                 flux = mi.Vector4f(inks[i].x, inks[i].y, inks[i].z, tag)
-                dr.scatter(fluxes, flux, slot, chosen[i])
+                dr.scatter(beams.fluxes, flux, slot, chosen[i])
                 squared = dr.maximum(tall[i] / dr.select(chosen[i], value.w, 1), 0)
-                dr.scatter(squares, squared, slot, chosen[i])
+                dr.scatter(beams.heights, squared, slot, chosen[i])
             slot += dr.select(chosen[i], mi.UInt32(1), mi.UInt32(0))
         k += 1
     return slot - first
@@ -211,8 +215,10 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
     lane = dr.arange(mi.UInt32, entries)
     near = dr.zeros(mi.UInt32, dr.width(beams.ways) // 4)
     margin = READ_DISTANCE / cells.inverse_size
-    sizes = (dr.opaque(mi.UInt32, groups), dr.opaque(mi.UInt32, dr.width(balls) // 4))
-    count = _mark_near(beams, middles, balls, margin, bin_axis(cells, 2), *sizes, lane, near)
+    place = Neighbourhood(
+        middles, balls, dr.opaque(mi.UInt32, dr.width(balls) // 4), margin, bin_axis(cells, 2)
+    )
+    count = _mark_near(beams, place, dr.opaque(mi.UInt32, groups), lane, near)
     counts = dr.zeros(mi.UInt32, entries + 1)
     dr.scatter(counts, count, lane)
     dr.eval(counts, near)
@@ -226,20 +232,31 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
     return Beams(dr.prefix_sum(counts), ways, fluxes, heights)
 
 
+@dataclass
+class Neighbourhood:
+    """Cells, and the balls that hide light from them.
+
+    Attributes:
+        middles: centre of each cell, four floats, mm.
+        balls: centre and radius of each ball, four floats, mm.
+        count: number of balls.
+        margin: distance by which the balls are enlarged, mm.
+        axis: axis of the direction bins.
+    """
+
+    middles: mi.Float
+    balls: mi.Float
+    count: mi.UInt32
+    margin: mi.Float
+    axis: mi.Vector3f
+
+
 @dr.syntax
 def _mark_near(
-    beams: Beams,
-    middles: mi.Float,
-    balls: mi.Float,
-    margin: mi.Float,
-    axis: mi.Vector3f,
-    groups: mi.UInt32,
-    ball_count: mi.UInt32,
-    lane: mi.UInt32,
-    near: mi.UInt32,
+    beams: Beams, place: Neighbourhood, groups: mi.UInt32, lane: mi.UInt32, near: mi.UInt32
 ) -> mi.UInt32:
     """Set ``near`` to 1 for beams that pass near a ball, and count them per cell and group."""
-    middle = dr.gather(mi.Vector4f, middles, lane // groups)
+    middle = dr.gather(mi.Vector4f, place.middles, lane // groups)
     point = mi.Point3f(middle.x, middle.y, middle.z)
     count = mi.UInt32(0)
     j = dr.gather(mi.UInt32, beams.starts, lane)
@@ -247,12 +264,12 @@ def _mark_near(
     while j < end:
         way = dr.gather(mi.Vector4f, beams.ways, j)
         height = dr.gather(mi.Float, beams.heights, j)
-        light = angular_variance(axis, mi.Vector3f(way.x, way.y, way.z), way.w, height)
+        light = angular_variance(place.axis, mi.Vector3f(way.x, way.y, way.z), way.w, height)
         touches = mi.Bool(False)
         n = mi.UInt32(0)
-        while n < ball_count:
-            ball = dr.gather(mi.Vector4f, balls, n)
-            ball.w += margin
+        while n < place.count:
+            ball = dr.gather(mi.Vector4f, place.balls, n)
+            ball.w += place.margin
             touches |= passes_near(ball, point, light)
             n += 1
         dr.scatter(near, mi.UInt32(1), j, touches)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -12,6 +13,22 @@ from numpy.typing import NDArray
 from optisense.optics.backend.arrays import floats
 from optisense.optics.backend.sequences import unit_float
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
+
+
+class Tables(NamedTuple):
+    """Light by cell, direction bin and light group.
+
+    Attributes:
+        moments: four floats per entry: the flux density across the light (mW/mm^2) times the
+            direction towards the light (3), and the flux density (1).
+        heights: the flux density times the squared component of the direction along the bins' axis.
+        colours: four floats per entry: the flux density in R, G, B where surfaces are coloured,
+            else the same array as ``moments``.
+    """
+
+    moments: mi.Float
+    heights: mi.Float
+    colours: mi.Float
 
 
 @dataclass(frozen=True)

@@ -75,9 +75,9 @@ def glossy_interreflection(
         at: the points.
     """
     lanes = dr.width(at.seen.pixel)
-    totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(field.groups)]
+    totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(field.binned.groups)]
     dr.eval(at)
-    directions = DIRECTIONS if field.narrow_lobes else BROAD_DIRECTIONS
+    directions = DIRECTIONS if field.binned.narrow_lobes else BROAD_DIRECTIONS
     lane = dr.arange(mi.UInt32, lanes * directions)
     owner = lane // directions
     table = scenes.full.table
@@ -173,11 +173,11 @@ def shading_points(
     normal.
     """
     points = seen.points
-    upright, offset = plane_of(field.cells, seen.near, points.valid)
+    upright, offset = plane_of(field.binned.cells, seen.near, points.valid)
     foot = points.point - upright * (dr.dot(upright, points.point) - offset)
     base = dr.select(seen.raised, foot, points.point)
     cell, shift, found = interpolating_cell(
-        field.cells, base, points.valid, points.series, points.number
+        field.binned.cells, base, points.valid, points.series, points.number
     )
     return ShadingPoints(
         seen=points,
@@ -196,8 +196,8 @@ def light_of(field: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> 
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
         at.seen.point,
-        plane_of(field.cells, at.cell, at.active)[0],
+        plane_of(field.binned.cells, at.cell, at.active)[0],
         at.raised & dr.opaque(mi.Bool, scenes.convex),
     )
     rays = dr.opaque(mi.Float, PLACE_SHADOW_RAYS)
-    return sum_bins(field.binned(), scenes, at, rays, sky)
+    return sum_bins(field.binned, scenes, at, rays, sky)

@@ -113,4 +113,6 @@ def interreflected(
         directions: number of rays from each point.
     """
     count = dr.opaque(mi.UInt32, directions)
-    return _sample(field.cells, field.irradiance, field.groups, scenes, at, count)
+    return _sample(
+        field.binned.cells, field.binned.irradiance, field.binned.groups, scenes, at, count
+    )

@@ -127,7 +127,9 @@ def _radiance_differences(
     away = -seen.towards_eye
     behind = scenes.fixed.intersect(Ray(seen.point, away, seen.valid))
     base = dr.select(behind.valid, behind.point, seen.point)
-    cell, shift, found = interpolating_cell(field.cells, base, seen.valid, seen.series, seen.number)
+    cell, shift, found = interpolating_cell(
+        field.binned.cells, base, seen.valid, seen.series, seen.number
+    )
     side = -dr.sign(dr.dot(away, behind.normal))
     skin = replace(
         seen,
@@ -138,7 +140,7 @@ def _radiance_differences(
     )
     coating = coating_of(scenes.full.table, behind.surface, behind.valid)
     flat = ShadingPoints(skin, coating, base, cell, shift, found & behind.valid, mi.Bool(False))
-    without = sum_beams(field.beams, field.groups, flat)
+    without = sum_beams(field.beams, field.binned.groups, flat)
     places = SecondaryHits(seen, mi.Bool(seen.valid), cell)
     lit = light_of(field, scenes, shading_points(field, scenes, places))
     return [one - other for one, other in zip(lit, without, strict=True)]

@@ -66,7 +66,7 @@ def shade_in_contacts(
     onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))
     base = dr.select(raised & onward.valid, onward.point, points.point)
     cell, shift, active = interpolating_cell(
-        field.cells, base, points.valid, points.series, points.number
+        field.binned.cells, base, points.valid, points.series, points.number
     )
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, field.metallic)
@@ -75,10 +75,10 @@ def shade_in_contacts(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
         points.point,
-        plane_of(field.cells, cell, active)[0],
+        plane_of(field.binned.cells, cell, active)[0],
         raised & dr.opaque(mi.Bool, scenes.convex),
     )
-    far = sum_bins(field.binned(), scenes, at, dr.opaque(mi.Float, CONTACT_SHADOW_RAYS), sky)
+    far = sum_bins(field.binned, scenes, at, dr.opaque(mi.Float, CONTACT_SHADOW_RAYS), sky)
     if not interreflection:
         return far, None
     between = glossy_interreflection if field.metallic else interreflected
@@ -103,21 +103,25 @@ def shade(
         reflected: whether the points are seen in the reflection of an interface.
     """
     base, seen = points.point, points.valid
-    cell, shift, active = interpolating_cell(field.cells, base, seen, points.series, points.number)
+    cell, shift, active = interpolating_cell(
+        field.binned.cells, base, seen, points.series, points.number
+    )
     start = leave(base, points.face_normal, points.face_normal)
     coating = coating_of(scenes.full.table, points.surface, active, field.metallic)
     at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
     indenters = scenes.indenters
     totals: list[mi.Color3f]
-    if field.metallic or field.coloured:
-        totals = sum_beams(field.beams, field.groups, at)
+    if field.metallic or field.binned.coloured:
+        totals = sum_beams(field.beams, field.binned.groups, at)
     else:
-        totals = [mi.Color3f(0) for _ in range(field.groups)]
+        totals = [mi.Color3f(0) for _ in range(field.binned.groups)]
         for k in range(CELLS_PER_SAMPLE):
             number = points.number * CELLS_PER_SAMPLE + k
-            beside, _, lit = interpolating_cell(field.cells, base, seen, points.series, number)
+            beside, _, lit = interpolating_cell(
+                field.binned.cells, base, seen, points.series, number
+            )
             light = sum_diffuse(
-                field.irradiance, field.groups, replace(at, cell=beside, active=lit)
+                field.binned.irradiance, field.binned.groups, replace(at, cell=beside, active=lit)
             )
             totals = [
                 one + each / CELLS_PER_SAMPLE for one, each in zip(totals, light, strict=True)
@@ -125,7 +129,7 @@ def shade(
     if indenters is None:
         return totals
     shadow_rays = dr.opaque(mi.Float, REFLECTED_SHADOW_RAYS if reflected else SHADOW_RAYS)
-    axis = bin_axis(field.cells, 2)
+    axis = bin_axis(field.binned.cells, 2)
     hidden = sum_hidden(culled_beams, totals, indenters.scene, at, axis, shadow_rays)
     # Where all light is occluded, rounding may make the sum of the shares exceed the total.
     return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]
@@ -147,7 +151,7 @@ def beside_contacts(
     """
     table = scenes.full.table
     cell, shift, active = interpolating_cell(
-        field.cells, points.point, points.valid, points.series, points.number
+        field.binned.cells, points.point, points.valid, points.series, points.number
     )
     coating = coating_of(table, points.surface, active, field.metallic)
     start = leave(points.point, points.face_normal, points.face_normal)

@@ -14,11 +14,12 @@ from scipy.sparse import csr_matrix
 
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.radiance_cache.beams import collect_beams
-from optisense.optics.radiance_cache.cache import RadianceCache, Tables
+from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
 from optisense.optics.radiance_cache.direction_bins import (
     COARSE_BINS,
     FINEST_BINS,
     DirectionBins,
+    Tables,
     bin_centres,
     direction_bin,
     dither,
@@ -287,38 +288,30 @@ class CacheTally:
             ]
             return Tables(flat[0], flat[1], flat[2] if self.coloured else flat[0])
 
-        moments, heights, colours = smoothed(self.landed)
-        above_surface = None if self.above_surface is None else smoothed(self.above_surface)
-        table = irradiance_table(
-            moments, self.cells.cells, dr.opaque(mi.UInt32, len(used)), self.groups
-        )
-        dr.eval(moments, heights, colours, table, above_surface)
-        return RadianceCache(
+        tables = smoothed(self.landed)
+        above = None if self.above_surface is None else smoothed(self.above_surface)
+        size = dr.opaque(mi.UInt32, len(used))
+        cells, groups = self.cells.cells, self.groups
+        table = irradiance_table(tables.moments, cells, size, groups)
+        dr.eval(tables, table, above)
+        across = self.directions.across
+        binned = BinnedLight(
             cells=self.cells,
             planes=self.planes,
-            bins=len(used),
-            groups=self.groups,
-            moments=moments,
-            heights=heights,
-            colours=colours,
-            coloured=self.coloured,
-            roughness=self.roughness,
-            narrow_lobes=self.directions.across >= FINEST_BINS.across,
+            tables=tables,
+            above=above,
             centres=bin_centres(self.cells, self.directions, used),
             irradiance=table,
-            beams=collect_beams(
-                moments,
-                heights,
-                colours,
-                self.coloured,
-                used,
-                self.directions.across,
-                self.directions.across,
-                self.cells.cells * self.groups,
-                self.groups,
-            ),
+            bins=size,
+            groups=groups,
+            coloured=self.coloured,
+            narrow_lobes=across >= FINEST_BINS.across,
+        )
+        return RadianceCache(
+            binned=binned,
+            beams=collect_beams(tables, self.coloured, used, across, cells, groups),
+            roughness=self.roughness,
             photons=self.photons,
             noise=self.noise(),
             worst_noise=self.worst_noise(),
-            above_surface=above_surface,
         )

@@ -10,7 +10,6 @@ import numpy as np
 from optisense import library
 from optisense.design import Light, LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
-from optisense.design.emitters import Intensity
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
@@ -48,7 +47,6 @@ class Assembly:
         sensing: the deformed sensing surface, with all its triangles.
         gels: the elastomers.
         emitters: all lights; ``group`` counts in the order of ``groups``.
-        light_areas: areas (mm^2) of the lights' windows, 0 for points.
         fine: by number of a piece of the sensing surface, that piece with all its triangles.
         ior_before: refractive index on the inner side of the (first) sensing surface.
         absorption_before: absorption coefficients (1/mm) of the medium on that side at R, G, B.
@@ -61,7 +59,6 @@ class Assembly:
     gels: list[TriangleMesh]
     emitters: list[Emitter]
     groups: list[str]
-    light_areas: list[float]
     fine: dict[int, Piece]
     ior_before: float
     absorption_before: RGB
@@ -170,7 +167,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
             surface = _opaque(design.materials.get(covers[sheet.name] or ""), ior)
         pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
-    emitters, areas = _emitters(design, solids)
+    emitters = _emitters(design, solids)
     for number, emitter in enumerate(emitters):
         if emitter.shape is not EmitterShape.POINT:
             pieces.append(_window(number, emitter))
@@ -180,7 +177,6 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         gels=[meshes[name] for name in design.parts_of(Role.ELASTOMER)],
         emitters=emitters,
         groups=list(design.lights),
-        light_areas=areas,
         fine=fine,
         ior_before=indices[0],
         absorption_before=absorptions[0],
@@ -285,17 +281,6 @@ def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
     return Piece(name, smooth.vertices, smooth.faces, surface, smooth.normals)
 
 
-@dataclass(frozen=True)
-class _Lamp:
-    """Properties that all lights of a group share; ``area`` is that of the window in mm^2."""
-
-    intensity: Intensity | None
-    exponent: float
-    shape: EmitterShape
-    size: tuple[float, float]
-    area: float
-
-
 def _absorption_at(places: list[Light], solids: list[Solid]) -> list[RGB]:
     """Return the absorption coefficients (1/mm) at R, G, B of the medium that each light shines
     into.
@@ -312,8 +297,8 @@ def _absorption_at(places: list[Light], solids: list[Solid]) -> list[RGB]:
     return [absorption for _, absorption in found]
 
 
-def _emitters(design: SensorDesign, solids: list[Solid]) -> tuple[list[Emitter], list[float]]:
-    emitters, areas = [], []
+def _emitters(design: SensorDesign, solids: list[Solid]) -> list[Emitter]:
+    emitters = []
     for number, group in enumerate(design.lights.values()):
         if group.emitter is None and not library.is_own("light", group.model):
             lamp = _built_in_lamp(group.model)
@@ -322,37 +307,38 @@ def _emitters(design: SensorDesign, solids: list[Solid]) -> tuple[list[Emitter],
         media = _absorption_at(group.lights, solids)
         for light, absorption in zip(group.lights, media, strict=True):
             emitters.append(
-                Emitter(
+                replace(
+                    lamp,
                     group=number,
                     position=light.position,
                     direction=light.direction,
                     up=light.up,
-                    shape=lamp.shape,
-                    size=lamp.size,
-                    exponent=lamp.exponent,
-                    intensity=lamp.intensity,
                     absorption=absorption,
                 )
             )
-            areas.append(float(lamp.area))
     if not emitters:
         raise DesignError("the design has no lights", where=design.where("lights"))
-    return emitters, areas
+    return emitters
 
 
 @lru_cache(maxsize=64)
-def _built_in_lamp(name: str) -> _Lamp:
+def _built_in_lamp(name: str) -> Emitter:
     return _lamp(library.emitter(LightGroup.model_construct(model=name, emitter=None)))
 
 
-def _lamp(model: LightModel) -> _Lamp:
+def _lamp(model: LightModel) -> Emitter:
+    """Return a light of a model, at the origin."""
     window, power = model.window(), model.cosine_power()
-    intensity = model.intensity() if power is None else None
-    exponent = 1.0 if power is None else power
+    lamp = Emitter(
+        group=0,
+        position=(0.0, 0.0, 0.0),
+        direction=(0.0, 0.0, 1.0),
+        exponent=1.0 if power is None else power,
+        intensity=model.intensity() if power is None else None,
+    )
     if window is None:
-        return _Lamp(intensity, exponent, EmitterShape.POINT, (0.0, 0.0), 0.0)
-    shape = EmitterShape[window.shape.upper()]
-    return _Lamp(intensity, exponent, shape, window.size, window.area)
+        return lamp
+    return replace(lamp, shape=EmitterShape[window.shape.upper()], size=window.size)
 
 
 def _window(number: int, emitter: Emitter) -> Piece:

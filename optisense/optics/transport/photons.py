@@ -91,7 +91,7 @@ class TargetCells:
 
 
 @dataclass
-class _Flight:
+class Flight:
     """Photons in flight.
 
     Attributes:
@@ -123,7 +123,7 @@ class _Recording:
     crossings: Records
 
 
-def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[_Flight, mi.UInt32]:
+def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[Flight, mi.UInt32]:
     """Emit photons from the lights; return them and the guide's cell of each.
 
     If refractive indices differ between channels, each photon carries light of one channel; the
@@ -149,7 +149,7 @@ def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[_Fli
     if scene.dispersive:
         ray.channel = number % 3
         power = mi.Color3f(*(dr.select(ray.channel == k, 3 * power[k], 0) for k in range(3)))
-    flight = _Flight(
+    flight = Flight(
         ray=ray,
         throughput=power,
         group=group | ((number & 1) << HALF_SHIFT),
@@ -162,8 +162,8 @@ def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[_Fli
 
 @dr.syntax
 def _fly(
-    scene: RayScene, flight: _Flight, recording: _Recording, limit: mi.UInt32, seed: mi.UInt64
-) -> _Flight:
+    scene: RayScene, flight: Flight, recording: _Recording, limit: mi.UInt32, seed: mi.UInt64
+) -> Flight:
     """Follow photons until they have met ``limit`` surfaces in all."""
     ray = flight.ray
     throughput = mi.Color3f(flight.throughput)
@@ -214,7 +214,7 @@ def _fly(
             survival = dr.minimum(dr.max(step.lobe.weight), MAX_SURVIVAL)
             ray.active &= rng.next_float32() < survival
             throughput /= dr.maximum(survival, 1e-6)
-    return _Flight(ray, throughput, flight.group, landed, scattered, flight.number)
+    return Flight(ray, throughput, flight.group, landed, scattered, flight.number)
 
 
 def _trace(

@@ -18,12 +18,12 @@ from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.scene.emitters import EmitterTable
-from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.interact import LobeSample, Path, interact
 from optisense.optics.transport.photon_map import GROUP_MASK
-from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, TargetCells, launch
+from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, Flight, TargetCells, launch
 
 TILT_BINS, TURN_BINS = 9, 12
 """Numbers of bins of the angle of incidence (10 degrees each) and of azimuth (30 degrees each)."""
@@ -66,28 +66,36 @@ class Disc:
     radius: float
 
 
+@dataclass
+class _Tally:
+    """Power that lands at a place.
+
+    Attributes:
+        middle, inward, right, up, radius: as in `Disc`.
+        sums: power in the disc, (lines, ways, tilts, turns, 3), mW.
+        seen: the cells of the sensing surface, with flags for those that the camera sees.
+        view: power in the camera's view, (lines, 3), mW.
+    """
+
+    middle: mi.Vector3f
+    inward: mi.Vector3f
+    right: mi.Vector3f
+    up: mi.Vector3f
+    radius: mi.Float
+    sums: mi.Float64
+    seen: TargetCells
+    view: mi.Float64
+
+
 @dr.syntax
 def _count(
-    scene: RayScene,
-    ray: Ray,
-    power: mi.Color3f,
-    line: mi.UInt32,
-    number: mi.UInt32,
-    disc: list[mi.Vector3f],
-    radius: mi.Float,
-    sums: mi.Float64,
-    seen: TargetCells,
-    view: mi.Float64,
-    seed: mi.UInt32,
+    scene: RayScene, tally: _Tally, flight: Flight, line: mi.UInt32, seed: mi.UInt32
 ) -> None:
-    """Follow photons to their ends and sum their power.
-
-    Power that lands in the disc is added to ``sums`` (lines, ways, tilts, turns, 3), and power that
-    lands in the camera's view to ``view`` (lines, 3).
-    """
-    middle, inward, right, up = disc
+    """Follow photons to their ends and add their power to the lines of a tally."""
+    middle, seen = tally.middle, tally.seen
+    ray, power = flight.ray, flight.throughput
     rng = mi.PCG32()
-    first, second = mi.sample_tea_32(number, seed)
+    first, second = mi.sample_tea_32(flight.number, seed)
     rng.seed(mi.UInt64(first), mi.UInt64(second))
     way = mi.UInt32(0)
     while ray.active:
@@ -95,21 +103,23 @@ def _count(
         step = interact(scene, ray, Path.PHOTON, sample)
         power *= step.transmittance
         offset = mi.Vector3f(step.hit.point) - middle
-        lands = step.sensed & (dr.squared_norm(offset) < radius * radius)
+        lands = step.sensed & (dr.squared_norm(offset) < tally.radius * tally.radius)
         cell, near = cell_at(seen.cells, step.hit.point, step.sensed)
         near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
         for k in range(3):
-            dr.scatter_add(view, mi.Float64(power[k]), line * 3 + k, near)
+            dr.scatter_add(tally.view, mi.Float64(power[k]), line * 3 + k, near)
         if lands:
             towards = -ray.direction
-            cosine = dr.clip(dr.dot(towards, inward), 0, 1)
+            cosine = dr.clip(dr.dot(towards, tally.inward), 0, 1)
             tilt = mi.UInt32(dr.minimum(dr.acos(cosine) * (2 / dr.pi) * TILT_BINS, TILT_BINS - 0.5))
-            angle = dr.atan2(dr.dot(towards, up), dr.dot(towards, right)) * (1 / dr.two_pi)
+            angle = dr.atan2(dr.dot(towards, tally.up), dr.dot(towards, tally.right)) * (
+                1 / dr.two_pi
+            )
             angle -= dr.floor(angle)
             turn = mi.UInt32(dr.minimum(angle * TURN_BINS, TURN_BINS - 0.5))
             row = ((line * WAYS + way) * TILT_BINS + tilt) * TURN_BINS + turn
             for k in range(3):
-                dr.scatter_add(sums, mi.Float64(power[k]), row * 3 + k)
+                dr.scatter_add(tally.sums, mi.Float64(power[k]), row * 3 + k)
         mirrored = step.scattered & ~step.opaque
         met = dr.select(step.turned, mi.UInt32(int(LightWay.REFLECTED)), 0)
         met = dr.select(mirrored, mi.UInt32(int(LightWay.MIRRORED)), met)
@@ -148,34 +158,31 @@ def trace_to_place(
         camera's view, (batches, groups, 3), for lights of 1 mW in each channel.
     """
     groups = table.groups
-    sums = dr.zeros(mi.Float64, BATCHES * groups * WAYS * TILT_BINS * TURN_BINS * 3)
-    view = dr.zeros(mi.Float64, BATCHES * groups * 3)
-    axes = [
-        mi.Vector3f(*(dr.opaque(mi.Float, float(part)) for part in vector))
-        for vector in (disc.middle, disc.inward, disc.right, disc.up)
-    ]
+
+    def vector(values: NDArray[np.float64]) -> mi.Vector3f:
+        return mi.Vector3f(*(dr.opaque(mi.Float, float(part)) for part in values))
+
+    tally = _Tally(
+        middle=vector(disc.middle),
+        inward=vector(disc.inward),
+        right=vector(disc.right),
+        up=vector(disc.up),
+        radius=dr.opaque(mi.Float, disc.radius),
+        sums=dr.zeros(mi.Float64, BATCHES * groups * WAYS * TILT_BINS * TURN_BINS * 3),
+        seen=seen,
+        view=dr.zeros(mi.Float64, BATCHES * groups * 3),
+    )
     per_light = max(1, photons // (BATCHES * table.count))
     lights = indices(np.arange(table.count))
     guide = uniform_guide(table.count)
     for batch in range(BATCHES):
         emission = Emission(table, guide, per_light, seed_of(seed, 6, batch))
         flight, _ = launch(scene, emission, lights)
-        _count(
-            scene,
-            flight.ray,
-            flight.throughput,
-            (flight.group & GROUP_MASK) + dr.opaque(mi.UInt32, batch * groups),
-            flight.number,
-            axes,
-            dr.opaque(mi.Float, disc.radius),
-            sums,
-            seen,
-            view,
-            dr.opaque(mi.UInt32, seed_of(seed, 7, batch)),
-        )
-        dr.eval(sums, view)
-    found = np.asarray(sums, dtype=np.float64)
+        line = (flight.group & GROUP_MASK) + dr.opaque(mi.UInt32, batch * groups)
+        _count(scene, tally, flight, line, dr.opaque(mi.UInt32, seed_of(seed, 7, batch)))
+        dr.eval(tally.sums, tally.view)
+    found = np.asarray(tally.sums, dtype=np.float64)
     return (
         found.reshape(BATCHES, groups, WAYS, TILT_BINS, TURN_BINS, 3),
-        np.asarray(view, dtype=np.float64).reshape(BATCHES, groups, 3),
+        np.asarray(tally.view, dtype=np.float64).reshape(BATCHES, groups, 3),
     )
