@@ -5,27 +5,23 @@ name.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from optisense.cli.console import PlainConsole, ends_well, messages, output
+from optisense.cli.library_add import add_entry
 from optisense.errors import LibraryError
 
 if TYPE_CHECKING:
-    from optisense.library import Added, AnyEntry
+    from optisense.library import AnyEntry
 
 KINDS = ("material", "coating", "light", "camera")
 PIPED_WIDTH = 240
 """Characters per line of a table that is piped to another program. No cell of the library's tables
 is wrapped at this width, so that every entry stays on one line.
 """
-
-KindOption = Annotated[
-    str | None,
-    typer.Option("--kind", metavar="KIND", help=f"One of: {', '.join(KINDS)}.", show_default=False),
-]
 
 library_app = typer.Typer(
     help="Materials, coatings, lights and cameras that designs can name.", no_args_is_help=True
@@ -120,154 +116,7 @@ def show_entry(
             messages.print(f"picture: {out}", markup=False)
 
 
-@library_app.command("add")
-@ends_well
-def add_entry(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE",
-            help="An entry (.yaml, as `library show --yaml` prints), an .ies, or the word camera "
-            "with --tuning.",
-        ),
-    ],
-    kind: KindOption = None,
-    name: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME", help="Name of the entry in designs; the file's name if left out."
-        ),
-    ] = None,
-    colour: Annotated[
-        str | None,
-        typer.Option(
-            metavar="COLOUR", help="With an .ies: red, green, blue, white, or R,G,B from 0 to 1."
-        ),
-    ] = None,
-    flux: Annotated[
-        float | None, typer.Option(metavar="MW", help="With an .ies: radiant flux in mW.")
-    ] = None,
-    wavelength: Annotated[
-        float | None, typer.Option(metavar="NM", help="With an .ies: dominant wavelength in nm.")
-    ] = None,
-    current: Annotated[
-        float | None, typer.Option(metavar="MA", help="With an .ies: current in mA at this flux.")
-    ] = None,
-    window: Annotated[
-        str | None,
-        typer.Option(metavar="WxH", help="With an .ies: size of its opening in mm, as 2.4x2.4."),
-    ] = None,
-    package: Annotated[
-        str | None,
-        typer.Option(metavar="WxLxH", help="With an .ies: size of its body in mm, as 2.8x3.5x1.9."),
-    ] = None,
-    description: Annotated[
-        str | None,
-        typer.Option(metavar="TEXT", help="With an .ies or --tuning: what it is, in a line."),
-    ] = None,
-    source: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="With an .ies: where these numbers are from.")
-    ] = None,
-    status: Annotated[
-        str,
-        typer.Option(
-            metavar="STATUS",
-            help="With an .ies: measured, datasheet, sourced, derived or assumed.",
-        ),
-    ] = "assumed",
-    tuning: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.json",
-            help="A tuning file of libcamera, from which noise, shading, colours and tone "
-            "curve are read.",
-            show_default=False,
-        ),
-    ] = None,
-    like: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="With --tuning: the camera of the library whose field of view and pixels the "
-            "new entry takes.",
-        ),
-    ] = None,
-    temperature: Annotated[
-        float | None,
-        typer.Option(metavar="K", help="With --tuning: colour temperature in K; 5000 if left out."),
-    ] = None,
-) -> None:
-    """Check an entry of your own and store it in your library folder.
-
-    The folder is $OPTISENSE_LIBRARY, or else optisense/library in your configuration folder.
-    """
-    from optisense import library
-
-    given = {
-        "--colour": colour, "--flux": flux, "--wavelength": wavelength, "--current": current,
-        "--window": window, "--package": package, "--description": description,
-        "--source": source,
-    }  # fmt: skip
-    if tuning is None:
-        if str(file) == "camera" and not file.exists():
-            raise typer.BadParameter(
-                "name the tuning file: library add camera --tuning FILE.json --like CAMERA",
-                param_hint="--tuning",
-            )
-        for option, value in (("--like", like), ("--temperature", temperature)):
-            if value is not None:
-                raise typer.BadParameter("is for --tuning only", param_hint=option)
-    if tuning is not None:
-        from optisense.cli.library_tuning import add_tuning_file
-
-        del given["--description"]
-        _refuse(given, "--tuning has none")
-        added = add_tuning_file(
-            file, tuning, like=like, temperature=temperature, name=name, description=description
-        )
-    elif file.suffix.lower() != ".ies":
-        _refuse(given, "is for .ies files only")
-        added = library.add_file(file, kind, name)
-    else:
-        if kind not in (None, "light", "lights"):
-            raise typer.BadParameter("an .ies file is a light", param_hint="--kind")
-        from optisense.cli.library_ies import add_ies_file
-
-        added = add_ies_file(
-            file,
-            name=name,
-            colour=colour,
-            flux=flux,
-            wavelength=wavelength,
-            current=current,
-            window=window,
-            package=package,
-            description=description,
-            source=source,
-            status=status,
-        )
-    _say_added(added)
-
-
-def _refuse(given: dict[str, Any], why: str) -> None:
-    """Refuse options that were given.
-
-    Raises:
-        typer.BadParameter: an option was given.
-    """
-    for option, value in given.items():
-        if value is not None:
-            raise typer.BadParameter(why, param_hint=option)
-
-
-def _say_added(added: Added) -> None:
-    output.print(f"{added.kind} {added.name}: {added.file}", markup=False)
-    unsourced = added.entry.unsourced()
-    if unsourced:
-        output.print(
-            f"no source is given for: {', '.join(unsourced)}", markup=False, style="yellow"
-        )
-    output.print(f"Look at it:  optisense library show {added.name}", markup=False, style="dim")
+library_app.command("add")(add_entry)
 
 
 def _print_table(table: Table) -> None:

@@ -89,36 +89,29 @@ def _taken_along(value: Model, name: str) -> dict[str, bytes]:
 
 def add_ies(
     file: str | Path,
+    light: TypicalLight,
+    source: Source | None = None,
     *,
-    flux: float,
-    colour: Colour,
-    colour_name: str,
+    colour_name: str = "own",
     name: str | None = None,
     description: str | None = None,
-    wavelength: float | None = None,
-    current: float | None = None,
     window: tuple[float, float] | None = None,
     package: tuple[float, float, float] | None = None,
-    source: str = "given when the light was added",
-    status: Status = Status.ASSUMED,
-    date: str | None = None,
 ) -> Added:
     """Add a light from its IES file and the data that this file lacks.
 
     Args:
-        flux: radiant flux, mW.
-        colour: R, G, B, 0 to 1.
+        light: colour, radiant flux (mW), dominant wavelength (nm) and current (mA).
+        source: source of these numbers and sizes; assumed if None.
         colour_name: name of the colour in the entry.
         name: name of the light for designs; None takes the name of the file.
-        wavelength: dominant wavelength, nm.
-        current: current at which the light has its flux, mA.
+        description: description in one line.
         window: width and height of its opening, mm; it is simulated as a point all the same.
         package: width, length and height of its body, mm.
-        source, status, date: source of these numbers.
 
     Raises:
-        LibraryError: the file can't be read or is damaged (the message names the line), a number is
-            out of its range, or the name is taken.
+        LibraryError: the file can't be read or is damaged (the message names the line), there is
+            no flux or no colour, or the name is taken.
         OutputError: the user's folder can't be written.
     """
     file = Path(file)
@@ -126,29 +119,21 @@ def add_ies(
     check_new_name(name)
     data = read_bytes(file, MOST_IES, LibraryError, "the IES file")
     parse_ies(data.decode("latin-1"), str(file))
-    given = Source(status=status, source=source, date=date)
-    sources = {
-        "file": Source(status=Status.SOURCED, source=_about(data) or file.name, date=date),
-        **{field: given for field, value in (("window", window), ("package", package)) if value},
-        **{
-            field: given
-            for field, value in (("wavelength", wavelength), ("current", current), ("flux", flux))
-            if value is not None
-        },
-    }
-    if flux <= 0.0 or max(colour) <= 0.0:
+    if source is None:
+        source = Source(status=Status.ASSUMED, source="given when the light was added")
+    given = {"window": window, "package": package}
+    given |= {name: getattr(light, name) for name in ("wavelength", "current", "flux")}
+    about = Source(status=Status.SOURCED, source=_about(data) or file.name, date=source.date)
+    sources = {field: source for field, value in given.items() if value is not None}
+    if not light.flux or max(light.colour) <= 0.0:
         raise LibraryError("the flux and at least one value of the colour must be above 0")
     entry = LightEntry(
         description=description or f"Light with the IES file {file.name}",
         value=IesEmitter(file=f"{name}.ies"),
         package=package,
         window=window,
-        typical={
-            colour_name: TypicalLight(
-                colour=colour, wavelength=wavelength, current=current, flux=flux
-            )
-        },
-        sources=sources,
+        typical={colour_name: light},
+        sources={"file": about, **sources},
     )
     return Added("light", name, entry, _stored("light", name, entry, {f"{name}.ies": data}))
 

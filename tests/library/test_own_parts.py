@@ -42,9 +42,11 @@ def write(folder: Path, name: str, text: str) -> Path:
     return file
 
 
-def add_lamp(file: Path, **changes: object) -> library.Added:
-    given: dict[str, object] = {"flux": 4.0, "colour": (1.0, 0.0, 0.0), "colour_name": "red"}
-    return library.add_ies(file, **{**given, **changes})  # type: ignore[arg-type]
+def add_lamp(
+    file: Path, wavelength: float | None = None, window: tuple[float, float] | None = None
+) -> library.Added:
+    light = library.TypicalLight(colour=(1.0, 0.0, 0.0), flux=4.0, wavelength=wavelength)
+    return library.add_ies(file, light, colour_name="red", window=window)
 
 
 class TestFolder:

@@ -233,7 +233,8 @@ def test_a_dataset_of_a_sensor_with_an_own_lamp_opens_and_continues_elsewhere(
     monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "own"))
     (tmp_path / "our-lamp.ies").write_text(LAMP)
     red = (1.0, 0.0, 0.0)
-    library.add_ies(tmp_path / "our-lamp.ies", flux=4.0, colour=red, colour_name="red")
+    light = library.TypicalLight(colour=red, flux=4.0)
+    library.add_ies(tmp_path / "our-lamp.ies", light, colour_name="red")
     design = load("gelsight-mini-ideal")
     lamps = design.lights["red"].model_dump() | {"model": "our-lamp"}
     design.lights["red"] = LightGroup.model_validate(lamps)

@@ -1,0 +1,193 @@
+"""``optisense library add``: addition of an entry of the user's own."""
+
+from __future__ import annotations
+
+import sys
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from optisense.cli.console import ends_well, messages, output
+from optisense.commands.adding import IesOptions, TuningOptions, above_0
+
+if TYPE_CHECKING:
+    from optisense.library import Added
+
+
+@ends_well
+def add_entry(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="An entry (.yaml, as `library show --yaml` prints), an .ies, or the word camera "
+            "with --tuning.",
+        ),
+    ],
+    *,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND", help="One of: material, coating, light, camera.", show_default=False
+        ),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME", help="Name of the entry in designs; the file's name if left out."
+        ),
+    ] = None,
+    description: Annotated[
+        str | None,
+        typer.Option(metavar="TEXT", help="With an .ies or --tuning: what it is, in a line."),
+    ] = None,
+    ies: IesOptions,
+    tuning: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.json",
+            help="A tuning file of libcamera, from which noise, shading, colours and tone "
+            "curve are read.",
+            show_default=False,
+        ),
+    ] = None,
+    camera: TuningOptions,
+) -> None:
+    """Check an entry of your own and store it in your library folder.
+
+    The folder is $OPTISENSE_LIBRARY, or else optisense/library in your configuration folder.
+    """
+    from optisense import library
+
+    if tuning is not None:
+        _refuse(ies, "--tuning has none")
+        _say_added(_from_tuning(file, tuning, camera, name, description))
+        return
+    if str(file) == "camera" and not file.exists():
+        raise typer.BadParameter(
+            "name the tuning file: library add camera --tuning FILE.json --like CAMERA",
+            param_hint="--tuning",
+        )
+    _refuse(camera, "is for --tuning only")
+    if file.suffix.lower() != ".ies":
+        _refuse(ies, "is for .ies files only")
+        if description is not None:
+            raise typer.BadParameter("is for .ies files only", param_hint="--description")
+        _say_added(library.add_file(file, kind, name))
+        return
+    if kind not in (None, "light", "lights"):
+        raise typer.BadParameter("an .ies file is a light", param_hint="--kind")
+    _say_added(_from_ies(file, ies, name, description))
+
+
+def _refuse(given: IesOptions | TuningOptions, why: str) -> None:
+    """Refuse options that were given.
+
+    Raises:
+        typer.BadParameter: an option was given.
+    """
+    for option in given.model_fields_set - {"status"}:
+        raise typer.BadParameter(why, param_hint=f"--{option}")
+
+
+def _from_ies(file: Path, given: IesOptions, name: str | None, description: str | None) -> Added:
+    """Store a light from an IES file; its colour and flux are asked for at a terminal.
+
+    Raises:
+        LibraryError: the file is damaged, or the name is taken.
+        OutputError: the user's folder can't be written.
+        typer.BadParameter: an option is missing while there is no terminal.
+    """
+    from optisense import library
+    from optisense.library.adding import check_new_name
+    from optisense.library.own_parts import own_folder
+
+    check_new_name(file.stem if name is None else name)
+    profile = library.ies.read_ies(file)
+    if given.colour is None or given.flux is None:
+        if not sys.stdin.isatty():
+            missing = "--colour" if given.colour is None else "--flux"
+            raise typer.BadParameter(
+                "the IES file does not tell it; give it here", param_hint=missing
+            )
+        messages.print(f"{file.name} gives {profile.lumens:.4g} lm into {own_folder()}")
+    colour = given.colour or typer.prompt("Colour (red, green, blue, white or R,G,B)", err=True)
+    colour_name, rgb = library.parse_colour(str(colour))
+    flux = given.flux
+    if flux is None:
+        flux = typer.prompt("Radiant flux in mW", type=float, err=True, value_proc=_asked_flux)
+    return library.add_ies(
+        file,
+        library.TypicalLight(
+            colour=rgb, flux=flux, wavelength=given.wavelength, current=given.current
+        ),
+        library.Source(
+            status=given.status,
+            source=given.source or "given when the light was added",
+            date=date.today().isoformat(),
+        ),
+        colour_name=colour_name,
+        name=name,
+        description=description,
+        window=given.window,
+        package=given.package,
+    )
+
+
+def _asked_flux(text: str) -> float:
+    try:
+        return above_0(float(text))
+    except ValueError:
+        raise typer.BadParameter(f"'{text}' is not a number above 0") from None
+
+
+def _from_tuning(
+    what: Path, tuning: Path, given: TuningOptions, name: str | None, description: str | None
+) -> Added:
+    """Store a camera from libcamera's tuning file.
+
+    Args:
+        what: argument of the command: the word camera.
+        tuning: tuning file.
+        given: data that the file lacks.
+        name: name for designs; the file's name if None.
+        description: description in one line.
+
+    Raises:
+        LibraryError: the file is no tuning file, there is no such camera, or the name is taken.
+        OutputError: the user's folder can't be written.
+        typer.BadParameter: an option is missing.
+    """
+    from optisense import library
+    from optisense.library.tuning import DAYLIGHT
+
+    if str(what) not in ("camera", "cameras"):
+        raise typer.BadParameter(
+            f"a tuning file is of a camera: optisense library add camera --tuning {tuning}",
+            param_hint="FILE",
+        )
+    if given.like is None:
+        raise typer.BadParameter(
+            "a tuning file does not tell the field of view; name a camera of the library that has "
+            "the same, such as --like pi-v2",
+            param_hint="--like",
+        )
+    return library.add_tuning(
+        tuning,
+        like=given.like,
+        name=name,
+        description=description,
+        temperature=given.temperature or DAYLIGHT,
+    )
+
+
+def _say_added(added: Added) -> None:
+    output.print(f"{added.kind} {added.name}: {added.file}", markup=False)
+    unsourced = added.entry.unsourced()
+    if unsourced:
+        output.print(
+            f"no source is given for: {', '.join(unsourced)}", markup=False, style="yellow"
+        )
+    output.print(f"Look at it:  optisense library show {added.name}", markup=False, style="dim")
