@@ -10,6 +10,7 @@ assumed.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -26,7 +27,14 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.digit_sources import provenance
-from optisense.sensors.dimensions import Positive, checks_dimensions, describe_changes, require
+from optisense.sensors.dimensions import (
+    Dimensions,
+    Length,
+    Positive,
+    WholeNumber,
+    builds,
+    require,
+)
 from optisense.sensors.half_round import FloatArray, HalfRound, stacked
 from optisense.sensors.led_flux import balanced_flux
 
@@ -71,30 +79,10 @@ SIDES = {
 """Faces of the acrylic's edge, and the direction in which each points."""
 
 
-@checks_dimensions(NAME)
-def digit(
-    *,
-    gel_width: Positive = 18.4,
-    straight_length: Positive = 15.85,
-    gel_thickness: Positive = 4.07,
-    wall_height: Positive = 1.35,
-    dome_rise: Positive = 1.94,
-    edge_inset: Positive = 0.6,
-    window_thickness: Positive = 6.15,
-    edge_roughness: float = 0.6,
-    led_height: float = 4.6,
-    led_pitch: Positive = 34.0,
-    led_gap: Positive = 0.2,
-    led_flux: float | None = None,
-    pupil_distance: Positive = 21.7,
-    fov: float = 46.83,
-    resolution: tuple[int, int] = (240, 320),
-    coating: str = "diffuse-grey",
-    tessellation: Positive = 0.6,
-) -> SensorDesign:
-    """Build a DIGIT.
+class DigitDimensions(Dimensions):
+    """Dimensions of a DIGIT.
 
-    Args:
+    Attributes:
         gel_width: width of the gel, mm; the half-round end has half of it as its radius, and the
             acrylic is 0.1 mm narrower.
         straight_length: distance from the straight end to the centre of the half round, mm.
@@ -115,35 +103,63 @@ def digit(
         resolution: width and height of the picture, pixels.
         coating: name of a coating of the library.
         tessellation: approximate edge length of the largest triangles, mm.
+    """
+
+    sensor: ClassVar[str] = NAME
+
+    gel_width: Positive = 18.4
+    straight_length: Positive = 15.85
+    gel_thickness: Positive = 4.07
+    wall_height: Positive = 1.35
+    dome_rise: Positive = 1.94
+    edge_inset: Positive = 0.6
+    window_thickness: Positive = 6.15
+    edge_roughness: Length = 0.6
+    led_height: Length = 4.6
+    led_pitch: Positive = 34.0
+    led_gap: Positive = 0.2
+    led_flux: Length | None = None
+    pupil_distance: Positive = 21.7
+    fov: Length = 46.83
+    resolution: tuple[WholeNumber, WholeNumber] = (240, 320)
+    coating: str = "diffuse-grey"
+    tessellation: Positive = 0.6
+
+
+@builds(DigitDimensions)
+def digit(size: DigitDimensions) -> SensorDesign:
+    """Build a DIGIT.
+
+    Args:
+        size: the dimensions.
 
     Raises:
         DesignError: dimensions contradict one another; the message says which.
         LibraryError: there is no such coating.
     """
-    given = dict(locals())
-    centre = 0.5 * (straight_length - 0.5 * gel_width)
-    outline = HalfRound(gel_width, straight_length, CORNERS[0], centre)
-    edge = HalfRound(gel_width - 2.0 * HALF_OVERHANG, straight_length, CORNERS[1], centre)
-    _check(outline, gel_thickness, wall_height + dome_rise, edge_inset)
-    window_top = -gel_thickness
-    window_bottom = window_top - window_thickness
-    _check_lights(edge, window_thickness, led_height, led_pitch, edge_roughness)
+    centre = 0.5 * (size.straight_length - 0.5 * size.gel_width)
+    outline = HalfRound(size.gel_width, size.straight_length, CORNERS[0], centre)
+    edge = HalfRound(size.gel_width - 2.0 * HALF_OVERHANG, size.straight_length, CORNERS[1], centre)
+    _check(outline, size.gel_thickness, size.wall_height + size.dome_rise, size.edge_inset)
+    window_top = -size.gel_thickness
+    window_bottom = window_top - size.window_thickness
+    _check_lights(edge, size.window_thickness, size.led_height, size.led_pitch, size.edge_roughness)
     require(
-        pupil_distance > gel_thickness + window_thickness,
+        size.pupil_distance > size.gel_thickness + size.window_thickness,
         NAME,
-        f"the camera's pupil, {pupil_distance:g} mm under the top of the gel, is inside the "
+        f"the camera's pupil, {size.pupil_distance:g} mm under the top of the gel, is inside the "
         f"acrylic, which ends {-window_bottom:g} mm under it",
         "Make pupil_distance larger, or window_thickness or gel_thickness smaller",
     )
-    flux = balanced_flux(LED) if led_flux is None else led_flux
-    lamp_z = window_bottom + led_height
+    flux = balanced_flux(LED) if size.led_flux is None else size.led_flux
+    lamp_z = window_bottom + size.led_height
     # The camera looks along +z with +y up, so the right of the picture is -x.
-    places = {"red": led_pitch, "green": -led_pitch, "blue": 0.0}
+    places = {"red": size.led_pitch, "green": -size.led_pitch, "blue": 0.0}
     colours = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
     design = SensorDesign(
         name=NAME,
         description="DIGIT, domed gel",
-        coating=library.coating(coating),
+        coating=library.coating(size.coating),
         materials={name: library.material(name) for name in (GEL, WINDOW, HOUSING)},
         parts={
             "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
@@ -152,34 +168,42 @@ def digit(
                 role=Role.SUPPORT,
                 mesh="meshes/acrylic.obj",
                 material=WINDOW,
-                faces=_frosted(edge_roughness),
+                faces=_frosted(size.edge_roughness),
             ),
             "housing": Part(role=Role.BLOCKER, mesh="meshes/housing.obj", material=HOUSING),
         },
         lights={
-            name: _led(edge, places[name], led_gap, lamp_z, colours[name], flux) for name in places
+            name: _led(edge, places[name], size.led_gap, lamp_z, colours[name], flux)
+            for name in places
         },
         camera=Camera(
             model=CAMERA,
-            fov=fov,
-            resolution=resolution,
-            position=(0.0, 0.0, -pupil_distance),
+            fov=size.fov,
+            resolution=size.resolution,
+            position=(0.0, 0.0, -size.pupil_distance),
             direction=(0.0, 0.0, 1.0),
             up=(0.0, 1.0, 0.0),
         ),
-        provenance=provenance(SIDES if edge_roughness else ()),
+        provenance=provenance(SIDES if size.edge_roughness else ()),
     )
-    gel = _gel(outline, (gel_thickness, wall_height, dome_rise, edge_inset), tessellation)
+    gel = _gel(
+        outline,
+        (size.gel_thickness, size.wall_height, size.dome_rise, size.edge_inset),
+        size.tessellation,
+    )
     design.meshes.update(
         skin=_coated(gel),
         gel=gel,
-        acrylic=_prism(edge, window_bottom, window_top, tessellation),
+        acrylic=_prism(edge, window_bottom, window_top, size.tessellation),
         housing=_housing(
-            outline, edge, (window_top, window_top + wall_height, -pupil_distance), tessellation
+            outline,
+            edge,
+            (window_top, window_top + size.wall_height, -size.pupil_distance),
+            size.tessellation,
         ),
     )
     design.cages = {"skin": Cage.around(["skin", "gel"], gel.bounds)}
-    describe_changes(design, digit, given)
+    size.describe(design)
     return design
 
 

@@ -7,65 +7,131 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from numbers import Integral, Real
-from typing import Any, ParamSpec
+from typing import Annotated, Any, ClassVar, TypeVar
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ConfigDict, PlainValidator, ValidationError
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError
+from optisense.near import suggestion
 
-Arguments = ParamSpec("Arguments")
 
-Positive = float
-"""Dimension above 0; `checks_dimensions` makes builders refuse others."""
+def _is(kind: type, what: str, low: float = -math.inf) -> PlainValidator:
+    """Return a validator that refuses values of another type and those not above `low`."""
 
-PositiveCount = int
+    def check(value: Any) -> Any:
+        if not isinstance(value, kind):
+            raise ValueError(what)
+        if low > -math.inf and not low < float(value) < math.inf:  # type: ignore[arg-type]
+            raise ValueError(f"{what} above {low:g}")
+        return value
+
+    return PlainValidator(check)
+
+
+Length = Annotated[float, _is(Real, "number")]
+"""Number of any sign: a length, an angle or a ratio."""
+
+Positive = Annotated[float, _is(Real, "number", 0.0)]
+"""Number above 0."""
+
+WholeNumber = Annotated[int, _is(Integral, "whole number")]
+
+PositiveCount = Annotated[int, _is(Integral, "whole number", 0.0)]
 """Number of objects, 1 or more."""
 
 
-def checks_dimensions(
-    sensor: str,
-) -> Callable[[Callable[Arguments, SensorDesign]], Callable[Arguments, SensorDesign]]:
-    """Return a decorator by which a builder refuses arguments of a wrong type or not above 0, and
-    values that no design can have.
+class Dimensions(BaseModel):
+    """Dimensions of a sensor, with defaults; each sensor has a subclass.
 
-    Args:
+    Attributes:
         sensor: name of the sensor, for messages.
     """
 
-    def decorate(builder: Callable[Arguments, SensorDesign]) -> Callable[Arguments, SensorDesign]:
-        signature = inspect.signature(builder)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
-        @functools.wraps(builder)
-        def build(*args: Arguments.args, **kwargs: Arguments.kwargs) -> SensorDesign:
-            for name, value in signature.bind(*args, **kwargs).arguments.items():
-                kind = str(signature.parameters[name].annotation)
-                if value is not None or not kind.endswith(" | None"):
-                    _check(sensor, name, value, kind.removesuffix(" | None"))
+    sensor: ClassVar[str]
+
+    def describe(self, design: SensorDesign, said: tuple[str, ...] = ()) -> None:
+        """Add to a design's description which dimensions differ from their defaults.
+
+        Args:
+            design: design that was built.
+            said: names of dimensions that the description mentions already.
+        """
+        defaults = {name: field.default for name, field in type(self).model_fields.items()}
+        given = {name: getattr(self, name) for name in self.model_fields_set}
+        describe_changes(design, given, defaults, said)
+
+
+D = TypeVar("D", bound=Dimensions)
+
+
+def builds(kind: type[D]) -> Callable[[Callable[[D], SensorDesign]], Callable[..., SensorDesign]]:
+    """Return a decorator by which a function of dimensions takes each as an argument by its name.
+
+    The function raises a `DesignError` for an unknown argument, for one of a wrong type or out of
+    its bounds, and for values that no design can have.
+
+    Args:
+        kind: class of the dimensions; its attributes are added to the function's documentation.
+    """
+
+    def decorate(function: Callable[[D], SensorDesign]) -> Callable[..., SensorDesign]:
+        @functools.wraps(function)
+        def build(**given: Any) -> SensorDesign:
             try:
-                return builder(*args, **kwargs)
+                size = kind(**given)
             except ValidationError as error:
-                raise _dimension_error(error, sensor) from None
+                raise _argument_error(error, kind, given) from None
+            try:
+                return function(size)
+            except ValidationError as error:
+                raise _dimension_error(error, kind.sensor) from None
 
+        types = {k: v for each in kind.__mro__ for k, v in inspect.get_annotations(each).items()}
+        by_name = inspect.Parameter.KEYWORD_ONLY
+        parameters = [
+            inspect.Parameter(name, by_name, default=field.default, annotation=types[name])
+            for name, field in kind.model_fields.items()
+        ]
+        build.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            parameters, return_annotation="SensorDesign"
+        )
+        attributes = [
+            inspect.cleandoc(each.__doc__ or "").partition("Attributes:\n")[2]
+            for each in kind.__mro__
+            if issubclass(each, Dimensions) and each is not Dimensions
+        ]
+        before, args, after = inspect.cleandoc(function.__doc__ or "").partition("Args:\n")
+        after = after.partition("\n\n")[2]
+        named = "\n".join(text.rstrip() for text in attributes)
+        build.__doc__ = f"{before}{args}{named}\n\n{after}" if args else before
         return build
 
     return decorate
 
 
-def _check(sensor: str, name: str, value: Any, kind: str) -> None:
-    """Refuse a value that is no number, or not above 0, if the annotation of its argument requires
-    it.
-    """
-    whole = kind in ("int", "PositiveCount")
-    if (whole or kind in ("float", "Positive")) and not isinstance(
-        value, Integral if whole else Real
-    ):
-        what = "whole number" if whole else "number"
-        raise DesignError(f"{name} is {value!r}", where=sensor, hint=f"Give a {what}")
-    if "Positive" in kind:
-        for each in value if isinstance(value, tuple | list) else (value,):
-            if not (isinstance(each, Real) and 0.0 < float(each) < math.inf):
-                raise DesignError(f"{name} is {value}", where=sensor, hint=f"Give a {name} above 0")
+def _argument_error(
+    error: ValidationError, kind: type[Dimensions], given: Mapping[str, Any]
+) -> DesignError:
+    """Return the error for an argument that a builder refuses."""
+    report = error.errors(include_url=False)[0]
+    name = str(report["loc"][0])
+    if name not in kind.model_fields:
+        hint = suggestion(name, kind.model_fields, limit=len(kind.model_fields))
+        return DesignError(f"there is no dimension '{name}'", where=kind.sensor, hint=hint)
+    what = str(report.get("ctx", {}).get("error", ""))
+    value = given[name]
+    shown = value if isinstance(value, Real) else repr(value)
+    if what.endswith("above 0"):
+        return DesignError(f"{name} is {value}", where=kind.sensor, hint=f"Give a {name} above 0")
+    if what:
+        return DesignError(f"{name} is {shown}", where=kind.sensor, hint=f"Give a {what}")
+    message = report["msg"].replace("Input should", "it should")
+    return DesignError(
+        f"{name} is {shown}: {message}", where=kind.sensor, hint="Change that argument"
+    )
 
 
 def _dimension_error(error: ValidationError, sensor: str) -> DesignError:
@@ -91,28 +157,24 @@ def require(condition: bool, sensor: str, message: str, hint: str) -> None:
 
 def describe_changes(
     design: SensorDesign,
-    builder: Callable[..., SensorDesign],
     given: Mapping[str, Any],
+    defaults: Mapping[str, Any],
     said: tuple[str, ...] = (),
-    own_defaults: Mapping[str, Any] | None = None,
 ) -> None:
-    """Add to a design's description which arguments differ from the builder's defaults.
+    """Add to a design's description which dimensions differ from their defaults.
 
     The provenance describes the defaults, so a reader sees for which numbers it does not hold.
 
     Args:
         design: design that was built.
-        builder: function that built it.
-        given: its arguments, by name.
-        said: names of arguments that the description mentions already.
-        own_defaults: defaults that replace the builder's.
+        given: dimensions by name; those without a default are left out.
+        defaults: default dimensions by name.
+        said: names of dimensions that the description mentions already.
     """
-    defaults = {name: p.default for name, p in inspect.signature(builder).parameters.items()}
-    defaults |= own_defaults or {}
     changed = [
-        f"{name} {value:g}" if isinstance(value, float) else f"{name} {value}"
-        for name, value in given.items()
-        if name in defaults and name not in said and value != defaults[name]
+        f"{name} {given[name]:g}" if isinstance(given[name], float) else f"{name} {given[name]}"
+        for name in defaults
+        if name in given and name not in said and given[name] != defaults[name]
     ]
     if changed:
         design.description += f"; chosen: {', '.join(changed)}"

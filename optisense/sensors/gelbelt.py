@@ -11,6 +11,7 @@ enters the side of the acrylic from entering the belt, by total reflection.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,10 +36,12 @@ from optisense.sensors.belt_path import (
     way_back,
 )
 from optisense.sensors.dimensions import (
+    Dimensions,
+    Length,
     Positive,
     PositiveCount,
-    checks_dimensions,
-    describe_changes,
+    WholeNumber,
+    builds,
 )
 from optisense.sensors.gelbelt_checks import (
     LED_LENGTH,
@@ -84,37 +87,10 @@ WRAP = 90.0
 """Angle by which the belt is turned at the end of the modelled part, degrees."""
 
 
-@checks_dimensions(SENSOR)
-def gelbelt(
-    *,
-    light_design: int = 3,
-    window_size: tuple[Positive, Positive] = (50.0, 36.0),
-    window_thickness: Positive = 6.0,
-    gel_thickness: Positive = 3.0,
-    tape_thickness: Positive = 0.05,
-    film_thickness: float = 0.02,
-    coat_thickness: Positive = 0.1,
-    wheel_radius: Positive = 25.0,
-    wheel_distance: Positive = 90.0,
-    roller_radius: Positive = 1.0,
-    deflection: float = 35.0,
-    incline: Positive = 25.0,
-    pupil_distance: Positive = 42.0,
-    fov: float = 62.2,
-    resolution: tuple[int, int] = (320, 240),
-    leds_per_group: PositiveCount = 8,
-    led_pitch: Positive = 4.0,
-    led_gap: Positive = 0.2,
-    led_flux: tuple[float, float, float] | None = None,
-    green_distance: Positive = 2.5,
-    green_angle: float = 45.0,
-    reflectance: float = 0.7,
-    specularity: float = 0.2,
-    tessellation: Positive = 2.0,
-) -> SensorDesign:
-    """Build a GelBelt.
+class GelBeltDimensions(Dimensions):
+    """Dimensions of a GelBelt.
 
-    Args:
+    Attributes:
         light_design: arrangement of the LEDs, as in the OptiSense paper. 1: on the sides of the
             acrylic. 2: red and blue on the sides of the belt; green next to the acrylic, at an
             angle through the inner face of the belt. 3: as 2, but on the green LEDs' side of the
@@ -146,61 +122,103 @@ def gelbelt(
         reflectance: reflectance of the coating's diffuse part, 0 to 1.
         specularity: specularity of the coating, 0 to 1.
         tessellation: approximate edge length of the triangles, mm.
+    """
+
+    sensor: ClassVar[str] = SENSOR
+
+    light_design: WholeNumber = 3
+    window_size: tuple[Positive, Positive] = (50.0, 36.0)
+    window_thickness: Positive = 6.0
+    gel_thickness: Positive = 3.0
+    tape_thickness: Positive = 0.05
+    film_thickness: Length = 0.02
+    coat_thickness: Positive = 0.1
+    wheel_radius: Positive = 25.0
+    wheel_distance: Positive = 90.0
+    roller_radius: Positive = 1.0
+    deflection: Length = 35.0
+    incline: Positive = 25.0
+    pupil_distance: Positive = 42.0
+    fov: Length = 62.2
+    resolution: tuple[WholeNumber, WholeNumber] = (320, 240)
+    leds_per_group: PositiveCount = 8
+    led_pitch: Positive = 4.0
+    led_gap: Positive = 0.2
+    led_flux: tuple[Length, Length, Length] | None = None
+    green_distance: Positive = 2.5
+    green_angle: Length = 45.0
+    reflectance: Length = 0.7
+    specularity: Length = 0.2
+    tessellation: Positive = 2.0
+
+
+@builds(GelBeltDimensions)
+def gelbelt(size: GelBeltDimensions) -> SensorDesign:
+    """Build a GelBelt.
+
+    Args:
+        size: the dimensions.
 
     Raises:
         DesignError: dimensions contradict one another; the message says which.
     """
-    given = dict(locals())
+    led_flux = size.led_flux
     if led_flux is None:
         most = nominal_flux(LED, "green")
         led_flux = round(most / GREEN_LEAD, 3), most, round(most / GREEN_LEAD, 3)
     check_numbers(
-        light_design,
-        film_thickness,
-        fov,
-        deflection,
-        green_angle,
-        (reflectance, specularity),
+        size.light_design,
+        size.film_thickness,
+        size.fov,
+        size.deflection,
+        size.green_angle,
+        (size.reflectance, size.specularity),
         led_flux,
     )
-    level = -gel_thickness - tape_thickness
-    window_top = level - film_thickness
-    window_bottom = window_top - window_thickness
-    half = 0.5 * window_size[0], 0.5 * window_size[1]
-    check_camera(pupil_distance, -window_bottom, 2.0 * wheel_radius - level)
+    level = -size.gel_thickness - size.tape_thickness
+    window_top = level - size.film_thickness
+    window_bottom = window_top - size.window_thickness
+    half = 0.5 * size.window_size[0], 0.5 * size.window_size[1]
+    check_camera(size.pupil_distance, -window_bottom, 2.0 * size.wheel_radius - level)
     check_leds(
-        (leds_per_group - 1) * led_pitch + LED_LENGTH,
-        window_size,
-        window_thickness if light_design == 1 else gel_thickness,
+        (size.leds_per_group - 1) * size.led_pitch + LED_LENGTH,
+        size.window_size,
+        size.window_thickness if size.light_design == 1 else size.gel_thickness,
     )
-    plain = trace([Straight(0.5 * wheel_distance), Bend(wheel_radius, WRAP)], level, tessellation)
+    plain = trace(
+        [Straight(0.5 * size.wheel_distance), Bend(size.wheel_radius, WRAP)],
+        level,
+        size.tessellation,
+    )
     bent = trace(
         [
-            Straight(half[0] + ROLLER_CLEARANCE + roller_radius),
-            Bend(roller_radius, deflection),
-            Straight(incline),
-            Bend(wheel_radius, WRAP - deflection),
+            Straight(half[0] + ROLLER_CLEARANCE + size.roller_radius),
+            Bend(size.roller_radius, size.deflection),
+            Straight(size.incline),
+            Bend(size.wheel_radius, WRAP - size.deflection),
         ],
         level,
-        tessellation,
+        size.tessellation,
     )
-    left = bent if light_design == 3 else plain
+    left = bent if size.light_design == 3 else plain
     for half_belt in (left, plain):
-        check_wheels(half_belt, (half[0], window_bottom), pupil_distance, fov)
+        check_wheels(half_belt, (half[0], window_bottom), size.pupil_distance, size.fov)
 
-    middle = 0.5 * (window_top + window_bottom) if light_design == 1 else -0.5 * gel_thickness
+    middle = (
+        0.5 * (window_top + window_bottom) if size.light_design == 1 else -0.5 * size.gel_thickness
+    )
     # Like the belt's halves, the green row is computed on the right and then mirrored.
-    green, shine = np.array([half[0] + led_gap, middle]), np.array([-1.0, 0.0])
-    if light_design == 2:
+    green, shine = np.array([half[0] + size.led_gap, middle]), np.array([-1.0, 0.0])
+    if size.light_design == 2:
         target = np.array([half[0] + BESIDE_WINDOW, level])
-        green, shine = _aimed(target, green_angle, green_distance)
-    elif light_design == 3:
+        green, shine = _aimed(target, size.green_angle, size.green_distance)
+    elif size.light_design == 3:
         start, end = bent.points[bent.starts[2]], bent.points[bent.starts[3]]
-        target = start + BEHIND_ROLLER / incline * (end - start)
-        green, shine = _aimed(target, green_angle - deflection, green_distance)
+        target = start + BEHIND_ROLLER / size.incline * (end - start)
+        green, shine = _aimed(target, size.green_angle - size.deflection, size.green_distance)
     (x, z), (dx, dz) = green.tolist(), shine.tolist()
     check_green(left, (x, z))
-    row, side = (leds_per_group, led_pitch), half[1] + led_gap
+    row, side = (size.leds_per_group, size.led_pitch), half[1] + size.led_gap
     rows = {
         # The camera looks along +z with +y up, so the right of the picture is -x.
         "red": (RED, row_of_lights((0.0, side, middle), ALONG_X, *row, (0.0, -1.0, 0.0))),
@@ -208,11 +226,11 @@ def gelbelt(
         "blue": (BLUE, row_of_lights((0.0, -side, middle), ALONG_X, *row, (0.0, 1.0, 0.0))),
     }
     coating = library.coating("semi-specular").model_copy(
-        update={"reflectance": (reflectance,) * 3, "specularity": specularity}
+        update={"reflectance": (size.reflectance,) * 3, "specularity": size.specularity}
     )
     design = SensorDesign(
         name=SENSOR,
-        description=f"GelBelt, light design {light_design}",
+        description=f"GelBelt, light design {size.light_design}",
         coating=coating,
         materials={
             GEL: library.material(GEL),
@@ -232,7 +250,7 @@ def gelbelt(
                 role=Role.BLOCKER,
                 mesh="meshes/far-coat.obj",
                 material=BLACK,
-                thickness=coat_thickness,
+                thickness=size.coat_thickness,
             ),
         },
         lights={
@@ -241,28 +259,32 @@ def gelbelt(
         },
         camera=Camera(
             model="pi-v2",
-            fov=fov,
-            resolution=resolution,
-            position=(0.0, 0.0, -pupil_distance),
+            fov=size.fov,
+            resolution=size.resolution,
+            position=(0.0, 0.0, -size.pupil_distance),
             direction=(0.0, 0.0, 1.0),
             up=(0.0, 1.0, 0.0),
         ),
         provenance=gelbelt_sources(
-            light_design,
-            _left_out(left, plain, wheel_radius, (tape_thickness, gel_thickness), half[1]),
+            size.light_design,
+            _left_out(
+                left, plain, size.wheel_radius, (size.tape_thickness, size.gel_thickness), half[1]
+            ),
         ),
     )
     design.meshes.update(
-        _belt(left, plain, (tape_thickness, gel_thickness), half[1], tessellation),
+        _belt(left, plain, (size.tape_thickness, size.gel_thickness), half[1], size.tessellation),
         window=TriangleMesh.box((-half[0], -half[1], window_bottom), (*half, window_top)),
-        wheels=_wheels(left, plain, max(film_thickness, WHEEL_GAP), half[1], tessellation),
+        wheels=_wheels(
+            left, plain, max(size.film_thickness, WHEEL_GAP), half[1], size.tessellation
+        ),
     )
-    if film_thickness > 0.0:
+    if size.film_thickness > 0.0:
         design.meshes["film"] = TriangleMesh.box((-half[0], -half[1], window_top), (*half, level))
     else:
         del design.parts["film"], design.materials[FILM]
         del design.provenance["parts.film"], design.provenance[f"materials.{FILM}.ior"]
-    describe_changes(design, gelbelt, given, said=("light_design",))
+    size.describe(design, ("light_design",))
     return design
 
 

@@ -9,6 +9,7 @@ makes eight light groups. A ring of LEDs lights the wall from below.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
 
@@ -25,10 +26,12 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.dimensions import (
+    Dimensions,
+    Length,
     Positive,
     PositiveCount,
-    checks_dimensions,
-    describe_changes,
+    WholeNumber,
+    builds,
     require,
 )
 from optisense.sensors.led_boards import (
@@ -55,35 +58,10 @@ BOARD_CLEARANCE = 0.05
 """Distance between boards and the gel, and between the ring's LEDs and the boards, mm."""
 
 
-@checks_dimensions(SENSOR)
-def gelsight360(
-    *,
-    light_colours: str = "GRRGGRRG",
-    base_ring: str = "B",
-    tip_design: float = 5.0,
-    resin_design: float = 0.0,
-    radius: Positive = 14.0,
-    height: Positive = 34.0,
-    gel_thickness: Positive = 3.0,
-    shell_thickness: Positive = 2.5,
-    edge_radius: Positive = 7.0,
-    cone_height: Positive = 12.0,
-    flattest: Positive = 0.1,
-    board_bottom: float = 2.0,
-    board_height: Positive = 12.0,
-    board_thickness: Positive = 1.0,
-    base_thickness: Positive = 2.0,
-    leds_per_group: PositiveCount = 4,
-    base_leds: PositiveCount = 12,
-    led_flux: float | None = None,
-    fov: float = 128.0,
-    resolution: tuple[int, int] = (320, 240),
-    coating: str = "semi-specular",
-    tessellation: Positive = 1.0,
-) -> SensorDesign:
-    """Build a GelSight360.
+class GelSight360Dimensions(Dimensions):
+    """Dimensions of a GelSight360.
 
-    Args:
+    Attributes:
         light_colours: colours (R, G, B) of the eight light groups, anticlockwise as seen when
             looking at the tip. Group 1 is on the first board (on +x) and shines anticlockwise,
             group 2 faces it from the second board (on +y), group 3 is on that board's other face,
@@ -114,47 +92,83 @@ def gelsight360(
         resolution: width and height of the picture, pixels.
         coating: name of a coating of the library.
         tessellation: approximate edge length of the largest triangles, mm.
+    """
+
+    sensor: ClassVar[str] = SENSOR
+
+    light_colours: str = "GRRGGRRG"
+    base_ring: str = "B"
+    tip_design: Length = 5.0
+    resin_design: Length = 0.0
+    radius: Positive = 14.0
+    height: Positive = 34.0
+    gel_thickness: Positive = 3.0
+    shell_thickness: Positive = 2.5
+    edge_radius: Positive = 7.0
+    cone_height: Positive = 12.0
+    flattest: Positive = 0.1
+    board_bottom: Length = 2.0
+    board_height: Positive = 12.0
+    board_thickness: Positive = 1.0
+    base_thickness: Positive = 2.0
+    leds_per_group: PositiveCount = 4
+    base_leds: PositiveCount = 12
+    led_flux: Length | None = None
+    fov: Length = 128.0
+    resolution: tuple[WholeNumber, WholeNumber] = (320, 240)
+    coating: str = "semi-specular"
+    tessellation: Positive = 1.0
+
+
+@builds(GelSight360Dimensions)
+def gelsight360(size: GelSight360Dimensions) -> SensorDesign:
+    """Build a GelSight360.
+
+    Args:
+        size: the dimensions.
 
     Raises:
         DesignError: dimensions contradict one another, or the colours are not eight letters R, G,
             B; the message says which.
         LibraryError: there is no such coating.
     """
-    given = dict(locals())
-    _check_colours(light_colours, base_ring)
-    for name, number in (("tip_design", tip_design), ("resin_design", resin_design)):
+    _check_colours(size.light_colours, size.base_ring)
+    for name, number in (("tip_design", size.tip_design), ("resin_design", size.resin_design)):
         require(
             0.0 <= number <= DESIGNS, SENSOR, f"{name} is {number:g}", "Give a number from 0 to 10"
         )
-    _check_layers(radius, edge_radius, gel_thickness, shell_thickness)
-    shape = TipShape.of_family(tip_design / DESIGNS, radius, height, edge_radius, cone_height)
+    _check_layers(size.radius, size.edge_radius, size.gel_thickness, size.shell_thickness)
+    shape = TipShape.of_family(
+        size.tip_design / DESIGNS, size.radius, size.height, size.edge_radius, size.cone_height
+    )
     require(
         shape.shoulder > 0.0,
         SENSOR,
-        f"the tip is {height - shape.shoulder:g} mm high, the whole sensor only {height:g} mm",
+        f"the tip is {size.height - shape.shoulder:g} mm high, the whole sensor only "
+        f"{size.height:g} mm",
         "Make height larger, or cone_height or tip_design smaller",
     )
     boards = LedBoards(
-        radius=radius - gel_thickness - 0.5 * shell_thickness,
-        depth=shell_thickness,
-        bottom=board_bottom,
-        height=board_height,
-        thickness=board_thickness,
-        leds=leds_per_group,
+        radius=size.radius - size.gel_thickness - 0.5 * size.shell_thickness,
+        depth=size.shell_thickness,
+        bottom=size.board_bottom,
+        height=size.board_height,
+        thickness=size.board_thickness,
+        leds=size.leds_per_group,
     )
-    _check_boards(boards, shape, radius - gel_thickness, base_leds)
+    _check_boards(boards, shape, size.radius - size.gel_thickness, size.base_leds)
 
-    flux = balanced_flux(LED_MODEL) if led_flux is None else led_flux
-    lights = boards.light_groups(light_colours, flux)
-    if base_ring:
-        lights["base"] = ring(base_ring, boards.radius, base_leds, flux)
+    flux = balanced_flux(LED_MODEL) if size.led_flux is None else size.led_flux
+    lights = boards.light_groups(size.light_colours, flux)
+    if size.base_ring:
+        lights["base"] = ring(size.base_ring, boards.radius, size.base_leds, flux)
     epoxy = library.material("epoxy-rough")
     assert isinstance(epoxy, Dielectric)
     design = SensorDesign(
         name=SENSOR,
-        description=f"GelSight360, lights {light_colours}, tip design {tip_design:g}, "
-        f"resin design {resin_design:g}",
-        coating=library.coating(coating),
+        description=f"GelSight360, lights {size.light_colours}, tip design {size.tip_design:g}, "
+        f"resin design {size.resin_design:g}",
+        coating=library.coating(size.coating),
         materials={
             GEL: library.material(GEL),
             EPOXY: epoxy.model_copy(update={"roughness": 0.0}),
@@ -169,28 +183,28 @@ def gelsight360(
                 role=Role.BLOCKER,
                 mesh="meshes/base.obj",
                 material=BLACK,
-                thickness=base_thickness,
+                thickness=size.base_thickness,
             ),
         },
         lights=lights,
         camera=Camera(
             model="ov5647-fisheye-160",
             projection="equidistant",
-            fov=fov,
-            resolution=resolution,
+            fov=size.fov,
+            resolution=size.resolution,
             position=(0.0, 0.0, 0.0),
             direction=(0.0, 0.0, 1.0),
             up=(0.0, 1.0, 0.0),
         ),
-        provenance=_provenance(base_ring),
+        provenance=_provenance(size.base_ring),
     )
-    dome = 1.0 - (1.0 - flattest) * resin_design / DESIGNS
+    dome = 1.0 - (1.0 - size.flattest) * size.resin_design / DESIGNS
     design.meshes.update(
-        _solids(shape, (gel_thickness, shell_thickness), dome, tessellation),
+        _solids(shape, (size.gel_thickness, size.shell_thickness), dome, size.tessellation),
         boards=boards.mesh(),
     )
     said = ("light_colours", "tip_design", "resin_design")
-    describe_changes(design, gelsight360, given, said)
+    size.describe(design, said)
     return design
 
 

@@ -16,6 +16,7 @@ from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.design.yaml_reader import read_yaml
 from optisense.sensors.dimensions import describe_changes
 from optisense.sensors.gelsight_mini_ideal import (
+    GelSightMiniDimensions,
     gelsight_mini_ideal,
     gelsight_mini_ideal_cylindrical,
     gelsight_mini_ideal_spherical,
@@ -50,7 +51,9 @@ def unfitted_design(
     design.name = design.name.replace("-ideal", "")
     what, _, _ = design.description.partition(", ideal camera")
     design.description = f"{what}, light and camera of a real unit"
-    describe_changes(design, gelsight_mini_ideal, dimensions, own_defaults=own)
+    fields = GelSightMiniDimensions.model_fields
+    defaults = {name: field.default for name, field in fields.items()} | own
+    describe_changes(design, dimensions, defaults)
     assumed = Status.ASSUMED
     width, height = GUIDE_SIZE
     design.provenance["parts.guide"] = Provenance(

@@ -9,7 +9,7 @@ publishes neither the light guide, the LEDs nor the camera's position: these are
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import ClassVar
 
 import numpy as np
 
@@ -30,10 +30,12 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors.dimensions import (
+    Dimensions,
+    Length,
     Positive,
     PositiveCount,
-    checks_dimensions,
-    describe_changes,
+    WholeNumber,
+    builds,
     require,
 )
 from optisense.sensors.led_flux import BALANCED, balanced_flux
@@ -51,29 +53,10 @@ error.
 """
 
 
-@checks_dimensions(NAME)
-def gelsight_mini_ideal(
-    *,
-    gel_size: tuple[Positive, Positive] = (25.25, 20.75),
-    gel_thickness: Positive = 4.25,
-    tray_size: tuple[Positive, Positive] = (28.23, 23.73),
-    tray_thickness: Positive = 1.0,
-    guide_thickness: Positive = 4.0,
-    guide_size: tuple[Positive, Positive] | None = None,
-    pupil_distance: Positive = 17.0,
-    view_width: float = 18.6,
-    fov: float | None = None,
-    resolution: tuple[int, int] = (320, 240),
-    leds_per_group: PositiveCount = 5,
-    led_pitch: Positive = 4.0,
-    led_gap: Positive = 0.2,
-    led_flux: float | None = None,
-    coating: str = "diffuse-grey",
-    tessellation: Positive = 0.5,
-) -> SensorDesign:
-    """Build a GelSight Mini with a flat gel, an ideal camera and lights of equal power.
+class GelSightMiniDimensions(Dimensions):
+    """Dimensions of a GelSight Mini with a flat gel, an ideal camera and lights of equal power.
 
-    Args:
+    Attributes:
         gel_size: size of the gel along x and y, mm.
         gel_thickness: thickness of the gel, mm.
         tray_size: size of the rigid plate on which the gel is cast, along x and y, mm.
@@ -90,34 +73,66 @@ def gelsight_mini_ideal(
         led_flux: radiant flux of each LED, mW; None takes that of its weakest colour (library).
         coating: name of a coating of the library.
         tessellation: edge length of the triangles on top of the gel, mm.
+    """
+
+    sensor: ClassVar[str] = NAME
+
+    gel_size: tuple[Positive, Positive] = (25.25, 20.75)
+    gel_thickness: Positive = 4.25
+    tray_size: tuple[Positive, Positive] = (28.23, 23.73)
+    tray_thickness: Positive = 1.0
+    guide_thickness: Positive = 4.0
+    guide_size: tuple[Positive, Positive] | None = None
+    pupil_distance: Positive = 17.0
+    view_width: Length = 18.6
+    fov: Length | None = None
+    resolution: tuple[WholeNumber, WholeNumber] = (320, 240)
+    leds_per_group: PositiveCount = 5
+    led_pitch: Positive = 4.0
+    led_gap: Positive = 0.2
+    led_flux: Length | None = None
+    coating: str = "diffuse-grey"
+    tessellation: Positive = 0.5
+
+
+@builds(GelSightMiniDimensions)
+def gelsight_mini_ideal(size: GelSightMiniDimensions) -> SensorDesign:
+    """Build a GelSight Mini with a flat gel, an ideal camera and lights of equal power.
+
+    Args:
+        size: the dimensions.
 
     Raises:
         DesignError: dimensions contradict one another; the message says which.
         LibraryError: there is no such coating.
     """
-    given = dict(locals())
-    _check(gel_size, tray_size, guide_thickness, pupil_distance, (leds_per_group, led_pitch))
-    tray_top = -gel_thickness
-    guide_top = tray_top - tray_thickness
-    guide_bottom = guide_top - guide_thickness
+    return _flat(size)
+
+
+def _flat(size: GelSightMiniDimensions) -> SensorDesign:
+    """Return the sensor with a flat gel."""
+    _check(size)
+    tray_top = -size.gel_thickness
+    guide_top = tray_top - size.tray_thickness
+    guide_bottom = guide_top - size.guide_thickness
     lamp_z = 0.5 * (guide_top + guide_bottom)
-    guide = gel_size if guide_size is None else guide_size
+    guide = size.gel_size if size.guide_size is None else size.guide_size
     half_x, half_y = 0.5 * guide[0], 0.5 * guide[1]
 
     support, gel_index = library.material(GUIDE), library.material(GEL)
     layers = [
-        (pupil_distance - guide_thickness, 1.0),
-        (guide_thickness + tray_thickness, _index(support)),
-        (gel_thickness, _index(gel_index)),
+        (size.pupil_distance - size.guide_thickness, 1.0),
+        (size.guide_thickness + size.tray_thickness, _index(support)),
+        (size.gel_thickness, _index(gel_index)),
     ]
-    flux = balanced_flux(LED) if led_flux is None else led_flux
-    leds = (leds_per_group, led_pitch, flux)
+    flux = balanced_flux(LED) if size.led_flux is None else size.led_flux
+    leds = (size.leds_per_group, size.led_pitch, flux)
 
-    gel = _gel(gel_size, gel_thickness, tessellation)
+    gel = _gel(size.gel_size, size.gel_thickness, size.tessellation)
     design = SensorDesign(
         name=NAME,
         description="GelSight Mini, flat gel, ideal camera",
-        coating=library.coating(coating),
+        coating=library.coating(size.coating),
         materials={GEL: library.material(GEL), GUIDE: library.material(GUIDE)},
         parts={
             "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
@@ -127,15 +142,15 @@ def gelsight_mini_ideal(
         },
         lights={
             # The camera looks along +z with +y up, so the right of the picture is -x.
-            "red": _row((1, 0, 0), (0, 1), half_y + led_gap, lamp_z, *leds),
-            "green": _row((0, 1, 0), (-1, 0), half_x + led_gap, lamp_z, *leds),
-            "blue": _row((0, 0, 1), (0, -1), half_y + led_gap, lamp_z, *leds),
+            "red": _row((1, 0, 0), (0, 1), half_y + size.led_gap, lamp_z, *leds),
+            "green": _row((0, 1, 0), (-1, 0), half_x + size.led_gap, lamp_z, *leds),
+            "blue": _row((0, 0, 1), (0, -1), half_y + size.led_gap, lamp_z, *leds),
         },
         camera=Camera(
             model="gelsight-mini",
-            fov=_field_of_view(view_width, layers) if fov is None else fov,
-            resolution=resolution,
-            position=(0.0, 0.0, guide_top - pupil_distance),
+            fov=_field_of_view(size.view_width, layers) if size.fov is None else size.fov,
+            resolution=size.resolution,
+            position=(0.0, 0.0, guide_top - size.pupil_distance),
             direction=(0.0, 0.0, 1.0),
             up=(0.0, 1.0, 0.0),
         ),
@@ -144,50 +159,68 @@ def gelsight_mini_ideal(
     design.meshes.update(
         skin=_top(gel),
         gel=gel,
-        tray=_plate(tray_size, guide_top, tray_top),
+        tray=_plate(size.tray_size, guide_top, tray_top),
         guide=_plate(guide, guide_bottom, guide_top),
     )
     design.cages = {"skin": Cage.around(["skin", "gel"], gel.bounds)}
-    describe_changes(design, gelsight_mini_ideal, given)
+    size.describe(design, ("rise",))
     return design
 
 
-@checks_dimensions(NAME)
-def gelsight_mini_ideal_cylindrical(rise: float = 6.0, **dimensions: Any) -> SensorDesign:
+class CylindricalDimensions(GelSightMiniDimensions):
+    """Dimensions of a GelSight Mini with a cylindrical gel.
+
+    Attributes:
+        rise: distance by which the three top control points at middle x are moved along +z, mm (the
+            OptiSense paper moves the middle row by 6 mm). The gel rises by half of it.
+    """
+
+    rise: Length = 6.0
+
+
+class SphericalDimensions(GelSightMiniDimensions):
+    """Dimensions of a GelSight Mini with a domed gel.
+
+    Attributes:
+        rise: distance by which the top centre control point is moved along +z, mm (the OptiSense
+            paper moves it by 9 mm). The gel rises by a quarter of it.
+    """
+
+    rise: Length = 9.0
+
+
+@builds(CylindricalDimensions)
+def gelsight_mini_ideal_cylindrical(size: CylindricalDimensions) -> SensorDesign:
     """Build an ideal GelSight Mini whose gel is bent to a cylinder along the short side (y).
 
     Args:
-        rise: distance by which the three top control points at middle x are moved along +z, mm (the
-            OptiSense paper moves the middle row by 6 mm). The gel rises by half of it.
-        dimensions: arguments of `gelsight_mini_ideal`.
+        size: the dimensions.
 
     Raises:
         DesignError: see `gelsight_mini_ideal`; or the rise presses the gel through its tray.
     """
-    return _bent("cylindrical", "cylinder", [(1, j, 2) for j in range(3)], (rise, 0.5), dimensions)
+    return _bent(size, "cylindrical", "cylinder", [(1, j, 2) for j in range(3)], (size.rise, 0.5))
 
 
-@checks_dimensions(NAME)
-def gelsight_mini_ideal_spherical(rise: float = 9.0, **dimensions: Any) -> SensorDesign:
+@builds(SphericalDimensions)
+def gelsight_mini_ideal_spherical(size: SphericalDimensions) -> SensorDesign:
     """Build an ideal GelSight Mini whose gel is bent to a dome.
 
     Args:
-        rise: distance by which the top centre control point is moved along +z, mm (the OptiSense
-            paper moves it by 9 mm). The gel rises by a quarter of it.
-        dimensions: arguments of `gelsight_mini_ideal`.
+        size: the dimensions.
 
     Raises:
         DesignError: see `gelsight_mini_ideal`; or the rise presses the gel through its tray.
     """
-    return _bent("spherical", "dome", [(1, 1, 2)], (rise, 0.25), dimensions)
+    return _bent(size, "spherical", "dome", [(1, 1, 2)], (size.rise, 0.25))
 
 
 def _bent(
+    size: GelSightMiniDimensions,
     variant: str,
     shape: str,
     moved: list[tuple[int, int, int]],
     rise: tuple[float, float],
-    dimensions: dict[str, Any],
 ) -> SensorDesign:
     """Return a flat sensor with some control points raised.
 
@@ -195,7 +228,7 @@ def _bent(
         rise: displacement of the control points, mm, and the share of it by which the gel rises in
             the middle.
     """
-    design = gelsight_mini_ideal(**dimensions)
+    design = _flat(size)
     height, share = rise
     cage = design.cages["skin"]
     thickness = float(-design.meshes["gel"].bounds[0, 2])
@@ -218,34 +251,28 @@ def _bent(
     return design
 
 
-def _check(
-    gel_size: tuple[float, float],
-    tray_size: tuple[float, float],
-    guide_thickness: float,
-    pupil_distance: float,
-    row: tuple[int, float],
-) -> None:
-    """Check lengths in mm; `row` is the number of LEDs and their pitch."""
+def _check(size: GelSightMiniDimensions) -> None:
+    """Refuse dimensions that contradict one another."""
     require(
-        gel_size[0] <= tray_size[0] and gel_size[1] <= tray_size[1],
+        size.gel_size[0] <= size.tray_size[0] and size.gel_size[1] <= size.tray_size[1],
         NAME,
-        f"the gel, {gel_size[0]:g} x {gel_size[1]:g} mm, is larger than its tray, "
-        f"{tray_size[0]:g} x {tray_size[1]:g} mm",
+        f"the gel, {size.gel_size[0]:g} x {size.gel_size[1]:g} mm, is larger than its tray, "
+        f"{size.tray_size[0]:g} x {size.tray_size[1]:g} mm",
         "Make gel_size smaller or tray_size larger",
     )
     require(
-        pupil_distance > guide_thickness,
+        size.pupil_distance > size.guide_thickness,
         NAME,
-        f"the camera's pupil, {pupil_distance:g} mm behind the tray, is inside the light guide, "
-        f"{guide_thickness:g} mm thick",
+        f"the camera's pupil, {size.pupil_distance:g} mm behind the tray, is inside the light "
+        f"guide, {size.guide_thickness:g} mm thick",
         "Make pupil_distance larger than guide_thickness",
     )
-    count, pitch = row
+    count, pitch = size.leds_per_group, size.led_pitch
     require(
-        (count - 1) * pitch <= min(gel_size),
+        (count - 1) * pitch <= min(size.gel_size),
         NAME,
         f"a row of {count} LEDs {pitch:g} mm apart is longer than the guide's shorter side, "
-        f"{min(gel_size):g} mm",
+        f"{min(size.gel_size):g} mm",
         "Use fewer leds_per_group or a smaller led_pitch",
     )
 

@@ -12,8 +12,10 @@ numbers are marked in the design.
 from __future__ import annotations
 
 import math
+from typing import ClassVar
 
 import numpy as np
+from pydantic import SkipValidation
 
 from optisense import library
 from optisense.design import (
@@ -30,9 +32,11 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points
 from optisense.sensors.dimensions import (
+    Dimensions,
+    Length,
     Positive,
-    checks_dimensions,
-    describe_changes,
+    WholeNumber,
+    builds,
     require,
 )
 from optisense.sensors.led_flux import balanced_flux
@@ -66,42 +70,10 @@ BACK_OUTLINE = (
 """Outline of the back as (x, z) in mm, from the bottom of the base to the tip."""
 
 
-@checks_dimensions("gelsight-svelte")
-def gelsight_svelte(
-    *,
-    palm_outline: Points = PALM_OUTLINE,
-    back_outline: Points = BACK_OUTLINE,
-    gel_thickness: Positive = 3.5,
-    gel_width: Positive = 20.0,
-    m1_ends: Points = ((5.8, 13.3), (10.4, 88.2)),
-    m1_sagitta: Positive = 5.5,
-    m1_width: Positive = 22.0,
-    m1_grid: tuple[int, int] = (168, 45),
-    mirror_thickness: Positive = 1.0,
-    wall_thickness: Positive = 1.0,
-    clearance: Positive = 0.5,
-    m2_bottom: tuple[float, float] = (16.7, -2.8),
-    m2_tilt: float = 22.4,
-    m2_length: Positive | None = None,
-    m2_width: Positive = 18.0,
-    view: str = "m2",
-    fov: Positive | None = None,
-    resolution: tuple[int, int] = (320, 240),
-    leds_per_side: int = 8,
-    led_pitch: Positive = 8.0,
-    led_gap: Positive = 0.2,
-    led_flux: float | None = None,
-    tip_leds: int = 0,
-    coating: str = "diffuse-grey",
-    tessellation: Positive = 0.5,
-) -> SensorDesign:
-    """Build a GelSight Svelte.
+class GelSightSvelteDimensions(Dimensions):
+    """Dimensions of a GelSight Svelte.
 
-    The mirror M1 is stored flat. Its cage of 27 points takes it from flat (`c_min`) to the largest
-    curvature that keeps `clearance` from the skin (`c_max`, found from the shapes), with its middle
-    at rest; `blend` is set so that it has the measured curvature, `m1_sagitta`.
-
-    Args:
+    Attributes:
         palm_outline: points (x, z) of the coated face of the skin, from base to tip, mm.
         back_outline: corners (x, z) of the body's back, from base to tip, mm.
         gel_thickness: thickness of the gel, mm.
@@ -131,46 +103,92 @@ def gelsight_svelte(
         tip_leds: number of blue LEDs behind the gel's end at the tip.
         coating: name of a coating of the library.
         tessellation: edge length of the triangles of the skin, mm.
+    """
+
+    sensor: ClassVar[str] = NAME
+
+    palm_outline: SkipValidation[Points] = PALM_OUTLINE
+    back_outline: SkipValidation[Points] = BACK_OUTLINE
+    gel_thickness: Positive = 3.5
+    gel_width: Positive = 20.0
+    m1_ends: SkipValidation[Points] = ((5.8, 13.3), (10.4, 88.2))
+    m1_sagitta: Positive = 5.5
+    m1_width: Positive = 22.0
+    m1_grid: tuple[WholeNumber, WholeNumber] = (168, 45)
+    mirror_thickness: Positive = 1.0
+    wall_thickness: Positive = 1.0
+    clearance: Positive = 0.5
+    m2_bottom: tuple[Length, Length] = (16.7, -2.8)
+    m2_tilt: Length = 22.4
+    m2_length: Positive | None = None
+    m2_width: Positive = 18.0
+    view: str = "m2"
+    fov: Positive | None = None
+    resolution: tuple[WholeNumber, WholeNumber] = (320, 240)
+    leds_per_side: WholeNumber = 8
+    led_pitch: Positive = 8.0
+    led_gap: Positive = 0.2
+    led_flux: Length | None = None
+    tip_leds: WholeNumber = 0
+    coating: str = "diffuse-grey"
+    tessellation: Positive = 0.5
+
+
+@builds(GelSightSvelteDimensions)
+def gelsight_svelte(size: GelSightSvelteDimensions) -> SensorDesign:
+    """Build a GelSight Svelte.
+
+    The mirror M1 is stored flat. Its cage of 27 points takes it from flat (`c_min`) to the largest
+    curvature that keeps `clearance` from the skin (`c_max`, found from the shapes), with its middle
+    at rest; `blend` is set so that it has the measured curvature, `m1_sagitta`.
+
+    Args:
+        size: the dimensions.
 
     Raises:
         DesignError: the dimensions contradict each other (a mirror through the skin, a gel thicker
             than the palm's bends, ...); the message says which one, and the remedy.
         LibraryError: there is no such coating.
     """
-    given = dict(locals())
-    led_flux = balanced_flux(LED) if led_flux is None else led_flux
+    led_flux = balanced_flux(LED) if size.led_flux is None else size.led_flux
     require(
-        min(m1_grid) >= 2 and leds_per_side >= 1 and tip_leds >= 0,
+        min(size.m1_grid) >= 2 and size.leds_per_side >= 1 and size.tip_leds >= 0,
         NAME,
-        f"m1_grid {m1_grid}, leds_per_side {leds_per_side} or tip_leds {tip_leds} is too small",
+        f"m1_grid {size.m1_grid}, leds_per_side {size.leds_per_side} or tip_leds {size.tip_leds} "
+        "is too small",
         "M1 needs 2 x 2 vertices or more, each side one LED or more",
     )
-    require(view in VIEWS, NAME, f"there is no view '{view}'", f"Give {' or '.join(VIEWS)}")
-    palm = Palm.through(palm_outline, tessellation)
-    inner = palm.offset(gel_thickness)
+    require(
+        size.view in VIEWS, NAME, f"there is no view '{size.view}'", f"Give {' or '.join(VIEWS)}"
+    )
+    palm = Palm.through(size.palm_outline, size.tessellation)
+    inner = palm.offset(size.gel_thickness)
     gel_outline = np.concatenate([palm.points, inner[::-1]])
-    m1 = CurvedMirror.from_arc(m1_ends[0], m1_ends[1], m1_sagitta)
-    most = m1.largest_sagitta(gel_outline, clearance)
-    if m1_sagitta > most:
+    m1 = CurvedMirror.from_arc(size.m1_ends[0], size.m1_ends[1], size.m1_sagitta)
+    most = m1.largest_sagitta(gel_outline, size.clearance)
+    if size.m1_sagitta > most:
         raise DesignError(
-            f"mirror M1 bent by {m1_sagitta:g} mm comes nearer than {clearance:g} mm to the skin",
+            f"mirror M1 bent by {size.m1_sagitta:g} mm comes nearer than "
+            f"{size.clearance:g} mm to the skin",
             where="m1_sagitta",
             hint=f"With these ends it can be {most:.2f} mm at most; lower it, move m1_ends away "
             "from the palm, or make gel_thickness smaller",
         )
-    m2 = FlatMirror.facing(m2_bottom, m2_tilt, m2_length, inner)
-    check_mirrors(m1, m1_sagitta, m2, gel_outline)
-    widths = (gel_width, max(m1_width, m2_width))
-    walls = housing(palm, back_outline, m1, most, m2, widths, led_gap, wall_thickness)
+    m2 = FlatMirror.facing(size.m2_bottom, size.m2_tilt, size.m2_length, inner)
+    check_mirrors(m1, size.m1_sagitta, m2, gel_outline)
+    widths = (size.gel_width, max(size.m1_width, size.m2_width))
+    walls = housing(
+        palm, size.back_outline, m1, most, m2, widths, size.led_gap, size.wall_thickness
+    )
     low, high = m2.seen_between()
-    if view == "palm":
-        low = m2.angle_of(m1.curve(m1_sagitta)[0])
-    rows = max(1, round(gel_width / tessellation))
+    if size.view == "palm":
+        low = m2.angle_of(m1.curve(size.m1_sagitta)[0])
+    rows = max(1, round(size.gel_width / size.tessellation))
 
     design = SensorDesign(
         name=NAME,
         description="GelSight Svelte: a finger seen over a flat and a curved mirror",
-        coating=library.coating(coating),
+        coating=library.coating(size.coating),
         materials={GEL: library.material(GEL), MIRROR: library.material(MIRROR)},
         parts={
             "skin": Part(role=Role.SENSING_SURFACE, mesh="meshes/skin.obj"),
@@ -179,43 +197,45 @@ def gelsight_svelte(
                 role=Role.MIRROR,
                 mesh="meshes/M1.obj",
                 material=MIRROR,
-                thickness=mirror_thickness,
+                thickness=size.mirror_thickness,
             ),
             "M2": Part(
                 role=Role.MIRROR,
                 mesh="meshes/M2.obj",
                 material=MIRROR,
-                thickness=mirror_thickness,
+                thickness=size.mirror_thickness,
             ),
-            "body": Part(role=Role.BLOCKER, mesh="meshes/body.obj", thickness=wall_thickness),
+            "body": Part(role=Role.BLOCKER, mesh="meshes/body.obj", thickness=size.wall_thickness),
             **{
-                name: Part(role=Role.BLOCKER, mesh=f"meshes/{name}.obj", thickness=wall_thickness)
+                name: Part(
+                    role=Role.BLOCKER, mesh=f"meshes/{name}.obj", thickness=size.wall_thickness
+                )
                 for name in ("side-walls", "led-covers")
             },
         },
-        lights=_lights(
-            palm, gel_thickness, gel_width, leds_per_side, led_pitch, led_gap, led_flux, tip_leds
-        ),
+        lights=_lights(palm, size, led_flux),
         camera=Camera(
             model="pi-v1",
-            fov=round(math.degrees(high - low), 3) if fov is None else fov,
-            resolution=resolution,
+            fov=round(math.degrees(high - low), 3) if size.fov is None else size.fov,
+            resolution=size.resolution,
             position=(0.0, 0.0, 0.0),
             direction=(math.cos(0.5 * (low + high)), 0.0, math.sin(0.5 * (low + high))),
             up=(0.0, 1.0, 0.0),
         ),
     )
     design.meshes.update(
-        skin=ribbon(palm.points, 0.5 * gel_width, rows),
-        gel=strip(palm.points, inner, 0.5 * gel_width, rows),
-        M1=ribbon(m1.curve(0.0, m1_grid[0]), 0.5 * m1_width, m1_grid[1] - 1).flipped(),
-        M2=ribbon(m2.ends()[::-1], 0.5 * m2_width, 1).flipped(),
+        skin=ribbon(palm.points, 0.5 * size.gel_width, rows),
+        gel=strip(palm.points, inner, 0.5 * size.gel_width, rows),
+        M1=ribbon(
+            m1.curve(0.0, size.m1_grid[0]), 0.5 * size.m1_width, size.m1_grid[1] - 1
+        ).flipped(),
+        M2=ribbon(m2.ends()[::-1], 0.5 * size.m2_width, 1).flipped(),
         **walls,
-        **{"led-covers": led_covers(palm, inner, widths, led_gap)},
+        **{"led-covers": led_covers(palm, inner, widths, size.led_gap)},
     )
-    design.cages = {"M1": _mirror_cage(design.meshes["M1"], m1, most, m1_sagitta / most)}
-    design.provenance = provenance(tip_leds > 0)
-    describe_changes(design, gelsight_svelte, given)
+    design.cages = {"M1": _mirror_cage(design.meshes["M1"], m1, most, size.m1_sagitta / most)}
+    design.provenance = provenance(size.tip_leds > 0)
+    size.describe(design)
     return design
 
 
@@ -241,19 +261,11 @@ def _mirror_cage(mesh: TriangleMesh, mirror: CurvedMirror, most: float, blend: f
     )
 
 
-def _lights(
-    palm: Palm,
-    thickness: float,
-    width: float,
-    count: int,
-    pitch: float,
-    gap: float,
-    flux: float,
-    tip_count: int,
-) -> dict[str, LightGroup]:
+def _lights(palm: Palm, size: GelSightSvelteDimensions, flux: float) -> dict[str, LightGroup]:
     """Return rows of lights along both sides of the gel, in the middle of its thickness, that shine
     across it.
     """
+    count, pitch, gap = size.leds_per_side, size.led_pitch, size.led_gap
     shares = 0.5 + (np.arange(count) - 0.5 * (count - 1)) * pitch / palm.length
     if shares[0] < 0.0:
         raise DesignError(
@@ -265,20 +277,20 @@ def _lights(
     for name, colour, side in (("red", (1.0, 0.0, 0.0), 1.0), ("green", (0.0, 1.0, 0.0), -1.0)):
         lights = []
         for share in shares:
-            point, along = palm.at(float(share), 0.5 * thickness)
-            place = (float(point[0]), side * (0.5 * width + gap), float(point[1]))
+            point, along = palm.at(float(share), 0.5 * size.gel_thickness)
+            place = (float(point[0]), side * (0.5 * size.gel_width + gap), float(point[1]))
             up = (float(along[0]), 0.0, float(along[1]))
             lights += row_of_lights(place, up, 1, pitch, (0.0, -side, 0.0))
         groups[name] = LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
-    if tip_count:
-        point, along = palm.at(1.0, 0.5 * thickness)
+    if size.tip_leds:
+        point, along = palm.at(1.0, 0.5 * size.gel_thickness)
         point = point + gap * along
         towards = (-float(along[0]), 0.0, -float(along[1]))
         row = row_of_lights(
             (float(point[0]), 0.0, float(point[1])),
             (0.0, 1.0, 0.0),
-            tip_count,
-            min(4.0, width / tip_count),
+            size.tip_leds,
+            min(4.0, size.gel_width / size.tip_leds),
             towards,
         )
         groups["blue"] = LightGroup(model=LED, colour=(0.0, 0.0, 1.0), flux=flux, lights=row)

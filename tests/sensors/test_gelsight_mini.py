@@ -108,7 +108,7 @@ def test_dimensions_can_be_chosen() -> None:
 
 
 def test_a_bent_sensor_takes_dimensions_too() -> None:
-    design = sensors.gelsight_mini_ideal_spherical(4.0, gel_thickness=3.0)
+    design = sensors.gelsight_mini_ideal_spherical(rise=4.0, gel_thickness=3.0)
     skin = design.deformed_meshes()["skin"].bounds
     assert skin[1, 2] == pytest.approx(1.0, abs=0.01)  # a quarter of the rise
     assert design.meshes["gel"].bounds[0, 2] == -3.0
@@ -138,7 +138,7 @@ def test_what_cannot_be_is_refused(change: dict[str, Any], message: str, hint: s
 
 def test_a_gel_is_not_pressed_through_its_tray() -> None:
     with pytest.raises(DesignError, match="through its tray") as caught:
-        sensors.gelsight_mini_ideal_cylindrical(-9.0)
+        sensors.gelsight_mini_ideal_cylindrical(rise=-9.0)
     assert "more than -8.5 mm" in str(caught.value.hint)
 
 
