@@ -6,7 +6,8 @@ by an entry point of its group, so that a user only has to install them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, Generic, TypeVar
@@ -38,6 +39,7 @@ class Registry(Generic[T]):
         error: type[OptiSenseError],
         built_in: Mapping[str, str],
         check: Callable[[str, Any], None] = lambda name, thing: None,
+        adapt: Callable[[str, Any], T] = lambda name, thing: thing,
     ) -> None:
         """Store the names of the built-in objects; each is loaded when it is first requested.
 
@@ -49,10 +51,13 @@ class Registry(Generic[T]):
                 name.
             check: function that is called with name and object, and raises `error` if the object
                 does not fit.
+            adapt: function that is called with name and object of an entry point, and returns the
+                object to register.
         """
         self.noun, self.group = noun, group
         self.built_in = tuple(built_in)
         self._error, self._homes, self._check = error, built_in, check
+        self._adapt = adapt
         self._registered: dict[str, T] = {}
 
     def register(self, name: str, thing: T) -> T:
@@ -64,14 +69,16 @@ class Registry(Generic[T]):
         """
         if name != name.strip().lower() or not name or set(name) & set(":,@/"):
             raise self._error(
-                f"'{name}' can't be the name of a {self.noun}",
+                f"'{name}' can't be the name of {with_article(self.noun)}",
                 hint="Use lower case, without spaces at the ends and without : , @ /",
             )
         self._check(name, thing)
         home, old = _home(thing), self._registered.get(name)
         if self._homes.get(name, home) != home or (old is not None and _home(old) != home):
             raise self._error(
-                f"there is already a {self.noun} '{name}'", where=home, hint="Give it another name"
+                f"there is already {with_article(self.noun)} '{name}'",
+                where=place_of_definition(thing),
+                hint="Give it another name",
             )
         self._registered[name] = thing
         return thing
@@ -88,7 +95,7 @@ class Registry(Generic[T]):
         if key in self._homes:
             module, _, attribute = self._homes[key].partition(":")
             found: T = getattr(import_module(module), attribute)
-            return found
+            return self._registered.get(key, found)  # the import may have registered it
         for point in entry_points(group=self.group):
             if point.name == key:
                 return self._loaded(point)
@@ -111,6 +118,25 @@ class Registry(Generic[T]):
         offered = {point.name for point in entry_points(group=self.group)}
         return [*self.built_in, *sorted((offered | set(self._registered)) - set(self.built_in))]
 
+    def registered(self) -> dict[str, T]:
+        """Return the objects that were registered so far, by name."""
+        return dict(self._registered)
+
+    @contextmanager
+    def forgetting(self) -> Iterator[None]:
+        """Restore the registry on exit to its state on entry, except for this package's objects.
+
+        This is for long-running processes that run users' files: a changed file can then register
+        its name again, from another place.
+        """
+        before = dict(self._registered)
+        try:
+            yield
+        finally:
+            for name in set(self._registered) - set(before) - set(self._homes):
+                del self._registered[name]
+            self._registered.update(before)
+
     def _loaded(self, point: EntryPoint) -> T:
         try:
             thing = point.load()
@@ -123,13 +149,30 @@ class Registry(Generic[T]):
             ) from error
         if point.name in self._registered:  # the import of its module has registered it
             return self._registered[point.name]
-        return self.register(point.name, thing)
+        return self.register(point.name, self._adapt(point.name, thing))
 
 
 def _home(thing: object) -> str:
-    """Return the place of definition of a function or class: "module:name"."""
+    """Return the place of definition of a function or class: "module:name"; that of an objective is
+    its function's.
+    """
+    thing = getattr(thing, "function", thing)
     name = getattr(thing, "__qualname__", type(thing).__qualname__)
     return f"{getattr(thing, '__module__', '')}:{name}"
+
+
+def place_of_definition(thing: object) -> str:
+    """Return the file and name of a function or class, for messages."""
+    function = getattr(thing, "function", thing)
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return _home(thing)
+    return f"{code.co_filename}: {getattr(function, '__qualname__', repr(function))}"
+
+
+def with_article(noun: str) -> str:
+    """Return a noun with "a" or "an"."""
+    return f"{'an' if noun[0] in 'aeio' else 'a'} {noun}"
 
 
 def must_be(kind: type, error: type[OptiSenseError], noun: str) -> Callable[[str, object], None]:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import inspect
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from importlib import import_module
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -19,13 +16,11 @@ from numpy.typing import NDArray
 from optisense.errors import ObjectiveError
 from optisense.near import suggestion
 from optisense.objectives.score import Drawing
+from optisense.registry import Registry, place_of_definition
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation, Reads
     from optisense.objectives.press import Press
-
-ENTRY_POINTS = "optisense.objectives"
-"""Entry-point group under which installed packages add objectives: name = "module:function"."""
 
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
@@ -44,15 +39,12 @@ FURTHER = (
     "clearance",
     "cage_roughness",
 )
-"""Objectives of this package in addition to the paper's."""
+"""Objectives of this package in addition to the paper's; each is a function of its name in a module
+of its name."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
 """Names under which the store of a study keeps the conditions of its trials and other watched
 scores, in addition to the parts of each objective; they are reserved and cannot name an
-objective."""
-
-_MODULES = ("rgb2normal", "normdiff", "aoap", "projection_warping", *FURTHER)
-"""Modules of this package that register objectives; a module in `FURTHER` has the name of its
 objective."""
 
 UNBOUNDED = (-math.inf, math.inf)
@@ -143,7 +135,51 @@ class Objective:
         return " ".join(text.split("\n\n")[0].split()).rstrip(".")
 
 
-_registry: dict[str, Objective] = {}
+def _check(name: str, given: Objective) -> None:
+    if name in (CONDITIONS, WATCHED) or any(sign in name for sign in "'\""):
+        raise ObjectiveError(
+            f"'{name}' can't be the name of an objective",
+            hint="Use lower case, without quotes, and not 'conditions' or 'watched'",
+        )
+    try:
+        parameters = list(inspect.signature(given.function).parameters.values())
+    except (TypeError, ValueError):
+        parameters = []
+    required = [each for each in parameters[1:] if each.default is each.empty]
+    if not parameters or any(
+        each.kind not in (each.VAR_KEYWORD, each.VAR_POSITIONAL) for each in required
+    ):
+        raise ObjectiveError(
+            f"the objective '{name}' must take an evaluation, and settings with defaults",
+            where=place_of_definition(given),
+            hint="Write: def score(evaluation): ...",
+        )
+
+
+def _from_package(name: str, loaded: Any) -> Objective:
+    if not callable(loaded):
+        raise ObjectiveError(f"the objective '{name}' is not a function")
+    return Objective(name, loaded, name)
+
+
+OBJECTIVES: Registry[Objective] = Registry(
+    "objective",
+    "optisense.objectives",
+    ObjectiveError,
+    {
+        "rgb2normal": "optisense.objectives.rgb2normal:rgb2normal",
+        "normdiff": "optisense.objectives.normdiff:normdiff",
+        "aoap": "optisense.objectives.aoap:aoap",
+        "2to3pw": "optisense.objectives.projection_warping:projection_warping",
+        **{name: f"optisense.objectives.{name}:{name}" for name in FURTHER},
+    },
+    _check,
+    _from_package,
+)
+"""Registry of the objectives: the paper's, further ones of this package, then others; packages add
+functions under the entry-point group `optisense.objectives`."""
+
+names, forgetting = OBJECTIVES.names, OBJECTIVES.forgetting
 
 
 def objective(
@@ -195,7 +231,7 @@ def objective(
             rays_only,
             usual,
         )
-        _register(given)
+        OBJECTIVES.register(name, given)
         return function
 
     return register
@@ -242,41 +278,7 @@ def find(name: str) -> Objective:
         return from_file(Path(file), function)
     if name.endswith(".py"):
         return from_file(Path(name))
-    _load_built_in()
-    key = name.strip().lower()
-    if key in _registry:
-        return _registry[key]
-    offered = {point.name: point for point in entry_points(group=ENTRY_POINTS)}
-    if key in offered:
-        return _from_entry_point(key, offered[key])
-    known = [*_registry, *offered]
-    raise ObjectiveError(f"there is no objective '{name}'", hint=suggestion(key, known))
-
-
-def names() -> list[str]:
-    """Return the names of all objectives: the paper's, further ones of this package, then
-    others.
-    """
-    _load_built_in()
-    offered = [point.name for point in entry_points(group=ENTRY_POINTS)]
-    own = (*BUILT_IN, *FURTHER)
-    return [*own, *sorted({*_registry, *offered} - set(own))]
-
-
-@contextmanager
-def forgetting() -> Iterator[None]:
-    """Restore the registry on exit to its state on entry.
-
-    This is for long-running processes that run users' files: a changed file can then register its
-    name again, from another place.
-    """
-    _load_built_in()
-    before = dict(_registry)
-    try:
-        yield
-    finally:
-        _registry.clear()
-        _registry.update(before)
+    return OBJECTIVES.find(name)
 
 
 def from_file(path: Path, function: str | None = None) -> Objective:
@@ -292,9 +294,10 @@ def from_file(path: Path, function: str | None = None) -> Objective:
     """
     from optisense.objectives.files import run_file
 
-    before = dict(_registry)
+    before = OBJECTIVES.registered()
     content = run_file(path)
-    added = [each for key, each in _registry.items() if before.get(key) is not each]
+    after = OBJECTIVES.registered()
+    added = [each for key, each in after.items() if before.get(key) is not each]
     if function is None:
         if len(added) != 1:
             found = ", ".join(each.function.__name__ for each in added) or "none"
@@ -316,71 +319,5 @@ def from_file(path: Path, function: str | None = None) -> Objective:
             where=str(path),
             hint=suggestion(function, known),
         )
-    return _register(Objective(function.lower(), chosen, function))
-
-
-def _from_entry_point(name: str, point: Any) -> Objective:
-    try:
-        loaded = point.load()
-    except Exception as error:
-        raise ObjectiveError(
-            f"the objective '{name}' can't be loaded: {type(error).__name__}: {error}",
-            where=f"{point.value}, of {point.dist.name if point.dist else 'an installed package'}",
-            hint="Repair or remove the package that brings it",
-        ) from error
-    if name in _registry:  # importing its decorated module has registered it
-        return _registry[name]
-    if not callable(loaded):
-        raise ObjectiveError(f"the objective '{name}' is not a function", where=point.value)
-    return _register(Objective(name, loaded, name))
-
-
-def _register(new: Objective) -> Objective:
-    if (
-        new.name != new.name.strip().lower()
-        or not new.name
-        or new.name in (CONDITIONS, WATCHED)
-        or any(sign in new.name for sign in ":'\"")
-    ):
-        raise ObjectiveError(
-            f"'{new.name}' can't be the name of an objective",
-            hint="Use lower case, without colons, quotes or spaces around it",
-        )
-    try:
-        parameters = list(inspect.signature(new.function).parameters.values())
-    except (TypeError, ValueError):
-        parameters = []
-    required = [each for each in parameters[1:] if each.default is each.empty]
-    if not parameters or any(
-        each.kind not in (each.VAR_KEYWORD, each.VAR_POSITIONAL) for each in required
-    ):
-        raise ObjectiveError(
-            f"the objective '{new.name}' must take an evaluation, and settings with defaults",
-            where=_home(new.function),
-            hint="Write: def score(evaluation): ...",
-        )
-    old = _registry.get(new.name)
-    # A function that is registered again by a cell or file that was run once more replaces itself.
-    if (old is not None and _home(old.function) != _home(new.function)) or (
-        old is None
-        and new.name in (*BUILT_IN, *FURTHER)
-        and not new.function.__module__.startswith(__package__)
-    ):
-        raise ObjectiveError(
-            f"there is already an objective '{new.name}'",
-            where=_home(new.function),
-            hint="Give it another name",
-        )
-    _registry[new.name] = new
-    return new
-
-
-def _home(function: Callable[..., Any]) -> str:
-    code = getattr(function, "__code__", None)
-    file = f"{code.co_filename}: " if code is not None else ""
-    return f"{file}{getattr(function, '__qualname__', repr(function))}"
-
-
-def _load_built_in() -> None:
-    for module in _MODULES:
-        import_module(f"optisense.objectives.{module}")
+    key = function.lower()
+    return OBJECTIVES.register(key, Objective(key, chosen, function))

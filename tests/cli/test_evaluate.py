@@ -158,13 +158,13 @@ def test_an_output_folder_that_is_a_file_is_an_error_before_the_work(tmp_path: P
 PRESSED = """
 import signal, sys
 from optisense.cli import app
-from optisense.objectives import registry
+from optisense import objective
 
 def pressed(evaluation):
     signal.raise_signal(signal.SIGINT)
     return 1.0
 
-registry._register(registry.Objective("pressed", pressed, "Pressed"))
+objective("pressed", title="Pressed")(pressed)
 app(["evaluate", "gelsight-mini-ideal", "-b", "aoap", "-b", "pressed", "-b", "2to3pw",
      "--resolution", "40x30", "--out", sys.argv[1]])
 """

@@ -78,7 +78,7 @@ class TestFromAFile(ObjectiveContract):
         path.write_text(OWN.format(name="contrast-of-file"))
         self.objective = str(path)
         yield
-        registry._registry.pop("contrast-of-file", None)
+        registry.OBJECTIVES._registered.pop("contrast-of-file", None)
 
 
 class TestFromAnInstalledPackage(ObjectiveContract):
@@ -95,7 +95,7 @@ class TestFromAnInstalledPackage(ObjectiveContract):
         )
         monkeypatch.syspath_prepend(str(tmp_path))
         yield
-        registry._registry.pop(self.objective, None)
+        registry.OBJECTIVES._registered.pop(self.objective, None)
         import sys
 
         sys.modules.pop("contrast_scores", None)
