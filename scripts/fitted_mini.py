@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import json
 import sys
+from datetime import date
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 
@@ -20,10 +22,15 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import optisense as ots
+from optisense import library
 from optisense.calibration import CalibrationSettings, calibrate, compare, read_photographs
 from optisense.calibration.families import chosen_families
 from optisense.design import SensorDesign, Status, get_value
-from optisense.sensors.gelsight_mini import FITTED_NUMBERS, unfitted_design
+from optisense.design.camera import ImagingModel
+from optisense.design.yaml_writer import to_yaml
+from optisense.library.entries import CameraModel, Source
+from optisense.library.own_parts import HEADS
+from optisense.sensors.gelsight_mini import FITTED_CAMERA, FITTED_NUMBERS, unfitted_design
 
 UNIT = "one GelSight Mini, calibration pictures of GelSLAM (commit e0ea7de, MIT)"
 """Whose photographs they are, for the source of each number."""
@@ -38,7 +45,10 @@ PICTURE = Path(__file__).parent.parent / "docs" / "images" / "gelsight-mini-fitt
 """Where the pictures are drawn."""
 
 FILE = Path(ots.__file__).parent / "sensors" / FITTED_NUMBERS
-"""Where the fitted numbers are written."""
+"""Where the fitted numbers are written, except those of the camera's processing."""
+
+CAMERA_FILE = Path(ots.__file__).parent / "library" / "cameras" / f"{FITTED_CAMERA}.yaml"
+"""Where those of the camera's processing are written."""
 
 
 def fitted_to(photographs: str) -> SensorDesign:
@@ -67,8 +77,10 @@ def plain(value: object) -> object:
     return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
-def write(design: SensorDesign, path: Path) -> None:
-    """Write the fitted numbers and their sources."""
+def write(design: SensorDesign) -> None:
+    """Write the fitted numbers and their sources: the camera's processing into the library, and the
+    others beside the sensor.
+    """
     lines = ["# Made by scripts/fitted_mini.py. Lengths in mm, angles in degrees, powers in mW."]
     fitted = {
         place: known.source
@@ -79,11 +91,26 @@ def write(design: SensorDesign, path: Path) -> None:
     for name, part in design.parts.items():
         if part.faces:  # the edges of several parts have one roughness
             fitted[f"parts.{name}.faces"] = of_edges
+    values: dict[str, Any] = {}
+    sources: dict[str, Source] = {}
     for place, text in fitted.items():
+        value = plain(get_value(design, place))
+        first, _, field = place.partition(".")
+        if first == "camera" and field in ImagingModel.model_fields:
+            values[field] = value
+            sources[field] = Source(
+                status=Status.CALIBRATED, source=f"{UNIT}, {text}", date=str(date.today().year)
+            )
+            continue
         source = json.dumps(f"{UNIT}, {text}", ensure_ascii=False)
-        value = json.dumps(plain(get_value(design, place)))
-        lines += [f"{place}:", f"  value: {value}", f"  source: {source}"]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        lines += [f"{place}:", f"  value: {json.dumps(value)}", f"  source: {source}"]
+    FILE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    known = library.entry("camera", FITTED_CAMERA)
+    view = known.value.model_dump(mode="json", exclude_none=True)
+    kept = {field: known.sources[field] for field in known.sources if field not in sources}
+    value = CameraModel.model_validate(view | values)
+    entry = known.model_copy(update={"value": value, "sources": kept | sources})
+    CAMERA_FILE.write_text(to_yaml(entry, HEADS["camera"]), encoding="utf-8")
 
 
 def show(photographs: str) -> None:
@@ -110,6 +137,6 @@ def show(photographs: str) -> None:
 if __name__ == "__main__":
     what, photographs, *done = sys.argv[1:]
     if what == "fit":
-        write(ots.load(done[0]) if done else fitted_to(photographs), FILE)
+        write(ots.load(done[0]) if done else fitted_to(photographs))
     else:
         show(photographs)

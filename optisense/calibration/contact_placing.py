@@ -30,9 +30,14 @@ FIT_WIDTH = 160
 the end, and enough for the smooth responses of balls.
 """
 
-PLACINGS = 2
-"""Number of renderings by which contacts are placed; a third one moves them by less than a tenth of
-a pixel.
+MOST_PLACINGS = 6
+"""Largest number of renderings by which a contact is placed. Two are enough for most contacts, but
+at the edge of the picture each one moves a contact by half as much as the one before.
+"""
+
+SETTLED = 0.25
+"""Change of a contact's position and radius, pixels of the fit, below which it is placed: the
+photographs' noise hides smaller ones.
 """
 
 WIDEST_CHANGE = 0.5
@@ -65,19 +70,31 @@ def placed(
         OptiSenseError: the model can't be rendered.
     """
     found = list(seen)
+    moving = list(range(len(found)))
     none: FloatArray = np.zeros(0)
-    for _ in range(PLACINGS):
-        layers = layered_pictures(model, photographs, found, photons, seed, kept=kept)
+    for _ in range(MOST_PLACINGS):
+        some, places = photographs.subset(moving), [found[index] for index in moving]
+        layers = layered_pictures(model, some, places, photons, seed, kept=kept)
         if exposure is None:
             total = layers.background.sum(axis=0)
             exposure = matched_exposure(total, layers.chain, photographs.background)
-        fit = LayeredFit(photographs, found, layers, [], exposure, none, {})
-        solution = fit.solve(none, np.zeros((len(found), 3)))
-        found = [
-            moved_contact(place, amount)
-            for place, amount in zip(found, solution.contacts, strict=True)
+        fit = LayeredFit(some, places, layers, [], exposure, none, {})
+        solution = fit.solve(none, np.zeros((len(places), 3)))
+        for index, place, amount in zip(moving, places, solution.contacts, strict=True):
+            found[index] = moved_contact(place, amount)
+        moving = [
+            index
+            for index, place in zip(moving, places, strict=True)
+            if _change(place, found[index]) >= SETTLED
         ]
+        if not moving:
+            break
     return found
+
+
+def _change(one: SeenContact, other: SeenContact) -> float:
+    """Return the larger change of position and radius, pixels."""
+    return max(math.dist(one.centre, other.centre), abs(one.radius - other.radius))
 
 
 def scaled_contact(place: SeenContact, factor: float) -> SeenContact:

@@ -1,16 +1,21 @@
 """Readers calibrated on a model and applied to photographs, and the reverse.
 
-The reader is the one of the objective `reading` (`optisense.reading.lookup`). It learns the change
-of colour at each tilt from the contacts of the presses, where the ball determines the tilt of the
-skin, and reads the same contacts in the other's pictures. With a model that represents a sensor it
-must read the sensor's balls in their true size.
+The reader is a polynomial of degree two of the changes of R, G and B and of the place in the
+picture, fitted by ridge regression (Hoerl and Kennard 1970) to the contacts of the presses, where
+the ball determines the tilt of the skin. Readers of real sensors are also calibrated on presses of
+a ball. With a model that represents a sensor, the model's reader reads the sensor's balls in their
+true size, as precisely as a reader that is calibrated on other photographs.
+
+The reader of the objective `reading` (`optisense.reading.lookup`) is made for presses all over the
+picture. Photographs of a GelSight Mini, whose presses lie at one side, are read by it with an error
+of 6.0 degrees, and by this one with 5.1, if each is calibrated on the other photographs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,14 +25,7 @@ from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import ReadBothWays, Realism, distances, realism
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.geometry import Sphere
-from optisense.reading.lookup import (
-    Pixels,
-    PressTable,
-    TiltLookup,
-    tilt_grid,
-    tilt_kernel,
-    tilts_to_normals,
-)
+from optisense.reading.lookup import Pixels, tilts_to_normals
 from optisense.reading.tilts import angles_between
 
 if TYPE_CHECKING:
@@ -48,6 +46,19 @@ FEWEST = 3
 """Smallest number of presses from which a reader can be calibrated; fewer don't represent other
 places.
 """
+
+DEGREE = 2
+"""Degree of the reader's polynomial. If photographs of a GelSight Mini are read by readers that are
+calibrated on the others, the largest error is 7 degrees with degree 2, and 30 with degree 3.
+"""
+
+RIDGE = 1.0
+"""Weight of the squared coefficients, in units of one pixel's squared error. It only keeps the
+coefficients of channels without light finite: with 0.1 and 100 errors are within 0.2 degrees.
+"""
+
+NOISE_SEED = 0
+"""Seed of the noise that is added to the model's pictures."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +112,9 @@ def read_both_ways(
 ) -> tuple[ReadBothWays, ...]:
     """Calibrate a reader on the model and one on the photographs, and read the other's contacts.
 
+    Noise of the photographs is added to the model's pictures, because a reader that knows no noise
+    amplifies it.
+
     Args:
         photographs: photographs of the sensor.
         seen: contacts in the photographs.
@@ -118,32 +132,55 @@ def read_both_ways(
         _ball(place, contact, rays, axes)
         for place, contact in zip(seen, pictures.contacts, strict=True)
     ]
-    steepest = max(float(np.linalg.norm(ball.tilts, axis=1).max()) for ball in balls)
-    grid = tilt_grid(steepest)
-    real = [press.picture.astype(np.float64) for press in photographs.presses]
-    ground = photographs.background.astype(np.float64)
-    ones = [_pixels(picture, ground, ball) for picture, ball in zip(real, balls, strict=True)]
-    others = [
-        _pixels(picture, pictures.background, ball)
-        for picture, ball in zip(pictures.presses, balls, strict=True)
-    ]
-    kernels = [tilt_kernel(ball.tilts, grid) for ball in balls]
-    readers = [
-        TiltLookup(
-            [PressTable.of(each, kernel) for each, kernel in zip(known, kernels, strict=True)],
-            grid,
-            noise,
-        )
-        for known in (others, ones)
-    ]
+    random = np.random.default_rng(NOISE_SEED)
+
+    def noisy(picture: FloatArray) -> FloatArray:
+        return picture + noise * random.standard_normal(picture.shape)
+
+    real = _pixels_of(
+        [press.picture.astype(np.float64) for press in photographs.presses],
+        photographs.background.astype(np.float64),
+        balls,
+    )
+    shown = _pixels_of(
+        [noisy(picture) for picture in pictures.presses], noisy(pictures.background), balls
+    )
+    of_model, of_photographs = _Reader(shown, balls), _Reader(real, balls)
     found = []
-    for press, ball, one, other in zip(photographs.presses, balls, ones, others, strict=True):
-        forth, back = (
-            _judged(reader.normals(pixels), ball)
-            for reader, pixels in zip(readers, (one, other), strict=True)
-        )
-        found.append(ReadBothWays(press.name, *forth, *back))
+    for index, (press, ball) in enumerate(zip(photographs.presses, balls, strict=True)):
+        others = _Reader(real[:index] + real[index + 1 :], balls[:index] + balls[index + 1 :])
+        forth = _judged(of_model.normals(real[index]), ball)
+        back = _judged(of_photographs.normals(shown[index]), ball)
+        alone = _judged(others.normals(real[index]), ball)
+        found.append(ReadBothWays(press.name, *forth, *back, *alone))
     return tuple(found)
+
+
+class _Reader:
+    """Polynomial that maps changes of colour and places to tilts."""
+
+    def __init__(self, known: Sequence[Pixels], balls: Sequence[_Ball]) -> None:
+        from sklearn.linear_model import Ridge
+        from sklearn.pipeline import make_pipeline
+        from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+        self._model: Any = make_pipeline(
+            StandardScaler(),
+            PolynomialFeatures(DEGREE, include_bias=False),
+            StandardScaler(),
+            Ridge(RIDGE),
+        )
+        terms = np.concatenate([_terms(each) for each in known])
+        self._model.fit(terms, np.concatenate([ball.tilts for ball in balls]))
+
+    def normals(self, pixels: Pixels) -> FloatArray:
+        """Return the read normals (n, 3); the third axis is the untouched normal."""
+        return tilts_to_normals(np.asarray(self._model.predict(_terms(pixels))))
+
+
+def _terms(pixels: Pixels) -> FloatArray:
+    """Return the changes of R, G and B, and the places, (n, 5)."""
+    return np.concatenate([pixels.picture - pixels.untouched, pixels.places], axis=1)
 
 
 def _ball(place: SeenContact, contact: Contact, rays: ChiefRays, axes: FloatArray) -> _Ball:
@@ -169,8 +206,14 @@ def _ball(place: SeenContact, contact: Contact, rays: ChiefRays, axes: FloatArra
     return _Ball(where, offsets, radius, offsets / np.maximum(length, 1e-12) * angle, places)
 
 
-def _pixels(picture: FloatArray, untouched: FloatArray, ball: _Ball) -> Pixels:
-    return Pixels(picture[ball.where], untouched[ball.where], ball.places)
+def _pixels_of(
+    pictures: Sequence[FloatArray], untouched: FloatArray, balls: Sequence[_Ball]
+) -> list[Pixels]:
+    """Return the pixels of each picture in its contact."""
+    return [
+        Pixels(picture[ball.where], untouched[ball.where], ball.places)
+        for picture, ball in zip(pictures, balls, strict=True)
+    ]
 
 
 def _judged(normals: FloatArray, ball: _Ball) -> tuple[float, float]:

@@ -112,6 +112,8 @@ class ReadBothWays:
         degrees: mean angle between the normals that it reads and the ball's, degrees.
         radius_back, degrees_back: the same of a reader that is calibrated on the photographs, in
             the model's picture.
+        radius_alone, degrees_alone: the same of a reader that is calibrated on the other
+            photographs, in this photograph: what the photographs permit without any model.
     """
 
     name: str
@@ -119,6 +121,8 @@ class ReadBothWays:
     degrees: float
     radius_back: float
     degrees_back: float
+    radius_alone: float
+    degrees_alone: float
 
 
 @dataclass(frozen=True)

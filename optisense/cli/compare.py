@@ -102,6 +102,7 @@ def reading_lines(found: Realism) -> list[str]:
         for one, other, radius, degrees in (
             ("the model", "the photographs", "radius", "degrees"),
             ("the photographs", "the model", "radius_back", "degrees_back"),
+            ("the photographs", "other photographs", "radius_alone", "degrees_alone"),
         )
     ]
 

@@ -30,6 +30,8 @@ READINGS = {
     "degrees": "error of the normals that it reads, degrees",
     "radius_back": "ball read by the photographs' reader in the model, times",
     "degrees_back": "error of the normals that it reads there, degrees",
+    "radius_alone": "ball read by the reader of the other photographs, times",
+    "degrees_alone": "error of the normals that it reads, degrees",
 }
 """Figures of readings whose medians the page shows, with their labels."""
 

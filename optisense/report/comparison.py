@@ -131,8 +131,8 @@ def noise_row(found: Realism) -> tuple[str, ...]:
 
 
 def reading_rows(found: Realism) -> list[tuple[str, ...]]:
-    """Return the readings of each contact by readers that were calibrated on the other's
-    pictures.
+    """Return the readings of each contact by readers that were calibrated on the model, on the
+    photographs, and on the other photographs.
     """
     return [
         (
@@ -141,6 +141,8 @@ def reading_rows(found: Realism) -> list[tuple[str, ...]]:
             f"{each.degrees:.1f}",
             f"{each.radius_back:.2f}",
             f"{each.degrees_back:.1f}",
+            f"{each.radius_alone:.2f}",
+            f"{each.degrees_alone:.1f}",
         )
         for each in found.readings
     ]

@@ -1,8 +1,9 @@
 """GelSight Mini with the light and the camera of a real unit.
 
 `optisense calibrate` has fitted the powers of the lights, the camera's place and its processing to
-published photographs; `scripts/fitted_mini.py` repeats the fit. The numbers are in a YAML file
-beside this module. Nobody has built the cylindrical and the spherical form, so these have the light
+published photographs; `scripts/fitted_mini.py` repeats the fit. The camera's processing is that of
+the library's camera `gelsight-mini`, and the other numbers are in a YAML file beside this module.
+Nobody has built the cylindrical and the spherical form, so these have the light
 and the camera of the flat one.
 """
 
@@ -12,6 +13,7 @@ from collections.abc import Callable
 from importlib.resources import as_file, files
 from typing import Any
 
+from optisense import library
 from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.design.yaml_reader import read_yaml
 from optisense.sensors.dimensions import describe_changes
@@ -24,6 +26,9 @@ from optisense.sensors.gelsight_mini_ideal import (
 
 FITTED_NUMBERS = "gelsight_mini_fitted.yaml"
 """Name of the file with the value at each fitted path, and its source."""
+
+FITTED_CAMERA = "gelsight-mini"
+"""Camera of the library with the fitted shading, stray light, colours and tone curve."""
 
 VIEW_WIDTH = 20.3
 """Width of the skin that pictures of real units show, mm, from the size of balls in them; the
@@ -119,7 +124,7 @@ def _fitted(build: Callable[..., SensorDesign], dimensions: dict[str, Any]) -> S
     """Return the design with the fitted numbers; a camera that `dimensions` move along its axis
     keeps its fitted place across it.
     """
-    design = unfitted_design(build, **dimensions)
+    design = library.with_imaging(unfitted_design(build, **dimensions), FITTED_CAMERA)
     with as_file(files("optisense.sensors") / FITTED_NUMBERS) as path:
         fitted, _ = read_yaml(path)
     for place, entry in fitted.items():

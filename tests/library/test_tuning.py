@@ -11,7 +11,7 @@ import pytest
 
 import optisense as ots
 from optisense import library
-from optisense.design import load_design, save_design
+from optisense.design import Status, load_design, save_design
 from optisense.design.lenses.film import film_places
 from optisense.errors import LibraryError
 from optisense.library.tuning import read_tuning
@@ -181,4 +181,13 @@ def test_a_focus_distance_gives_the_depth_of_field_of_the_lens() -> None:
     with pytest.raises(LibraryError, match="the f-number of camera 'pi-hq-6mm' is not known"):
         library.with_imaging(mini, "pi-hq-6mm", focus_distance=20.0)
     with pytest.raises(LibraryError, match="knows no distortion, shading"):
-        library.with_imaging(mini, "gelsight-mini")
+        library.with_imaging(mini, "ovm7692")
+
+
+def test_the_camera_of_the_mini_has_the_processing_of_the_fitted_sensor() -> None:
+    ideal, fitted = ots.load("gelsight-mini-ideal"), ots.load("gelsight-mini")
+    design = library.with_imaging(ideal, "gelsight-mini")
+    for name in ("shading", "stray_light", "colour_matrix", "tone_curve"):
+        assert getattr(design.camera, name) == getattr(fitted.camera, name)
+        assert fitted.provenance[f"camera.{name}"].status is Status.CALIBRATED
+    assert design.camera.fov == ideal.camera.fov
