@@ -19,8 +19,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import splu
 
 from optisense.mechanics import Elasticity
-from optisense.mechanics.convolution import GridResponse
-from optisense.mechanics.normal_contact import contact_area, solve_normal_contact
+from optisense.mechanics._convolution import GridResponse
+from optisense.mechanics._normal_contact import contact_area, solve_normal_contact
 
 FloatArray = NDArray[np.float64]
 

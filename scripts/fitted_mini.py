@@ -28,9 +28,9 @@ from optisense.calibration.families import chosen_families
 from optisense.design import SensorDesign, Status, get_value
 from optisense.design.camera import ImagingModel
 from optisense.design.yaml_writer import to_yaml
-from optisense.library.entries import CameraModel, Source
+from optisense.library import CameraModel, Source
 from optisense.library.own_parts import HEADS
-from optisense.sensors.gelsight_mini import FITTED_CAMERA, FITTED_NUMBERS, unfitted_design
+from optisense.sensors._gelsight_mini import FITTED_CAMERA, FITTED_NUMBERS, unfitted_design
 
 UNIT = "one GelSight Mini, calibration pictures of GelSLAM (commit e0ea7de, MIT)"
 """Whose photographs they are, for the source of each number."""

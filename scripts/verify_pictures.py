@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import optisense as ots
 from optisense.geometry import Contact
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
-from optisense.mechanics.height_map import heights
+from optisense.mechanics._height_map import heights
 
 OUT = Path(__file__).parent.parent / "docs" / "images"
 PITCH = 0.03

@@ -2,9 +2,17 @@
 
 from optisense.design.materials import flake_lobe, specularity_to_roughness
 from optisense.library import ies
+from optisense.library._entries import (
+    AnyEntry,
+    CameraModel,
+    Entry,
+    LightEntry,
+    Source,
+    TypicalLight,
+)
+from optisense.library._imaging import with_imaging
+from optisense.library._portable import with_own_lights
 from optisense.library.adding import Added, add_file, add_ies, add_tuning, parse_colour
-from optisense.library.entries import AnyEntry, CameraModel, Entry, LightEntry, Source, TypicalLight
-from optisense.library.imaging import with_imaging
 from optisense.library.loader import (
     camera,
     coating,
@@ -16,7 +24,6 @@ from optisense.library.loader import (
     names,
 )
 from optisense.library.own_parts import own_folder
-from optisense.library.portable import with_own_lights
 
 __all__ = [
     "Added",

@@ -16,7 +16,7 @@ from optisense.design.sensor_design import Status
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.folders import held
-from optisense.library.entries import AnyEntry, LightEntry, Source, TypicalLight
+from optisense.library._entries import AnyEntry, LightEntry, Source, TypicalLight
 from optisense.library.loader import entry, is_own, kind_named, names
 from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
 from optisense.library.reading import KINDS, Kind, files_of, kind_of, make_entry, read_entry

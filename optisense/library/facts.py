@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from optisense.design.fields import unit_of
-from optisense.library.entries import AnyEntry, CameraModel, LightEntry, Source
+from optisense.library._entries import AnyEntry, CameraModel, LightEntry, Source
 from optisense.library.previews.camera import DISTANCES, footprint_size
 from optisense.library.previews.light import colour_facts
 

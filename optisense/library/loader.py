@@ -12,7 +12,7 @@ from optisense.design.lights import LightGroup
 from optisense.design.materials import CoatingModel, Material
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
-from optisense.library.entries import AnyEntry, CameraModel
+from optisense.library._entries import AnyEntry, CameraModel
 from optisense.library.own_parts import own_files
 from optisense.library.reading import KINDS, Kind, inside, make_entry, read_entry
 from optisense.near import suggestion

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from optisense.design.yaml_writer import to_yaml
-from optisense.library.entries import AnyEntry
+from optisense.library._entries import AnyEntry
 from optisense.library.reading import Kind
 from optisense.writing import written_together
 

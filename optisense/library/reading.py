@@ -14,7 +14,7 @@ from optisense.design.materials import CoatingModel, Material
 from optisense.design.problems import design_error
 from optisense.design.yaml_reader import Lines, Steps, read_yaml
 from optisense.errors import LibraryError
-from optisense.library.entries import (
+from optisense.library._entries import (
     AnyEntry,
     CameraEntry,
     CoatingEntry,

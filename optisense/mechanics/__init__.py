@@ -11,32 +11,32 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.mechanics.attachment import is_attached, refuse_loose_gel
-    from optisense.mechanics.deformed_mesh import SkinMesh, SkinState, skin_mesh
-    from optisense.mechanics.elasticity import Elasticity, youngs_modulus_of_shore_a
-    from optisense.mechanics.gel import Gel, elasticity_in_words, elasticity_of
-    from optisense.mechanics.pressed_skin import Pressed, PressedSkin, SkinMaps
-    from optisense.mechanics.rims import rims_in_words
+    from optisense.mechanics._attachment import is_attached, refuse_loose_gel
+    from optisense.mechanics._deformed_mesh import SkinMesh, SkinState, skin_mesh
+    from optisense.mechanics._elasticity import Elasticity, youngs_modulus_of_shore_a
+    from optisense.mechanics._gel import Gel, elasticity_in_words, elasticity_of
+    from optisense.mechanics._pressed_skin import Pressed, PressedSkin, SkinMaps
+    from optisense.mechanics._rims import rims_in_words
     from optisense.mechanics.skins import CONFORMING, ELASTIC, SKINS
 
 _HOMES = {
     "CONFORMING": ".skins",
     "ELASTIC": ".skins",
     "SKINS": ".skins",
-    "Elasticity": ".elasticity",
-    "Gel": ".gel",
-    "Pressed": ".pressed_skin",
-    "PressedSkin": ".pressed_skin",
-    "SkinMaps": ".pressed_skin",
-    "SkinMesh": ".deformed_mesh",
-    "SkinState": ".deformed_mesh",
-    "elasticity_in_words": ".gel",
-    "elasticity_of": ".gel",
-    "is_attached": ".attachment",
-    "refuse_loose_gel": ".attachment",
-    "rims_in_words": ".rims",
-    "skin_mesh": ".deformed_mesh",
-    "youngs_modulus_of_shore_a": ".elasticity",
+    "Elasticity": "._elasticity",
+    "Gel": "._gel",
+    "Pressed": "._pressed_skin",
+    "PressedSkin": "._pressed_skin",
+    "SkinMaps": "._pressed_skin",
+    "SkinMesh": "._deformed_mesh",
+    "SkinState": "._deformed_mesh",
+    "elasticity_in_words": "._gel",
+    "elasticity_of": "._gel",
+    "is_attached": "._attachment",
+    "refuse_loose_gel": "._attachment",
+    "rims_in_words": "._rims",
+    "skin_mesh": "._deformed_mesh",
+    "youngs_modulus_of_shore_a": "._elasticity",
 }
 
 __all__ = [

@@ -2,7 +2,7 @@
 
 The change of colour by tilt is measured in ball presses at several places, interpolated to other
 places by regression, and looked up. The usual readers for real sensors are networks
-(`optisense.tasks.colour_to_normal`). Their training takes seconds and many presses, and its result
+(`optisense.tasks._colour_to_normal`). Their training takes seconds and many presses, and its result
 depends on the seed. This reader is made for objectives, which read nine presses, thousands of times
 in a search:
 

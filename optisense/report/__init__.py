@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.report.page import write_report
+    from optisense.report._page import write_report
     from optisense.report.scores import write_score_report
 
-_HOMES = {"write_report": ".page", "write_score_report": ".scores"}
+_HOMES = {"write_report": "._page", "write_score_report": ".scores"}
 
 __all__ = ["write_report", "write_score_report"]
 

@@ -14,7 +14,7 @@ from optisense.errors import OptiSenseError, SetupError
 from optisense.geometry import Contact, Sphere
 from optisense.objectives import Evaluation, Settings, evaluate
 from optisense.quality import PICTURE_PHOTONS
-from optisense.report.balls import Ball, find_balls
+from optisense.report._balls import Ball, find_balls
 from optisense.report.camera_rays import CameraRays
 
 if TYPE_CHECKING:

@@ -6,6 +6,7 @@ import math
 
 from optisense.calibration.realism import PATCH, Realism
 from optisense.calibration.result import Calibration
+from optisense.report._files import page
 from optisense.report.comparison import (
     CONTRAST,
     background_pictures,
@@ -14,7 +15,6 @@ from optisense.report.comparison import (
     press_row,
     press_section,
 )
-from optisense.report.files import page
 
 FIGURES = {
     "unexplained": "unexplained, patch of 1.35 radii",

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from optisense.calibration.comparing import Comparison
 from optisense.calibration.realism import PATCH, PressRealism, Realism, distances
 from optisense.design import SensorDesign
+from optisense.report._files import page
 from optisense.report.drawing import figure_uri, new_figure
-from optisense.report.files import page
 from optisense.report.pictures import data_uri
 from optisense.writing import write_text
 

@@ -16,8 +16,8 @@ from optisense.errors import OptiSenseError
 from optisense.objectives.registry import Objective
 from optisense.objectives.score import Score, shown_number
 from optisense.objectives.scored import Scored
+from optisense.report._files import page
 from optisense.report.camera_rays import CameraRays
-from optisense.report.files import page
 from optisense.writing import write_text
 
 DOTS_PER_INCH = 110

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optisense.report._files import page
 from optisense.report.drawing import (
     AMBER,
     BLUE,
@@ -19,7 +20,6 @@ from optisense.report.drawing import (
     legend_above,
     new_figure,
 )
-from optisense.report.files import page
 from optisense.search.space.manufacturing import unit_of
 from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
 from optisense.search.tolerance.sensitivity import Estimate

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from optisense.errors import OptiSenseError, SetupError
 from optisense.geometry import Sphere
 from optisense.objectives import Settings
-from optisense.report.study_figures import spread_out
+from optisense.report._study_figures import spread_out
 from optisense.search.evaluation.outcome import rank_of
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial

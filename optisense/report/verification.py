@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.geometry.objects import OBJECTS
+from optisense.report._files import page
 from optisense.report.drawing import AMBER, BLUE, GREY, RED, figure_uri, legend_above, new_figure
-from optisense.report.files import page
 from optisense.report.pictures import data_uri, normal_colours
 from optisense.tasks.paired_bootstrap import BETTER, UNKNOWN, WORSE, ErrorChange
 from optisense.tasks.press_readings import PressPictures

@@ -9,9 +9,9 @@ from pathlib import Path
 from optisense.design import SensorDesign
 from optisense.errors import DesignError, OutputError
 from optisense.registry import Registry, must_be
-from optisense.robots.body import SensorBody, sensor_body
-from optisense.robots.mjcf import mjcf
-from optisense.robots.urdf import urdf
+from optisense.robots._body import SensorBody, sensor_body
+from optisense.robots._mjcf import mjcf
+from optisense.robots._urdf import urdf
 from optisense.workshop.mesh_formats import stl_bytes_of
 from optisense.writing import inside, written_together
 

@@ -17,20 +17,20 @@ SENSORS: Registry[Callable[[], SensorDesign]] = Registry(
     "optisense.sensors",
     DesignError,
     {
-        "digit": "optisense.sensors.digit:digit",
-        "gelbelt": "optisense.sensors.gelbelt:gelbelt",
-        "gelsight360": "optisense.sensors.gelsight360:gelsight360",
-        "gelsight-mini": "optisense.sensors.gelsight_mini:gelsight_mini",
-        "gelsight-mini-cylindrical": "optisense.sensors.gelsight_mini:gelsight_mini_cylindrical",
-        "gelsight-mini-ideal": "optisense.sensors.gelsight_mini_ideal:gelsight_mini_ideal",
+        "digit": "optisense.sensors._digit:digit",
+        "gelbelt": "optisense.sensors._gelbelt:gelbelt",
+        "gelsight360": "optisense.sensors._gelsight360:gelsight360",
+        "gelsight-mini": "optisense.sensors._gelsight_mini:gelsight_mini",
+        "gelsight-mini-cylindrical": "optisense.sensors._gelsight_mini:gelsight_mini_cylindrical",
+        "gelsight-mini-ideal": "optisense.sensors._gelsight_mini_ideal:gelsight_mini_ideal",
         "gelsight-mini-ideal-cylindrical": (
-            "optisense.sensors.gelsight_mini_ideal:gelsight_mini_ideal_cylindrical"
+            "optisense.sensors._gelsight_mini_ideal:gelsight_mini_ideal_cylindrical"
         ),
         "gelsight-mini-ideal-spherical": (
-            "optisense.sensors.gelsight_mini_ideal:gelsight_mini_ideal_spherical"
+            "optisense.sensors._gelsight_mini_ideal:gelsight_mini_ideal_spherical"
         ),
-        "gelsight-mini-spherical": "optisense.sensors.gelsight_mini:gelsight_mini_spherical",
-        "gelsight-svelte": "optisense.sensors.gelsight_svelte:gelsight_svelte",
+        "gelsight-mini-spherical": "optisense.sensors._gelsight_mini:gelsight_mini_spherical",
+        "gelsight-svelte": "optisense.sensors._gelsight_svelte:gelsight_svelte",
     },
 )
 """Functions that build a sensor with its default dimensions; other packages add theirs under the

@@ -10,46 +10,46 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.tasks.ball_force import BallForce
-    from optisense.tasks.ball_shear import BallShear
-    from optisense.tasks.calibration import CalibratedSensor, ReconstructionSettings
-    from optisense.tasks.cylinder_radius import CylinderRadius
-    from optisense.tasks.dataset import Dataset, Sample
-    from optisense.tasks.dataset_settings import DatasetSettings
-    from optisense.tasks.draws import ContactDraw
-    from optisense.tasks.generation import generate
-    from optisense.tasks.misalignment import Misalignment
-    from optisense.tasks.perception import (
+    from optisense.tasks._ball_force import BallForce
+    from optisense.tasks._ball_shear import BallShear
+    from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
+    from optisense.tasks._cylinder_radius import CylinderRadius
+    from optisense.tasks._dataset_settings import DatasetSettings
+    from optisense.tasks._draws import ContactDraw
+    from optisense.tasks._generation import generate
+    from optisense.tasks._misalignment import Misalignment
+    from optisense.tasks._perception import (
         PerceptionResult,
         PerceptionTask,
         SampleSettings,
         perceive,
     )
-    from optisense.tasks.reconstruction import ReconstructionResult, reconstruct
-    from optisense.tasks.snr import signal_to_noise
+    from optisense.tasks._reconstruction import ReconstructionResult, reconstruct
+    from optisense.tasks._snr import signal_to_noise
+    from optisense.tasks.dataset import Dataset, Sample
     from optisense.tasks.verification import Verification, VerificationSettings, verify
 
 _HOMES = {
-    "CalibratedSensor": ".calibration",
-    "ContactDraw": ".draws",
-    "BallForce": ".ball_force",
-    "BallShear": ".ball_shear",
-    "CylinderRadius": ".cylinder_radius",
+    "CalibratedSensor": "._calibration",
+    "ContactDraw": "._draws",
+    "BallForce": "._ball_force",
+    "BallShear": "._ball_shear",
+    "CylinderRadius": "._cylinder_radius",
     "Dataset": ".dataset",
-    "DatasetSettings": ".dataset_settings",
-    "Misalignment": ".misalignment",
-    "PerceptionResult": ".perception",
-    "PerceptionTask": ".perception",
-    "ReconstructionResult": ".reconstruction",
-    "ReconstructionSettings": ".calibration",
+    "DatasetSettings": "._dataset_settings",
+    "Misalignment": "._misalignment",
+    "PerceptionResult": "._perception",
+    "PerceptionTask": "._perception",
+    "ReconstructionResult": "._reconstruction",
+    "ReconstructionSettings": "._calibration",
     "Sample": ".dataset",
-    "SampleSettings": ".perception",
+    "SampleSettings": "._perception",
     "Verification": ".verification",
     "VerificationSettings": ".verification",
-    "generate": ".generation",
-    "perceive": ".perception",
-    "reconstruct": ".reconstruction",
-    "signal_to_noise": ".snr",
+    "generate": "._generation",
+    "perceive": "._perception",
+    "reconstruct": "._reconstruction",
+    "signal_to_noise": "._snr",
     "verify": ".verification",
 }
 

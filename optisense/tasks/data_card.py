@@ -7,9 +7,9 @@ from collections import Counter
 from pathlib import Path
 
 from optisense.errors import TaskError
+from optisense.tasks._splits import SPLITS
 from optisense.tasks.dataset import Dataset
 from optisense.tasks.parquet import FOLDER
-from optisense.tasks.splits import SPLITS
 from optisense.text import markdown
 from optisense.untrusted_files import MOST_TEXT, read_bytes
 from optisense.writing import write_text

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from optisense.errors import TaskError
 from optisense.picture_files import read_picture
+from optisense.tasks._splits import SPLITS
 from optisense.tasks.dataset_tables import INFO, LABELS, read_failures, read_info, read_labels
-from optisense.tasks.splits import SPLITS
 from optisense.text import brief
 from optisense.untrusted_arrays import check_arrays, read_arrays
 from optisense.untrusted_files import (
@@ -166,7 +166,7 @@ class Dataset:
 
     def camera_rays(self) -> dict[str, NDArray[Any]]:
         """Return the ray of each pixel inside the gel; see
-        `optisense.tasks.camera_model.ray_arrays`.
+        `optisense.tasks._camera_model.ray_arrays`.
 
         Raises:
             TaskError: its file is missing, as in datasets of release 0.1, or damaged.

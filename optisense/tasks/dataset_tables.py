@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from optisense.errors import TaskError
-from optisense.tasks.records import read_object, read_rows
-from optisense.tasks.splits import SPLITS
+from optisense.tasks._records import read_object, read_rows
+from optisense.tasks._splits import SPLITS
 from optisense.text import brief
 from optisense.untrusted_files import COPY_AGAIN, MOST_TABLE, first_problem, read_text
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.tasks.perception import PerceptionResult
-from optisense.tasks.reconstruction import ReconstructionResult
+from optisense.tasks._perception import PerceptionResult
+from optisense.tasks._reconstruction import ReconstructionResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from optisense.errors import SetupError, TaskError
 from optisense.folders import held
+from optisense.tasks._records import write_whole
+from optisense.tasks._splits import SPLITS, TRAIN
 from optisense.tasks.dataset import Dataset, Sample
 from optisense.tasks.dataset_tables import NUMBER_COLUMNS
-from optisense.tasks.records import write_whole
-from optisense.tasks.splits import SPLITS, TRAIN
 from optisense.untrusted_files import MOST_PICTURE, read_bytes
 from optisense.writing import inside
 

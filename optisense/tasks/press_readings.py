@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from optisense.errors import TaskError
 from optisense.reading.tilts import angles_between
-from optisense.tasks.calibration import LEAST_PIXELS, CalibratedSensor
+from optisense.tasks._calibration import LEAST_PIXELS, CalibratedSensor
 
 if TYPE_CHECKING:
     from optisense.geometry import Contact

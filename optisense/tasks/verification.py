@@ -18,8 +18,9 @@ from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
 from optisense.near import suggestion
 from optisense.objectives.score import json_ready
-from optisense.tasks.calibration import CalibratedSensor, ReconstructionSettings
-from optisense.tasks.draws import PLACES_SEEN
+from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
+from optisense.tasks._draws import PLACES_SEEN
+from optisense.tasks._unseen_presses import UnseenPress, choose_presses
 from optisense.tasks.paired_bootstrap import (
     BETTER,
     LEAST_OBJECTS,
@@ -35,7 +36,6 @@ from optisense.tasks.press_readings import (
     read_press,
     whole_errors,
 )
-from optisense.tasks.unseen_presses import UnseenPress, choose_presses
 
 if TYPE_CHECKING:
     from optisense.geometry import Contact

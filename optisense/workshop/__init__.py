@@ -2,10 +2,10 @@
 materials.
 """
 
-from optisense.workshop.bill_of_materials import Bill, bill_of_materials
+from optisense.workshop._bill_of_materials import Bill, bill_of_materials
+from optisense.workshop._formats import FORMATS, ShapeFormat
+from optisense.workshop._placement import Placement, placements
 from optisense.workshop.export import export
-from optisense.workshop.formats import FORMATS, ShapeFormat
-from optisense.workshop.placement import Placement, placements
 
 __all__ = [
     "FORMATS",

@@ -9,13 +9,13 @@ from pathlib import Path
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError
-from optisense.workshop.assembly_files import assembly_files
-from optisense.workshop.bill_of_materials import bill_of_materials
-from optisense.workshop.drawings import cut_file, drawing
-from optisense.workshop.formats import FORMATS, ShapeFormat
-from optisense.workshop.moulds import moulds
-from optisense.workshop.placement import placement_csv, placements
-from optisense.workshop.plates import plates
+from optisense.workshop._assembly_files import assembly_files
+from optisense.workshop._bill_of_materials import bill_of_materials
+from optisense.workshop._drawings import cut_file, drawing
+from optisense.workshop._formats import FORMATS, ShapeFormat
+from optisense.workshop._moulds import moulds
+from optisense.workshop._placement import placement_csv, placements
+from optisense.workshop._plates import plates
 from optisense.workshop.shapes import Shape, shapes
 from optisense.writing import written_together
 

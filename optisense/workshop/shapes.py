@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from optisense.design import Cage, Role, SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.workshop.thickened import thickened
+from optisense.workshop._thickened import thickened
 
 AIR = 1.0
 """Refractive index of a part that is not made but left empty."""

@@ -7,7 +7,7 @@ import pytest
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import WAY, _turns, inside
-from optisense.sensors.shapes import arc, revolve
+from optisense.sensors._shapes import arc, revolve
 
 
 def _ball(radius: float) -> TriangleMesh:

@@ -8,7 +8,7 @@ import pytest
 from optisense.geometry import TriangleMesh
 from optisense.geometry.joining import closest_on_triangles, join, touching_area
 from optisense.optics.scene.media import Media, Solid
-from optisense.sensors.shapes import arc, revolve
+from optisense.sensors._shapes import arc, revolve
 
 GEL = TriangleMesh.box((-10, -8, -4), (10, 8, 0), (4, 4, 2))
 DISTANCE = 0.05

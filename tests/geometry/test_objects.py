@@ -12,7 +12,7 @@ from optisense.geometry import Contact, TriangleMesh, parse_contact
 from optisense.geometry.indenter_kinds import indenter_from_plain
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
 from optisense.geometry.objects.relief import TOP
-from optisense.mechanics.height_map import heights
+from optisense.mechanics._height_map import heights
 
 FINE = 0.02
 """Pitch (mm) of the grids on which heights are sampled."""

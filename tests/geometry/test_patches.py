@@ -14,7 +14,7 @@ from optisense.geometry.patches import (
     patches,
     smoothly_joined,
 )
-from optisense.sensors.shapes import arc, revolve
+from optisense.sensors._shapes import arc, revolve
 
 
 def fingertip(radius: float = 10.0, height: float = 20.0) -> TriangleMesh:

@@ -11,8 +11,8 @@ from SurfaceTopography import Topography
 
 from optisense.errors import ContactError
 from optisense.mechanics import Elasticity, youngs_modulus_of_shore_a
-from optisense.mechanics.convolution import GridResponse
-from optisense.mechanics.normal_contact import contact_area, solve_normal_contact
+from optisense.mechanics._convolution import GridResponse
+from optisense.mechanics._normal_contact import contact_area, solve_normal_contact
 
 
 def pressed(shape, width, count, thickness, gel):

@@ -8,8 +8,11 @@ import pytest
 from optisense.errors import ContactError
 from optisense.geometry import Contact, Plane, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
-from optisense.mechanics import Elasticity, Gel, normal_contact, pressed_skin, tangential_contact
-from optisense.mechanics.displacement_field import grid_response
+from optisense.mechanics import Elasticity, Gel
+from optisense.mechanics import _normal_contact as normal_contact
+from optisense.mechanics import _pressed_skin as pressed_skin
+from optisense.mechanics import _tangential_contact as tangential_contact
+from optisense.mechanics._displacement_field import grid_response
 
 TOP = TriangleMesh.grid((25.25, 20.75)).flipped()
 BLOCK = TriangleMesh.box((-12.625, -10.375, -4.25), (12.625, 10.375, 0.0))

@@ -10,12 +10,14 @@ from scipy.sparse.linalg import spsolve
 
 from optisense.geometry import Contact, Plane, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
-from optisense.mechanics import Elasticity, Gel, gel_patches, point_load
-from optisense.mechanics.gel_columns import gel_columns
-from optisense.mechanics.gel_patch import GelPatch
-from optisense.mechanics.hexahedra import CORNERS, stiffnesses
+from optisense.mechanics import Elasticity, Gel
+from optisense.mechanics import _gel_patches as gel_patches
+from optisense.mechanics import _point_load as point_load
+from optisense.mechanics._gel_columns import gel_columns
+from optisense.mechanics._gel_patch import GelPatch
+from optisense.mechanics._hexahedra import CORNERS, stiffnesses
 from optisense.sensors import load
-from optisense.sensors.shapes import revolve
+from optisense.sensors._shapes import revolve
 
 GEL = Elasticity(1.0, 0.49)
 

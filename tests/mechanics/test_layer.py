@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from optisense.mechanics.layer import SquareLoad, half_space_compliance, layer_compliance
+from optisense.mechanics._layer import SquareLoad, half_space_compliance, layer_compliance
 
 
 def solved_numerically(a, nu):

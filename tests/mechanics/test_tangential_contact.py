@@ -10,9 +10,9 @@ from optisense.geometry import Contact, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
 from optisense.geometry.contact_text import parse_contact
 from optisense.mechanics import Elasticity, Gel
-from optisense.mechanics.convolution import GridResponse
-from optisense.mechanics.normal_contact import solve_normal_contact
-from optisense.mechanics.tangential_contact import Drag, solve_shear
+from optisense.mechanics._convolution import GridResponse
+from optisense.mechanics._normal_contact import solve_normal_contact
+from optisense.mechanics._tangential_contact import Drag, solve_shear
 
 GEL = Elasticity(0.4, 0.45)
 TOP = TriangleMesh.grid((50.0, 50.0)).flipped()

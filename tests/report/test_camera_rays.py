@@ -11,8 +11,8 @@ import pytest
 from optisense.design.section import along_rows
 from optisense.design.section_drawing import LOST_RAY, RAY, section_svg
 from optisense.optics import OpticalModel
+from optisense.report._scene_view import scene_data
 from optisense.report.camera_rays import ACROSS, CameraRays
-from optisense.report.scene_view import scene_data
 from optisense.sensors import gelsight_mini_ideal, load
 
 

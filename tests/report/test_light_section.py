@@ -15,8 +15,8 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.cli import app
 from optisense.optics import OpticalModel
+from optisense.report._page import render_page
 from optisense.report.light_section import LEAST_DRAWN, OTHER, LightSection, ledger_page
-from optisense.report.page import render_page
 
 EVIL = "</script><img src=x onerror=alert(1)>"
 

@@ -9,7 +9,7 @@ import pytest
 
 from optisense.design import set_value
 from optisense.optics import OpticalModel
-from optisense.report.page import render_page
+from optisense.report._page import render_page
 from optisense.report.real_sensor import RealComparison, compare_with_real, has_real_picture
 from optisense.sensors import load
 

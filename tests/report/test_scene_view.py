@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from optisense.geometry import TriangleMesh
-from optisense.report.edges import feature_edges
-from optisense.report.scene_view import scene_data
+from optisense.report._edges import feature_edges
+from optisense.report._scene_view import scene_data
 from optisense.sensors import gelsight_mini_ideal
 
 
@@ -56,7 +56,7 @@ def test_the_frustum_is_as_wide_as_the_field_of_view() -> None:
 
 
 def test_a_huge_mesh_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("optisense.report.scene_view.MAX_TRIANGLES", 100)
+    monkeypatch.setattr("optisense.report._scene_view.MAX_TRIANGLES", 100)
     names = [part["name"] for part in scene_data(gelsight_mini_ideal(), {})["parts"]]
     assert "gel" not in names
     assert "guide" in names

@@ -13,10 +13,10 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.cli import app
 from optisense.design import SensorDesign
-from optisense.report import study_figures
-from optisense.report.balls import Ball
+from optisense.report import _study_figures as study_figures
+from optisense.report._balls import Ball
+from optisense.report._cage_changes import cage_changes
 from optisense.report.before_after import DesignView, RayFigures
-from optisense.report.cage_changes import cage_changes
 from optisense.report.study import render_study, write_study_report
 from optisense.search import Around, CagePoints, SearchResult, Study, search
 

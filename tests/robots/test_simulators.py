@@ -15,7 +15,7 @@ from optisense.design.projection import picture_places
 from optisense.errors import DesignError
 from optisense.geometry.common_space import as_manifold
 from optisense.robots import SensorBody, export_robot, sensor_body
-from optisense.robots.body import KILOGRAMS, mass_properties
+from optisense.robots._body import KILOGRAMS, mass_properties
 from optisense.workshop.shapes import shapes
 
 mujoco = pytest.importorskip("mujoco")

@@ -11,7 +11,7 @@ from optisense import OpticalModel, sensors, set_value
 from optisense.design import SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.sensors.half_round import HalfRound, stacked
+from optisense.sensors._half_round import HalfRound, stacked
 
 RED, GREEN, BLUE = 0, 1, 2
 

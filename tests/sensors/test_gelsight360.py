@@ -14,7 +14,7 @@ from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.optics import OpticalModel
 from optisense.optics.transport.chief_rays import RayOutcome
-from optisense.sensors.tip_shape import TipShape
+from optisense.sensors._tip_shape import TipShape
 
 R, HEIGHT, GEL, SHELL = 14.0, 34.0, 3.0, 2.5
 """Default dimensions, mm."""

@@ -15,8 +15,8 @@ from optisense.design.cage import as_array
 from optisense.errors import DesignError
 from optisense.optics import OpticalModel
 from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
-from optisense.sensors.gelsight_svelte import PALM_OUTLINE
-from optisense.sensors.svelte_profile import Palm
+from optisense.sensors._gelsight_svelte import PALM_OUTLINE
+from optisense.sensors._svelte_profile import Palm
 
 STRAIGHT = {"palm_outline": ((20.0, 22.0), (20.0, 60.0), (20.0, 90.0)), "m1_sagitta": 3.0}
 ARC_CENTRE, ARC_RADIUS = np.array([132.9, 43.1]), 130.5

@@ -10,7 +10,7 @@ import pytest
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign
 from optisense.geometry import Contact, Sphere
-from optisense.tasks.camera_model import Pinhole, camera_model, fit_pinhole, ray_arrays
+from optisense.tasks._camera_model import Pinhole, camera_model, fit_pinhole, ray_arrays
 
 SIZE = (80, 60)
 

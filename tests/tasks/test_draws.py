@@ -10,7 +10,7 @@ from optisense.errors import TaskError
 from optisense.geometry import Cylinder, Plane, Sphere
 from optisense.geometry.indenter_kinds import tilted
 from optisense.geometry.mesh import turn_about_x_and_y
-from optisense.tasks.draws import ContactDraw, Places
+from optisense.tasks._draws import ContactDraw, Places
 
 
 def test_places_are_even_by_area(cylindrical_mini: OpticalModel) -> None:

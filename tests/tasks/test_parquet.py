@@ -17,9 +17,9 @@ from PIL import Image
 from optisense import OpticalModel
 from optisense.errors import TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
+from optisense.tasks._splits import SPLITS
 from optisense.tasks.data_card import OURS, write_card
 from optisense.tasks.parquet import ARRAYS, write_parquet
-from optisense.tasks.splits import SPLITS
 
 EVIL = "sensor\n---\nlicense: evil | <b>x</b>"
 

@@ -22,8 +22,8 @@ from optisense.tasks import (
     SampleSettings,
     perceive,
 )
-from optisense.tasks.misalignment import plane_contact
-from optisense.tasks.perception import collect
+from optisense.tasks._misalignment import plane_contact
+from optisense.tasks._perception import collect
 
 QUIET = SampleSettings(count=40, camera_noise=0.0, skin="conforming")
 """Settings for colours from algebra, which does not depend on how the gel deforms; the conforming

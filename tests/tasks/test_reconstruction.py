@@ -13,9 +13,9 @@ from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
 from optisense.reading.tilts import angles_between, normals_of, tilts_of
 from optisense.tasks import ReconstructionSettings, reconstruct
-from optisense.tasks.colour_to_normal import fit_reader
+from optisense.tasks._colour_to_normal import fit_reader
+from optisense.tasks._reconstruction import pyramid
 from optisense.tasks.figures import draw_reconstruction
-from optisense.tasks.reconstruction import pyramid
 
 LAMBERTIAN = {"presses": 12, "camera_noise": 0.0, "resolution": (160, 120), "seed": 1}
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from optisense.errors import TaskError
-from optisense.tasks.records import CsvTable, differences, read_object, refuse_differences
+from optisense.tasks._records import CsvTable, differences, read_object, refuse_differences
 
 COLUMNS = ("name", "value")
 ROWS = [{"name": 'a, "quoted" word', "value": 0.1}, {"name": "b", "value": 1 / 3}]

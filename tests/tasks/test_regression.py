@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.errors import TaskError
-from optisense.tasks.regression import read_by_forest
+from optisense.tasks._regression import read_by_forest
 
 
 def test_a_smooth_target_is_read_far_better_than_guessed() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.errors import TaskError
-from optisense.tasks.snr import signal_to_noise
+from optisense.tasks._snr import signal_to_noise
 
 COUNT = 20_000
 

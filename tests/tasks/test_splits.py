@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from optisense.tasks.splits import CELLS, SHARES, SPLITS, TEST, split_of
+from optisense.tasks._splits import CELLS, SHARES, SPLITS, TEST, split_of
 
 
 def test_the_shares_are_those_of_the_cells() -> None:

@@ -14,11 +14,11 @@ from optisense import OpticalModel, load, set_value
 from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
 from optisense.optics import TactileImage
-from optisense.sensors.gelsight_mini_ideal import gelsight_mini_ideal
+from optisense.sensors._gelsight_mini_ideal import gelsight_mini_ideal
 from optisense.tasks import ReconstructionSettings, VerificationSettings, verify
+from optisense.tasks._unseen_presses import MOST_DEEP, choose_presses
 from optisense.tasks.paired_bootstrap import BETTER, UNKNOWN, WORSE
 from optisense.tasks.press_readings import PressReading, whole_errors
-from optisense.tasks.unseen_presses import MOST_DEEP, choose_presses
 
 FEW = ("screw-head", "cable", "wedge", "nut", "bean", "braille")
 READING = ReconstructionSettings(presses=8, resolution=(96, 72), seed=2)

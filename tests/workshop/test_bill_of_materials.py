@@ -20,7 +20,7 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.workshop import bill_of_materials
-from optisense.workshop.bill_of_materials import Item
+from optisense.workshop._bill_of_materials import Item
 
 
 def items(design: SensorDesign, kind: str) -> dict[str, Item]:

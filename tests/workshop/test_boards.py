@@ -14,7 +14,7 @@ from optisense.sensors.from_meshes.pick_and_place import read_pick_and_place
 from optisense.sensors.from_meshes.recipe_lights import FromTable
 from optisense.sensors.from_meshes.strips import from_table
 from optisense.workshop import bill_of_materials, export, placements
-from optisense.workshop.boards import axes_at_rest, boards_of
+from optisense.workshop._boards import axes_at_rest, boards_of
 
 
 @pytest.fixture(scope="module")

@@ -15,8 +15,8 @@ from optisense import sensors
 from optisense.design import Role
 from optisense.geometry import TriangleMesh
 from optisense.workshop import export
-from optisense.workshop.drawings import cut_file, drawing
-from optisense.workshop.plates import Circle, plates
+from optisense.workshop._drawings import cut_file, drawing
+from optisense.workshop._plates import Circle, plates
 from optisense.workshop.shapes import Shape, shapes
 
 SVG = "{http://www.w3.org/2000/svg}"

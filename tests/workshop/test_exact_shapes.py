@@ -13,13 +13,13 @@ from step_extra import needs_step
 from optisense import sensors
 from optisense.design import Role
 from optisense.geometry import TriangleMesh
-from optisense.sensors.half_round import HalfRound, stacked
-from optisense.sensors.shapes import revolve
+from optisense.sensors._half_round import HalfRound, stacked
+from optisense.sensors._shapes import revolve
 from optisense.workshop import export
-from optisense.workshop.profiles import pieces
-from optisense.workshop.recognised import box_sides, extrusion_of, turned
+from optisense.workshop._profiles import pieces
+from optisense.workshop._recognised import box_sides, extrusion_of, turned
+from optisense.workshop._step_format import write_step
 from optisense.workshop.shapes import Shape
-from optisense.workshop.step_format import write_step
 
 SAUCER = [(0.0, 0.0), (3.0, 0.0), *[(3.0 + math.sin(t), 1.0 - math.cos(t)) for t in
           np.linspace(0.2, math.pi / 2, 12)], (0.0, 1.0)]  # fmt: skip

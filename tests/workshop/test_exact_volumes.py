@@ -12,12 +12,12 @@ from step_extra import needs_step
 
 from optisense import sensors
 from optisense.design import SensorDesign
-from optisense.sensors.digit import CORNERS
-from optisense.sensors.gelsight_svelte import BACK_OUTLINE, PALM_OUTLINE
-from optisense.sensors.half_round import HalfRound
-from optisense.sensors.svelte_profile import FlatMirror, Palm
-from optisense.workshop.domes import dome
-from optisense.workshop.exact_shapes import _through
+from optisense.sensors._digit import CORNERS
+from optisense.sensors._gelsight_svelte import BACK_OUTLINE, PALM_OUTLINE
+from optisense.sensors._half_round import HalfRound
+from optisense.sensors._svelte_profile import FlatMirror, Palm
+from optisense.workshop._domes import dome
+from optisense.workshop._exact_shapes import _through
 from optisense.workshop.shapes import Shape, shapes
 
 SAME_VOLUME = 1e-4
@@ -30,7 +30,7 @@ def exact_volume(shape: Shape) -> float:
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 
-    from optisense.workshop.exact_shapes import exact_body
+    from optisense.workshop._exact_shapes import exact_body
 
     body = exact_body(shape)
     assert body is not None, shape.name
@@ -206,7 +206,7 @@ def drawn_volume(shape: Shape, axis: int = 1) -> float:
     from OCP.TopExp import TopExp_Explorer
     from OCP.TopoDS import TopoDS
 
-    from optisense.workshop.exact_shapes import exact_body
+    from optisense.workshop._exact_shapes import exact_body
 
     def each(whole: Any, kind: Any) -> Iterator[Any]:
         explorer = TopExp_Explorer(whole, kind)

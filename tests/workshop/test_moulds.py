@@ -16,7 +16,7 @@ from optisense.design import Role, SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import as_manifold
-from optisense.workshop.moulds import (
+from optisense.workshop._moulds import (
     CLEARANCE,
     FUNNEL,
     PIN,

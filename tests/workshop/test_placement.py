@@ -10,8 +10,8 @@ import pytest
 
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.workshop import placements
-from optisense.workshop.boards import axes_at_rest
-from optisense.workshop.placement import placement_csv
+from optisense.workshop._boards import axes_at_rest
+from optisense.workshop._placement import placement_csv
 
 DIRECTIONS = [
     (1, 0, 0),

@@ -16,9 +16,9 @@ from optisense.design import Part, Point, Role, SensorDesign
 from optisense.errors import DesignError, OutputError, SetupError
 from optisense.geometry import TriangleMesh
 from optisense.workshop import bill_of_materials, export
+from optisense.workshop._step_format import bodies, write_step
 from optisense.workshop.mesh_formats import NAMESPACE, three_mf_bytes
 from optisense.workshop.shapes import Shape, shapes
-from optisense.workshop.step_format import bodies, write_step
 
 SINGLE = 1e-6
 """Relative precision of the coordinates of an STL file."""

@@ -7,9 +7,9 @@ import pytest
 
 from optisense import sensors
 from optisense.geometry import TriangleMesh
-from optisense.sensors.shapes import ribbon
+from optisense.sensors._shapes import ribbon
+from optisense.workshop._thickened import thickened
 from optisense.workshop.shapes import shapes
-from optisense.workshop.thickened import thickened
 
 
 def test_a_rectangle_becomes_a_box_behind_its_face() -> None:

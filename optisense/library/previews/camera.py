@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.library.entries import CameraModel
+from optisense.library._entries import CameraModel
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

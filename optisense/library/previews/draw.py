@@ -6,7 +6,7 @@ from pathlib import Path
 from textwrap import shorten
 from typing import TYPE_CHECKING, Any
 
-from optisense.library.entries import AnyEntry, LightEntry
+from optisense.library._entries import AnyEntry, LightEntry
 from optisense.library.previews.camera import draw_camera
 from optisense.library.previews.light import draw_light
 from optisense.library.previews.material import draw_material

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from optisense.design.emitters import LightModel
 from optisense.design.emitters.base import DARK
-from optisense.library.entries import LightEntry, TypicalLight
+from optisense.library._entries import LightEntry, TypicalLight
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -122,8 +122,8 @@ def test_a_single_light_beside_a_long_side_is_not_beyond_it(cad: Cad) -> None:
 def test_file_names_tell_what_a_nameless_body_is(tmp_path: Path) -> None:
     pytest.importorskip("OCP")
     from optisense.design import Role
+    from optisense.workshop._step_format import write_step
     from optisense.workshop.shapes import Shape
-    from optisense.workshop.step_format import write_step
 
     for file in ("Pinki Gel", "Top Housing"):
         write_step(tmp_path / f"{file}.step", [Shape("Part-1", Role.BLOCKER, None, BOX)])

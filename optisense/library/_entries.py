@@ -1,0 +1,204 @@
+"""Entries of the library: a value, and the source of each of its numbers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Generic, Literal, TypeVar
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from optisense.design.camera import ImagingModel, Pixels
+from optisense.design.emitters import LightModel
+from optisense.design.fields import Colour, InconsistentValueError, Model, Name, Number, Positive
+from optisense.design.materials import CoatingModel, Material
+from optisense.design.sensor_design import Status
+from optisense.library._lens import lens_misfit
+from optisense.near import suggestion
+
+Value = TypeVar("Value", bound=Model)
+
+Text = Annotated[str, Field(min_length=1, max_length=2000)]
+
+NOT_NUMBERS = frozenset({"kind", "shape", "library", "colour", "part", "maker"})
+"""Fields that need no source: words, and the names of colours."""
+
+
+class Source(Model):
+    """Source of one or several numbers."""
+
+    status: Status
+    source: Text
+    date: Annotated[str, Field(pattern=r"^\d{4}(-\d{2}(-\d{2})?)?$")] | None = None
+    """Date when the source was published, or else read (year, year-month or full)."""
+
+
+class Entry(Model, Generic[Value]):
+    """Library entry.
+
+    Attributes:
+        description: description in one line.
+        maker: maker or vendor.
+        value: material, coating, light or camera.
+        sources: source of each field with a number.
+    """
+
+    description: Text
+    maker: Text | None = None
+    value: Value
+    sources: Annotated[dict[str, Source], Field(min_length=1)]
+
+    def numbers(self) -> list[str]:
+        """Return the fields that need a source."""
+        given = self.value.model_dump(exclude_none=True)
+        return [field for field in given if field not in NOT_NUMBERS]
+
+    def source_names(self) -> list[str]:
+        """Return the names that `sources` may have."""
+        return [*type(self.value).model_fields, "maker"]
+
+    def source(self, field: str) -> Source | None:
+        """Return the source of a number of `numbers`, or None if there is none."""
+        return self.sources.get(field)
+
+    def unsourced(self) -> list[str]:
+        """Return the numbers without a source."""
+        return [field for field in self.numbers() if self.source(field) is None]
+
+    @model_validator(mode="after")
+    def _check_source_names(self) -> Entry[Value]:
+        known = self.source_names()
+        for name in self.sources:
+            if name not in known:
+                raise InconsistentValueError(
+                    f"there is a source for '{name}', which this entry does not have",
+                    ("sources", name),
+                    suggestion(name, known),
+                )
+        return self
+
+
+class TypicalLight(Model):
+    """Output of one colour of a light at its nominal current.
+
+    Attributes:
+        colour: R, G, B for a design's light group.
+        part: order number at the maker.
+        wavelength: dominant wavelength, nm.
+        current: nominal current, mA.
+        flux: radiant flux at this current, mW.
+    """
+
+    colour: Colour
+    part: Text | None = None
+    wavelength: Positive | None = None
+    current: Positive | None = None
+    flux: Positive | None = None
+
+
+class LightEntry(Entry[LightModel]):
+    """Light with its package and its colours.
+
+    A source for `flux` refers to all colours, one for `flux.red` to one of them.
+
+    Attributes:
+        package: width, length and height of its body, mm.
+        window: width and height of the opening of a light that is simulated as a point, mm.
+        typical: its colours, by name.
+    """
+
+    package: tuple[Positive, Positive, Positive] | None = None
+    window: tuple[Positive, Positive] | None = None
+    typical: dict[Name, TypicalLight] = Field(default_factory=dict)
+
+    def numbers(self) -> list[str]:
+        """Return the fields that need a source; those of a colour as `flux.red`."""
+        own = [name for name in ("package", "window") if getattr(self, name) is not None]
+        colours = [
+            f"{field}.{colour}"
+            for colour, light in self.typical.items()
+            for field in light.model_dump(exclude_none=True)
+            if field not in NOT_NUMBERS
+        ]
+        return [*super().numbers(), *own, *colours]
+
+    def source_names(self) -> list[str]:
+        """Return the names that `sources` may have."""
+        fields = [field for field in TypicalLight.model_fields if field != "colour"]
+        each = [f"{field}.{colour}" for colour in self.typical for field in fields]
+        return [*super().source_names(), "package", "window", *fields, *each]
+
+    def source(self, field: str) -> Source | None:
+        """Return the source of a number of `numbers`, or None if there is none."""
+        return self.sources.get(field) or self.sources.get(field.split(".")[0])
+
+
+class LensFacts(Model):
+    """View of a camera module as sold.
+
+    Attributes:
+        projection: projection of angles to image heights.
+        fov: field of view across the image width, degrees.
+        resolution: pixels of the sensor, width and height.
+        pixel_size: pixel size, micrometres.
+        focal_length: focal length, mm.
+        f_number: focal length divided by the diameter of the entrance pupil.
+    """
+
+    projection: Literal["perspective", "equidistant"] = "perspective"
+    fov: Annotated[Number, Field(gt=0.0, le=360.0)]
+    resolution: tuple[Pixels, Pixels]
+    pixel_size: Positive | None = None
+    focal_length: Positive | None = None
+    f_number: Positive | None = None
+
+
+class CameraModel(ImagingModel, LensFacts):
+    """Camera module as sold: its view, and the effects of its lens, sensor and processor.
+
+    `imaging` has the data that a design can take over besides the view.
+    """
+
+    def imaging(self) -> dict[str, Any]:
+        """Return the known fields of its `ImagingModel`: plain values by field, as for a design
+        file.
+        """
+        values = self.model_dump(mode="json", include=set(ImagingModel.model_fields))
+        return {name: value for name, value in values.items() if value is not None}
+
+    @model_validator(mode="after")
+    def _check_consistent(self) -> CameraModel:
+        if self.projection == "perspective" and self.fov >= 180.0:
+            raise InconsistentValueError(
+                "a perspective camera sees less than 180 degrees", ("fov",), "Use equidistant"
+            )
+        if self.distortion is not None and self.distortion.projection != self.projection:
+            raise InconsistentValueError(
+                f"a lens distortion of kind '{self.distortion.kind}' is one of "
+                f"{self.distortion.projection} lenses",
+                ("distortion", "kind"),
+                f"Use 'projection: {self.distortion.projection}', or another kind of distortion",
+            )
+        misfit = lens_misfit(
+            self.projection, self.fov, self.resolution, self.pixel_size, self.focal_length
+        )
+        if misfit is not None:
+            raise InconsistentValueError(misfit[0], ("fov",), misfit[1])
+        return self
+
+    def angles(self) -> tuple[float, float, float]:
+        """Return the angles seen across the image's width, its height and its diagonal, degrees."""
+        width, height = self.resolution
+        across = np.array([width, height, np.hypot(width, height)]) / width
+        if self.projection == "equidistant":
+            wide, high, diagonal = self.fov * across
+        else:
+            half = np.tan(np.radians(self.fov / 2.0)) * across
+            wide, high, diagonal = 2.0 * np.degrees(np.arctan(half))
+        return float(wide), float(high), float(diagonal)
+
+
+MaterialEntry = Entry[Material]
+CoatingEntry = Entry[CoatingModel]
+CameraEntry = Entry[CameraModel]
+
+AnyEntry = MaterialEntry | CoatingEntry | LightEntry | CameraEntry

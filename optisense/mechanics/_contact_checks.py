@@ -1,0 +1,91 @@
+"""Checks for contacts that are impossible on an elastic skin: overlapping indenters, and holes in
+an indenter where it touches.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ContactError
+from optisense.geometry import TriangleMesh
+from optisense.mechanics._footprint import Footprint
+
+FloatArray = NDArray[np.float64]
+
+SHALLOWEST = 1e-3
+"""Depth (mm) of skin inside both of two indenters above which they count as overlapping; smaller
+depths are rounding."""
+
+ALONG_AN_EDGE = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Places along the part of an open edge inside the gel, as shares of its length, at which it is
+tested for whether it touches the skin."""
+
+
+def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
+    """Raise if two indenters overlap where they meet the undeformed skin.
+
+    Raises:
+        ContactError: a piece of skin lies inside both.
+    """
+    x, y = np.meshgrid(one.x, one.y)
+    inside = one.overlap > SHALLOWEST
+    flat = np.column_stack([x[inside], y[inside], np.zeros(int(inside.sum()))])
+    there = other.local(one.origin + flat @ one.axes.T)
+    near = np.abs(there[:, 2]) < min(one.thickness, other.thickness)
+    if (_overlap_at(other, there[near]) > SHALLOWEST).any():
+        raise ContactError(
+            "two contacts overlap: their indenters are in one another where they meet the skin",
+            where="at ({:.2f}, {:.2f}, {:.2f}) and ({:.2f}, {:.2f}, {:.2f}) mm".format(
+                *other.origin, *one.origin
+            ),
+            hint="move them apart, or join them to one mesh",
+        )
+
+
+def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
+    """Raise if the mesh of an indenter has an open edge where it touches the skin.
+
+    Args:
+        place: the footprint of the contact.
+        indenter: the placed mesh of the indenter in the design's frame, mm.
+
+    Raises:
+        ContactError: an edge of a single face lies inside the undeformed skin.
+    """
+    whole = indenter.welded()
+    corners = place.local(whole.vertices)[whole.open_edges]
+    height = corners[:, :, 2] + SHALLOWEST
+    corners, height = corners[height.min(axis=1) < 0.0], height[height.min(axis=1) < 0.0]
+    # Of an edge that crosses the skin, the part inside the gel is tested.
+    lower, edge = np.argmin(height, axis=1), np.arange(len(corners))
+    low, high = height[edge, lower], height[edge, 1 - lower]
+    inside = np.divide(-low, high - low, out=np.ones_like(low), where=high > 0.0)
+    start = corners[edge, lower]
+    way = inside[:, None] * (corners[edge, 1 - lower] - start)
+    touching = np.zeros(len(corners), dtype=bool)
+    for share in ALONG_AN_EDGE:
+        touching |= _overlap_at(place, start + share * way) > SHALLOWEST
+    if touching.any():
+        raise ContactError(
+            f"an indenter has a hole where it touches the skin: {int(touching.sum())} edges there "
+            "have one face only",
+            where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*place.origin),
+            hint="close the mesh; it may be open only above the skin",
+        )
+
+
+def _overlap_at(place: Footprint, local: FloatArray) -> FloatArray:
+    """Return the greatest overlap (n,), mm, at the grid points around points of a contact's
+    frame.
+    """
+    column = np.floor((local[:, 0] - place.x[0]) / place.pitch).astype(np.int64)
+    row = np.floor((local[:, 1] - place.y[0]) / place.pitch).astype(np.int64)
+    rows, columns = place.overlap.shape
+    inside = (column >= 0) & (column < columns - 1) & (row >= 0) & (row < rows - 1)
+    found = np.full(len(local), -np.inf)
+    some = row[inside], column[inside]
+    found[inside] = np.max(
+        [place.overlap[some[0] + up, some[1] + right] for up in (0, 1) for right in (0, 1)], axis=0
+    )
+    return found

@@ -1,0 +1,429 @@
+"""The displacement of a gel around one contact, interpolated between the points of its grids."""
+
+from __future__ import annotations
+
+from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import (
+    binary_erosion,
+    distance_transform_edt,
+    map_coordinates,
+    maximum_filter,
+    spline_filter,
+)
+
+from optisense.mechanics._convolution import GridResponse
+from optisense.mechanics._elasticity import Elasticity
+from optisense.mechanics._footprint import NO_OVERLAP, Footprint
+from optisense.mechanics._height_map import slopes
+
+if TYPE_CHECKING:
+    from optisense.mechanics._gel_patch import GelPatch
+
+FloatArray = NDArray[np.float64]
+
+RING = 1.0
+"""Width of the fine grid around a footprint, over the footprint's shorter side or, if that is less,
+the gel's thickness; displacements vary slowly farther out."""
+DECAY = 6.0
+"""Distance from a footprint, in thicknesses, beyond which displacements are neglected. They are
+less than 0.3 % there of those at half a thickness, for any Poisson ratio."""
+BEND_REACH = 2
+"""Distance, in pitches of a contact's grid, within which the largest second difference of
+the slopes counts: about half of the longest triangle."""
+COARSE_POINTS = 20
+"""Number of points of the coarse grid per thickness of the gel; the grid resolves bulges, which are
+as wide as the gel is thick."""
+COARSE_STEP = 16
+"""Step in which the number of points of the coarse grid along a side grows, so that contacts of
+similar sizes share its kernels."""
+MAX_COARSE = 400
+"""Largest number of points of the coarse grid along a side, which bounds the time of its
+transform."""
+
+
+class Nearby(NamedTuple):
+    """Points in and beside a contact.
+
+    Attributes:
+        away: (n,) distance (mm) from the contact, 0 inside it, accurate to about a pitch.
+        from_rim: (n,) distance (mm) from its rim, on either side of it.
+        bend: (n,) greatest second difference of the indenter's slopes on the contact's grid within
+            `BEND_REACH`; 0 beside the contact.
+    """
+
+    away: FloatArray
+    from_rim: FloatArray
+    bend: FloatArray
+
+
+class DisplacementField:
+    """Displacement around one contact, on a fine grid inside a coarse one.
+
+    Between grid points it is a cubic spline, so that slopes are smooth.
+
+    Attributes:
+        place: the grid of the pressure.
+        shear: (2, rows, columns) shear (MPa) of a dragged indenter; it must be set before
+            `sideways` is called.
+    """
+
+    def __init__(
+        self,
+        place: Footprint,
+        overlap: FloatArray,
+        pressure: FloatArray,
+        elasticity: Elasticity,
+        beyond: GridSpline | None = None,
+        patch: GelPatch | None = None,
+    ) -> None:
+        """Compute the displacement due to a pressure.
+
+        Args:
+            place: the grid of the pressure.
+            overlap: (rows, columns) overlap (mm) of the place, minus the displacement due to other
+                contacts and minus ``beyond``.
+            pressure: (rows, columns) pressure, MPa.
+            elasticity: elastic constants of the gel.
+            beyond: normal displacement of the gel in addition to that of a flat layer.
+            patch: the shape of the gel, from which ``beyond`` was computed.
+        """
+        self._beyond, self._patch = beyond, patch
+        self._shear_modulus = elasticity.shear_modulus
+        self.place, self._overlap = place, overlap
+        pitch, thickness = place.pitch, place.thickness
+        rows, columns = place.overlap.shape
+        ring = int(np.ceil(RING * min(rows, columns, thickness / pitch)))
+        shape = rows + 2 * ring, columns + 2 * ring
+        # Only the middle of either grid is loaded.
+        farthest = rows + ring - 1, columns + ring - 1
+        response = grid_response(shape, pitch, thickness, elasticity, farthest)
+        x0, y0 = place.x[0] - ring * pitch, place.y[0] - ring * pitch
+        self._around = GridArea(shape, x0, y0, pitch)
+        self._touching, self._pressure = pressure > 0.0, pressure
+        step = thickness / COARSE_POINTS
+        reach = DECAY * thickness
+        ends = [(g[0] - reach, g[-1] + reach) for g in (place.x, place.y)]
+        step = max(step, pitch, max(b - a for a, b in ends) / MAX_COARSE)
+        needed = [int(np.ceil((b - a) / step)) + 1 for a, b in ends]
+        counts = [COARSE_STEP * int(np.ceil(n / COARSE_STEP)) for n in needed]
+        coarse = binned(pressure, place, (ends[0][0], ends[1][0]), step, (counts[1], counts[0]))
+        border = int(reach / step) - 1  # squares in front of the first one that is loaded
+        farthest = counts[1] - 1 - border, counts[0] - 1 - border
+        wide = grid_response((counts[1], counts[0]), step, thickness, elasticity, farthest)
+        # What follows from these is computed when it is asked for: other contacts need the coarse
+        # grid only, and few calls need displacements along the skin.
+        self.shear: FloatArray | None = None
+        self._ring = ring
+        self._loads = (
+            (response, np.pad(pressure, ring), (x0, y0, pitch)),
+            (wide, coarse, (ends[0][0], ends[1][0], step)),
+        )
+
+    def at(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the displacement (mm) into the gel at points of the tangent plane, and its slopes
+        by x and y.
+
+        The slope jumps at the edge of a contact; inside, it equals that of the indenter.
+        """
+        result = np.zeros((3, len(x)))
+        near = self._around.holds(x, y)
+        reached = ~near & self._coarse.holds(x, y)
+        if near.any():
+            result[:, near] = self._fine.at(x[near], y[near])
+        if reached.any():
+            result[:, reached] = self._coarse.at_once(x[reached], y[reached])
+        inside = self.touching(x, y)
+        if inside.any():
+            column, row = (
+                (values[inside] - start) / self.place.pitch
+                for values, start in ((x, self.place.x[0]), (y, self.place.y[0]))
+            )
+            for k, slope in enumerate(self._indenter_slopes):
+                result[1 + k, inside] = map_coordinates(slope, [row, column], order=1)
+        if self._beyond is not None:
+            known = self._beyond.holds(x, y)
+            result[:, known] += self._beyond.at(x[known], y[known])
+        return result[0], result[1], result[2]
+
+    def depth(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the displacement (n,), mm, of points of the tangent plane into the gel."""
+        result = np.zeros(len(x))
+        near = self._around.holds(x, y)
+        reached = ~near & self._coarse.holds(x, y)
+        if near.any():
+            result[near] = self._fine.value(x[near], y[near])
+        if reached.any():
+            result[reached] = self._coarse.value(x[reached], y[reached])
+        if self._beyond is not None:
+            known = self._beyond.holds(x, y)
+            result[known] += self._beyond.value(x[known], y[known])
+        return result
+
+    def sideways(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the displacement (2, n), mm, of points of the tangent plane along x and y."""
+        result = np.zeros((2, len(x)))
+        (near, near_y), (far, far_y) = self._sideways_splines
+        close = near.holds(x, y)
+        reached = ~close & far.holds(x, y)
+        for where, splines in ((close, (near, near_y)), (reached, (far, far_y))):
+            if where.any():
+                for k, spline in enumerate(splines):
+                    result[k, where] = spline.value(x[where], y[where])
+        if self._patch is not None:
+            known = self._sideways_beyond[0].holds(x, y)
+            for k, spline in enumerate(self._sideways_beyond):
+                result[k, known] += spline.value(x[known], y[known])
+        return result
+
+    @cached_property
+    def _fine(self) -> GridSpline:
+        response, pressure, start = self._loads[0]
+        fine = response.normal(pressure)
+        inside = tuple(slice(self._ring, self._ring + n) for n in self._touching.shape)
+        fine[inside][self._touching] = self._overlap[self._touching]
+        return GridSpline(fine, *start)
+
+    @cached_property
+    def _coarse(self) -> GridSpline:
+        wide, coarse, start = self._loads[1]
+        return GridSpline(wide.normal(coarse), *start)
+
+    @cached_property
+    def _sideways_beyond(self) -> tuple[GridSpline, GridSpline]:
+        """Return the contribution of the gel's shape to displacements along x and y."""
+        assert self._patch is not None
+        shear = np.zeros((2, *self._pressure.shape)) if self.shear is None else self.shear
+        loads = np.concatenate([shear, self._pressure[None]])
+        return sideways_beyond(self._patch, loads, self.place, self._shear_modulus)
+
+    @cached_property
+    def _sideways_splines(self) -> list[tuple[GridSpline, GridSpline]]:
+        """Return splines of the displacements along x and along y on the fine and the coarse
+        grid.
+        """
+        found = []
+        shears: list[FloatArray | None] = [None, None]
+        if self.shear is not None:
+            _, (wide, _, start) = self._loads
+            shears[0] = np.pad(self.shear, ((0, 0), *((self._ring, self._ring),) * 2))
+            shears[1] = np.stack(
+                [binned(s, self.place, start[:2], start[2], wide.shape) for s in self.shear]
+            )
+        for (response, pressure, start), shear in zip(self._loads, shears, strict=True):
+            along_x, along_y, _ = response.displacement(pressure, shear)
+            found.append((GridSpline(along_x, *start), GridSpline(along_y, *start)))
+        return found
+
+    def pressure(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the pressure (n,), MPa, at points of the tangent plane."""
+        return self._between(self._pressure, x, y)
+
+    def penetration(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the depth (n,), mm, of points of the undeformed skin inside the indenter; 0
+        outside.
+        """
+        return self._between(np.maximum(self.place.overlap, 0.0), x, y)
+
+    def _between(self, values: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Interpolate values of the contact's grid linearly; 0 beside the grid."""
+        pitch = self.place.pitch
+        column, row = (x - self.place.x[0]) / pitch, (y - self.place.y[0]) / pitch
+        return np.asarray(map_coordinates(values, [row, column], order=1, mode="constant"))
+
+    @cached_property
+    def _indenter_slopes(self) -> tuple[FloatArray, FloatArray]:
+        """Return the slopes of the overlap by x and by y, (rows, columns) each.
+
+        Where an indenter ends in a steep wall, they are the slopes of the touching points beside
+        it.
+        """
+        known = np.where(self.place.overlap > NO_OVERLAP / 2, self._overlap, np.nan)
+        by_x, by_y = slopes(known, self.place.pitch)
+        return np.nan_to_num(by_x), np.nan_to_num(by_y)
+
+    @cached_property
+    def _bends(self) -> FloatArray:
+        """Return `Nearby.bend` on the contact's grid."""
+        found = np.zeros(self._touching.shape)
+        for slope in self._indenter_slopes:
+            for axis in (0, 1):
+                inner = [slice(1, -1) if k == axis else slice(None) for k in (0, 1)]
+                bend = np.abs(np.diff(slope, 2, axis=axis))
+                np.maximum(found[tuple(inner)], bend, out=found[tuple(inner)])
+        whole = binary_erosion(self._touching, np.ones((3, 3)))  # slopes jump at the rim
+        return np.asarray(maximum_filter(np.where(whole, found, 0.0), 2 * BEND_REACH + 1))
+
+    def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        """Return a mask of the points of the tangent plane that lie in the contact."""
+        rows, columns, inside = self._cells(x, y)
+        return inside & self._touching[rows, columns]
+
+    def nearby(self, x: FloatArray, y: FloatArray) -> Nearby:
+        """Return where points of the tangent plane lie in or beside the contact, and how smooth the
+        contact is there.
+        """
+        rows, columns, inside = self._cells(x, y)
+        away = self._away[rows, columns]
+        outside = ~inside
+        beyond = np.hypot(
+            x[outside] - self.place.x[columns[outside]], y[outside] - self.place.y[rows[outside]]
+        )
+        away[outside] += np.where(beyond > self.place.pitch, beyond, 0.0)
+        rim = np.maximum(away, self._depth[rows, columns])
+        return Nearby(away, rim, self._bends[rows, columns])
+
+    @cached_property
+    def _depth(self) -> FloatArray:
+        """Return the distance (rows, columns), mm, from points of the contact to the nearest point
+        outside it.
+        """
+        inside = distance_transform_edt(np.pad(self._touching, 1))[1:-1, 1:-1]
+        return np.asarray(inside) * self.place.pitch
+
+    @cached_property
+    def _away(self) -> FloatArray:
+        return np.asarray(distance_transform_edt(~self._touching)) * self.place.pitch
+
+    def _cells(
+        self, x: FloatArray, y: FloatArray
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+        """Return the nearest row and column of the pressure's grid, and whether each point lies on
+        the grid.
+        """
+        column = np.round((x - self.place.x[0]) / self.place.pitch).astype(np.int64)
+        row = np.round((y - self.place.y[0]) / self.place.pitch).astype(np.int64)
+        rows, columns = self._touching.shape
+        inside = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        return row.clip(0, rows - 1), column.clip(0, columns - 1), inside
+
+
+class GridArea:
+    """The area of a regular grid."""
+
+    def __init__(self, shape: tuple[int, ...], x0: float, y0: float, pitch: float) -> None:
+        """Set the number of rows and columns of points from (x0, y0) on, and their pitch (mm)."""
+        self._start, self._pitch, self._shape = (x0, y0), pitch, shape
+
+    def holds(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        """Return a mask of the points on the grid that are at least one grid point from its rim."""
+        column, row = self._place(x, y)
+        rows, columns = self._shape
+        return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
+
+    def _place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return (x - self._start[0]) / self._pitch, (y - self._start[1]) / self._pitch
+
+
+class GridSpline(GridArea):
+    """A cubic spline through values on a regular grid."""
+
+    def __init__(self, values: FloatArray, x0: float, y0: float, pitch: float) -> None:
+        """Fit the spline to values (rows, columns) at points from (x0, y0) on, with a pitch
+        (mm).
+        """
+        super().__init__(values.shape, x0, y0, pitch)
+        self._values = values
+        self._coefficients = spline_filter(values, order=3, mode="mirror")
+
+    def value(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the value (n,) at points."""
+        column, row = self._place(x, y)
+        return self._between(row, column)
+
+    def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return (3, n): the value, and its slopes by x and y from differences over one pitch."""
+        column, row = self._place(x, y)
+        half = 0.5
+        rows = np.concatenate([row, row, row, row - half, row + half])
+        columns = np.concatenate([column, column - half, column + half, column, column])
+        values = self._between(rows, columns).reshape(5, -1)
+        return np.stack(
+            [
+                values[0],
+                (values[2] - values[1]) / self._pitch,
+                (values[4] - values[3]) / self._pitch,
+            ]
+        )
+
+    def at_once(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return `at` with slopes that are linear between grid points; a third of the time."""
+        column, row = self._place(x, y)
+        by_y, by_x = self._slopes
+        return np.stack(
+            [
+                self._between(row, column),
+                map_coordinates(by_x, [row, column], order=1),
+                map_coordinates(by_y, [row, column], order=1),
+            ]
+        )
+
+    @cached_property
+    def _slopes(self) -> tuple[FloatArray, FloatArray]:
+        """Return the slopes (rows, columns) by y and by x at the grid points."""
+        by_y, by_x = np.gradient(self._values, self._pitch)
+        return np.asarray(by_y), np.asarray(by_x)
+
+    def _between(self, rows: FloatArray, columns: FloatArray) -> FloatArray:
+        return np.asarray(
+            map_coordinates(
+                self._coefficients, [rows, columns], order=3, mode="mirror", prefilter=False
+            )
+        )
+
+
+@lru_cache(maxsize=48)
+def grid_response(
+    shape: tuple[int, int],
+    pitch: float,
+    thickness: float,
+    elasticity: Elasticity,
+    farthest: tuple[int, int] | None = None,
+) -> GridResponse:
+    """Return the response of a grid; equal arguments share one object, which keeps its kernels (16
+    bytes per grid point).
+    """
+    return GridResponse(shape, pitch, thickness, elasticity, farthest)
+
+
+def binned(
+    pressure: FloatArray,
+    place: Footprint,
+    start: tuple[float, float],
+    step: float,
+    shape: tuple[int, int],
+) -> FloatArray:
+    """Return a pressure on a coarser grid with the same force and centre, distributed linearly."""
+    column = (place.x - start[0]) / step
+    row = (place.y - start[1]) / step
+    result = np.zeros(shape)
+    share = (place.pitch / step) ** 2
+    for up in (0, 1):
+        for right in (0, 1):
+            rows = np.floor(row).astype(np.int64) + up
+            columns = np.floor(column).astype(np.int64) + right
+            weight_y = np.abs(1 - up - (row - np.floor(row)))
+            weight_x = np.abs(1 - right - (column - np.floor(column)))
+            weights = weight_y[:, None] * weight_x[None, :]
+            np.add.at(result, np.ix_(rows, columns), share * weights * pressure)
+    return result
+
+
+def sideways_beyond(
+    patch: GelPatch, loads: FloatArray, place: Footprint, shear_modulus: float
+) -> tuple[GridSpline, GridSpline]:
+    """Return splines of the contribution (mm) of a gel's shape to displacements along x and y.
+
+    Args:
+        patch: the gel's shape.
+        loads: (3, rows, columns) loads (MPa) along x and y and into the gel.
+        place: the grid of the loads.
+        shear_modulus: shear modulus of the gel, MPa.
+    """
+    pitch, start = patch.columns.pitch, (patch.x[0], patch.y[0])
+    coarse = np.stack([binned(a, place, start, pitch, patch.shape) for a in loads])
+    along_x, along_y = patch.sideways(coarse * pitch**2 / shear_modulus)
+    return GridSpline(along_x, *start, pitch), GridSpline(along_y, *start, pitch)

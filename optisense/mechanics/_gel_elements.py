@@ -1,0 +1,199 @@
+"""Linear finite elements of the gel around a contact, whose stiffness matrix is factorised once."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ContactError
+from optisense.mechanics._gel_columns import LAYERS, GelColumns
+from optisense.mechanics._hexahedra import face_points, stiffnesses
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+AT_ONCE = 128
+"""Number of elements whose matrices are computed together; they fit in a processor's cache."""
+SIDES = ((0, 1, 1.0), (2, 3, -1.0), (0, 2, -1.0), (1, 3, 1.0))
+"""Corners of each side of a cell along its run, and the sign that makes run x up point outward."""
+OPPOSITE = ((2, 3), (0, 1), (1, 3), (0, 2))
+"""Corners of the opposite side of a cell, in the order of `SIDES`."""
+
+
+class GelElements:
+    """Hexahedra between columns of a gel, for a shear modulus of 1 MPa.
+
+    The base and the columns that are held are fixed; everything else is free.
+
+    Attributes:
+        rows, cols: (columns,) grid indices of each column.
+        top: (columns, 3) points of the skin, mm.
+        inward: (columns, 3) unit normals of the skin, into the gel.
+        fixed: (f, 3) nodes that are fixed, mm.
+        points: (faces, 4, 3) Gauss points of the skin and of the free sides, mm.
+        normals: (faces, 4, 3) outward normals there, times each point's share of the area.
+        supports: (s, 4, 3) Gauss points of the base and of the sides beyond which the gel
+            continues, mm.
+        support_normals: (s, 4, 3) outward normals there, times each point's share of the area.
+        size: number of free displacements.
+    """
+
+    def __init__(self, columns: GelColumns, poisson_ratio: float) -> None:
+        """Set up the elements between columns."""
+        self._nu = poisson_ratio
+        solid = columns.solid
+        # Neighbours along the shorter side get consecutive numbers, so that the matrix has a
+        # narrow band.
+        if solid.shape[0] < solid.shape[1]:
+            self.cols, self.rows = np.nonzero(solid.T)
+        else:
+            self.rows, self.cols = np.nonzero(solid)
+        count = len(self.rows)
+        number = np.full(solid.shape, -1)
+        number[self.rows, self.cols] = np.arange(count)
+        self.top = columns.top[self.rows, self.cols]
+        self.inward = columns.inward[self.rows, self.cols]
+        share = np.arange(LAYERS + 1) / LAYERS
+        length = columns.length[self.rows, self.cols]
+        down = share[None, :, None] * length[:, None, None] * self.inward[:, None]
+        self._nodes = (self.top[:, None] + down).reshape(-1, 3)
+        free = np.ones((count, LAYERS + 1), dtype=bool)
+        free[:, -1] = False
+        free[columns.held[self.rows, self.cols]] = False
+        self.size = 3 * int(free.sum())
+        self._freedom = np.full((free.size, 3), -1)
+        self._freedom[free.ravel()] = np.arange(self.size).reshape(-1, 3)
+        self._fixed = np.flatnonzero(~free.ravel())
+        self.fixed = self._nodes[self._fixed]
+        corners = np.stack(
+            [number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]], axis=2
+        )
+        self._cells = corners[columns.cells]
+        faces, signs, free_ones = self._outer_faces()
+        points, normals, self._weights = face_points(self._nodes[faces])
+        normals = normals * signs[:, None, None]
+        self._faces = faces[free_ones]
+        self.points, self.normals = points[free_ones], normals[free_ones]
+        self.supports, self.support_normals = points[~free_ones], normals[~free_ones]
+
+    @cached_property
+    def _elements(self) -> IntArray:
+        """Return the nodes (elements, 8) of each element: the lower four, then the upper four."""
+        base = self._cells[:, None, :] * (LAYERS + 1) + np.arange(LAYERS)[None, :, None]
+        return np.concatenate([base + 1, base], axis=2).reshape(-1, 8)
+
+    @cached_property
+    def _stiffness(self) -> FloatArray:
+        """Return the stiffness matrices (elements, 24, 24)."""
+        corners = self._nodes[self._elements]
+        found = np.empty((len(corners), 24, 24))
+        for first in range(0, len(corners), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            found[some] = stiffnesses(corners[some], self._nu)
+        return found
+
+    @cached_property
+    def _factor(self) -> FloatArray:
+        """Return the banded Cholesky factor (band, free) of the free displacements."""
+        from scipy.linalg import LinAlgError, cholesky_banded  # slow to import
+
+        freedom = self._freedom[self._elements].reshape(-1, 24)
+        least = np.where(freedom < 0, self.size, freedom).min(axis=1)
+        width = int(np.maximum(freedom.max(axis=1) - least, 0).max(initial=0)) + 1
+        band = np.zeros(self.size * width)
+        for first in range(0, len(freedom), AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            row, column = freedom[some, :, None], freedom[some, None, :]
+            lower = (row >= column) & (column >= 0)
+            place = (column * (width - 1) + row)[lower]
+            np.add.at(band, place, self._stiffness[some][lower])
+        try:
+            return np.asarray(
+                cholesky_banded(
+                    band.reshape(self.size, width).T,
+                    overwrite_ab=True,
+                    lower=True,
+                    check_finite=False,
+                )
+            )
+        except LinAlgError:
+            raise ContactError(
+                "the gel around a contact cannot be divided into elements",
+                hint="press elsewhere, or check the meshes of the skin and of the gel for folds",
+            ) from None
+
+    def moved(self, right_side: FloatArray) -> FloatArray:
+        """Return the displacements (columns, 3) of the skin by forces (free,); 0 for columns that
+        are fixed.
+
+        Raises:
+            ContactError: the elements are folded.
+        """
+        from scipy.linalg import cho_solve_banded
+
+        found = cho_solve_banded((self._factor, True), right_side, check_finite=False)
+        freedom = self._freedom.reshape(-1, LAYERS + 1, 3)[:, 0]
+        return np.where(freedom < 0, 0.0, found[freedom])
+
+    def held_back(self, displacement: FloatArray) -> FloatArray:
+        """Return the forces (free, sources) by which displacements (sources, f, 3) of the fixed
+        nodes pull at the free ones.
+        """
+        count = len(displacement)
+        given = np.zeros((len(self._freedom), 3, count))
+        given[self._fixed] = np.moveaxis(displacement, 0, -1)
+        freedom = self._freedom[self._elements].reshape(-1, 24)
+        some = (freedom < 0).any(axis=1)
+        forces = self._stiffness[some] @ given[self._elements[some]].reshape(-1, 24, count)
+        return self._summed(freedom[some], forces)
+
+    def pushed(self, push: FloatArray) -> FloatArray:
+        """Return the forces (free, sources) of tractions (sources, faces, 4, 3), times each point's
+        share of the area, at the Gauss points of free faces.
+        """
+        shared = np.einsum("sfgi,ga->fais", push, self._weights, optimize=True)
+        return self._summed(
+            self._freedom[self._faces].reshape(len(shared), 12),
+            shared.reshape(len(shared), 12, -1),
+        )
+
+    def _summed(self, freedom: IntArray, values: FloatArray) -> FloatArray:
+        """Add values (n, m, sources) of free displacements (n, m); -1 is left out."""
+        count = values.shape[-1]
+        free = freedom >= 0
+        place = freedom[free][:, None] * count + np.arange(count)
+        total = np.bincount(place.ravel(), values[free].ravel(), minlength=self.size * count)
+        return np.asarray(total.reshape(self.size, count))
+
+    def at_skin(self, columns: IntArray, force: FloatArray) -> FloatArray:
+        """Return the forces (free, sources) of forces (sources, 3), each at the skin's node of its
+        column; those at fixed nodes are left out.
+        """
+        result = np.zeros((self.size, len(columns)))
+        freedom = self._freedom.reshape(-1, LAYERS + 1, 3)[columns, 0]
+        free = freedom >= 0
+        result[freedom[free], np.nonzero(free)[0]] = force[free]
+        return result
+
+    def _outer_faces(self) -> tuple[IntArray, FloatArray, NDArray[np.bool_]]:
+        """Return the nodes (faces, 4) of all outer faces of the elements, the signs that turn their
+        normals outward, and a mask of those on the skin and on free sides.
+        """
+        cells, count = self._cells, len(self.top)
+        base = cells * (LAYERS + 1)
+        nodes = [base, base + LAYERS]
+        signs = [np.ones(len(cells)), -np.ones(len(cells))]
+        free = [np.ones(len(cells), dtype=bool), np.zeros(len(cells), dtype=bool)]
+        held = (self._freedom.reshape(-1, LAYERS + 1, 3)[:, 0, 0]) < 0
+        for (one, other, sign), (third, fourth) in zip(SIDES, OPPOSITE, strict=True):
+            ends = cells[:, one], cells[:, other]
+            beyond = cells[:, third] * count + cells[:, fourth]
+            outer = ~np.isin(ends[0] * count + ends[1], beyond)
+            run = np.stack(ends, axis=1)[outer]
+            base = run[:, None, :] * (LAYERS + 1) + np.arange(LAYERS)[None, :, None]
+            nodes.append(np.concatenate([base + 1, base], axis=2).reshape(-1, 4))
+            signs.append(np.full(len(nodes[-1]), sign))
+            free.append(np.repeat(~held[run].all(axis=1), LAYERS))
+        return np.concatenate(nodes), np.concatenate(signs), np.concatenate(free)

@@ -1,0 +1,113 @@
+"""Warnings about contacts beside the rim of a gel, where the computed force is inaccurate."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.design.parts import Role
+from optisense.geometry import TriangleMesh
+from optisense.geometry.surface import closest_points
+from optisense.mechanics._footprint import Footprint
+from optisense.mechanics._gel_columns import LEAST_UPRIGHT
+
+FloatArray = NDArray[np.float64]
+
+STEEP_RIM = 2.0
+"""Distance (mm) of a contact from skin that is too steep for elements, below which forces are not
+reliable: on DIGIT, the skin at the foot of its rim moves by 0.3 mm at 2.4 mm, where a real gel is
+held."""
+FREE_SIDE = 1.0
+"""Distance (mm) of the middle of a contact from a free side of the gel, below which the force is
+more than 3 % too small; measured with a ball of radius 1.5 mm on the pad of GelSight Mini."""
+TOO_SMALL = 22
+"""Largest error (%) of that force, at 0.2 mm from the side."""
+STEEP = "skin that is steeper than 60 degrees against it"
+"""Description of the skin for which there are no elements (`gel_columns.LEAST_UPRIGHT`)."""
+
+
+def rims_in_words(design: SensorDesign) -> str:
+    """Describe where forces of contacts on a design's skin are inaccurate; empty if nowhere."""
+    meshes = design.deformed_meshes()
+    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
+    return Rims(TriangleMesh.joined(skins).welded()).in_words() if skins else ""
+
+
+class Rims:
+    """The places of a sensing surface beside which forces are inaccurate."""
+
+    def __init__(self, skin: TriangleMesh) -> None:
+        """Set the sensing surface, mm; its faces share vertices."""
+        self._skin = skin
+
+    def warning(self, place: Footprint) -> str:
+        """Return a sentence about the error of a contact's force; empty if there is none."""
+        at = "the contact at ({:.2f}, {:.2f}, {:.2f}) mm".format(*place.origin)
+        upright = -(self._skin.face_normals @ place.axes[:, 2])
+        steep = self._distance(np.flatnonzero(upright < LEAST_UPRIGHT), place.origin, STEEP_RIM)
+        if steep < STEEP_RIM:
+            return (
+                f"{at} is {steep:.1f} mm from {STEEP}; within {STEEP_RIM:g} mm of such a rim, "
+                "forces are not reliable"
+            )
+        side = _distance_from_edges(place.origin, self._border)
+        if side < FREE_SIDE:
+            return (
+                f"{at} is {side:.1f} mm from the side of the gel; within {FREE_SIDE:g} mm of it, "
+                f"forces are up to {TOO_SMALL} % too small"
+            )
+        return ""
+
+    def in_words(self) -> str:
+        """Describe where forces of contacts are inaccurate; empty if the skin has no rim."""
+        if self._has_steep_rim():
+            return f"forces within {STEEP_RIM:g} mm of the steep rim of the gel are not reliable"
+        if len(self._border):
+            return (
+                f"forces within {FREE_SIDE:g} mm of the side of the gel are up to {TOO_SMALL} % "
+                "too small"
+            )
+        return ""
+
+    def _has_steep_rim(self) -> bool:
+        """Return whether skin is steep against other skin that is less than `STEEP_RIM` away."""
+        from scipy.spatial import cKDTree  # slow to import
+
+        middles, normals = self._skin.triangles.mean(axis=1), self._skin.face_normals
+        # Fine meshes have far more pairs of faces than are needed: one face is enough for each
+        # quarter of the distance and each direction.
+        alike = np.round(np.hstack([middles * (4.0 / STEEP_RIM), normals * 4.0]))
+        _, some = np.unique(alike, axis=0, return_index=True)
+        middles, normals = middles[some], normals[some]
+        pairs = cKDTree(middles).query_pairs(STEEP_RIM, output_type="ndarray")
+        cosines = np.einsum("pi,pi->p", normals[pairs[:, 0]], normals[pairs[:, 1]])
+        return bool((cosines < LEAST_UPRIGHT).any())
+
+    def _distance(self, faces: NDArray[np.int64], point: FloatArray, most: float) -> float:
+        """Return the distance (mm) of a point from some faces; infinite if it is above ``most``."""
+        middle, square = self._skin.face_spheres
+        away = np.linalg.norm(middle[faces] - point, axis=1) - np.sqrt(square[faces])
+        near = faces[away < most]
+        if not len(near):
+            return np.inf
+        found = closest_points(TriangleMesh(self._skin.vertices, self._skin.faces[near]), point)
+        return float(np.nanmin(np.linalg.norm(found - point, axis=1)))
+
+    @cached_property
+    def _border(self) -> FloatArray:
+        """Return the ends (n, 2, 3) of the edges of single faces, mm."""
+        return np.asarray(self._skin.vertices[self._skin.open_edges], dtype=np.float64)
+
+
+def _distance_from_edges(point: FloatArray, edges: FloatArray) -> float:
+    """Return the distance (mm) of a point from the nearest of edges (n, 2, 3); infinite if there
+    are none.
+    """
+    way = edges[:, 1] - edges[:, 0]
+    square = np.maximum(np.einsum("ni,ni->n", way, way), np.finfo(float).tiny)
+    share = np.clip(np.einsum("ni,ni->n", point - edges[:, 0], way) / square, 0.0, 1.0)
+    apart = np.linalg.norm(edges[:, 0] + share[:, None] * way - point, axis=1)
+    return float(apart.min(initial=np.inf))

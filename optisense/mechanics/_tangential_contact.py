@@ -1,0 +1,108 @@
+"""Shear between an indenter that is dragged or turned and an elastic layer, with friction."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.errors import ContactError
+from optisense.mechanics._convolution import GridResponse
+
+FloatArray = NDArray[np.float64]
+
+TOLERANCE = 1e-4
+"""Relative change of the shear in a step at which the iteration ends."""
+MAX_ITERATIONS = 1000
+"""Number of iterations after which the solver fails; contacts of 64 points across take 50 to
+150."""
+
+
+class Drag(NamedTuple):
+    """The motion of an indenter along the skin after it was pressed in.
+
+    Attributes:
+        shift: (2,) translation along x and y of the tangent plane, mm.
+        twist: rotation (radians) about the outward normal, counter-clockwise seen from outside.
+    """
+
+    shift: FloatArray
+    twist: float
+
+    def displacement(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the displacement (2, rows, columns), mm, of sticking skin at x (columns,) and y
+        (rows,).
+        """
+        across, along = np.meshgrid(x, y)
+        cosine, sine = np.cos(self.twist), np.sin(self.twist)
+        return np.stack(
+            [
+                self.shift[0] + across - (cosine * across + sine * along),
+                self.shift[1] + along - (cosine * along - sine * across),
+            ]
+        )
+
+
+def solve_shear(
+    response: GridResponse,
+    pressure: FloatArray,
+    friction: float,
+    wanted: FloatArray,
+    start: FloatArray | None = None,
+) -> FloatArray:
+    """Solve for the shear on a skin that sticks to an indenter where friction suffices, and slips
+    elsewhere.
+
+    The shear is nowhere larger than friction times pressure. Where it is smaller, the skin has
+    moved with the indenter; where it is equal, the skin has moved less, and the shear points along
+    the difference. This minimises a convex energy; the method is an accelerated projected gradient
+    (Beck and Teboulle, SIAM J. Imaging Sci. 2, 2009) with restarts. The effect of shear on the
+    pressure is neglected, as usual; it vanishes for an incompressible half-space.
+
+    Args:
+        response: the response of the layer on the grid.
+        pressure: (rows, columns) pressure, MPa.
+        friction: coefficient of friction.
+        wanted: (2, rows, columns) displacement of the indenter along x and y, mm.
+        start: (2, rows, columns) initial shear, MPa.
+
+    Returns:
+        The shear (2, rows, columns), MPa, on the skin.
+
+    Raises:
+        ContactError: the iteration does not converge.
+    """
+    limit = friction * pressure
+    shear = np.zeros_like(wanted)
+    if not limit.any() or not wanted.any():
+        return shear
+    if start is not None:
+        shear = _within(start, limit)
+    step = 1.0 / response.largest_sideways()
+    ahead, momentum = shear, 1.0
+    for _ in range(MAX_ITERATIONS):
+        slope = response.sideways(ahead) - wanted
+        found = _within(ahead - step * slope, limit)
+        change = found - shear
+        if ((ahead - found) * change).sum() > 0.0:  # the momentum points uphill: restart
+            ahead, momentum = shear, 1.0
+            continue
+        after = 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * momentum**2))
+        ahead = found + (momentum - 1.0) / after * change
+        momentum, shear = after, found
+        if np.linalg.norm(change) <= TOLERANCE * np.linalg.norm(shear):
+            return shear
+    rest = float(np.linalg.norm(change) / np.linalg.norm(shear))
+    raise ContactError(
+        f"the shear under an indenter is not found in {MAX_ITERATIONS} iterations; its last change "
+        f"was {100 * rest:.2g} %",
+        hint="shift or turn the indenter less, or check its shape for spikes",
+    )
+
+
+def _within(shear: FloatArray, limit: FloatArray) -> FloatArray:
+    """Return shear (2, rows, columns), limited in length to ``limit`` (rows, columns)."""
+    size = np.hypot(shear[0], shear[1])
+    factor = np.divide(limit, size, out=np.ones_like(size), where=size > limit)
+    return np.asarray(shear * factor)

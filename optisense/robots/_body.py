@@ -1,0 +1,321 @@
+"""A sensor as a rigid body: its meshes, mass, inertia and frames, in metres and kilograms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from optisense.design import Role, SensorDesign
+from optisense.design.looks import ROLE_LOOKS
+from optisense.design.projection import image_edges
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.common_space import as_manifold
+from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
+from optisense.robots._densities import density_of
+from optisense.workshop.export import file_name
+from optisense.workshop.shapes import Shape, is_air, shapes
+
+FloatArray = NDArray[np.float64]
+
+METRES = 1e-3
+"""Length of one mm, m: robot files are in metres, designs in mm."""
+KILOGRAMS = 1e-6
+"""Mass of one mm^3 of a density of 1 g/cm^3, kg."""
+USUAL_FRICTION = 1.0
+"""Friction of a gel whose material gives none: that of the library's silicones."""
+WIDEST_PINHOLE = 170.0
+"""Largest vertical angle (degrees) of the pinhole camera that stands for a fisheye: a pinhole sees
+less than 180 degrees, and near it only the rim of its picture."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Pose in the frame of the sensor.
+
+    Attributes:
+        origin: (3,) m.
+        axes: (3, 3) unit vectors x, y and z, as columns.
+    """
+
+    origin: FloatArray
+    axes: FloatArray
+
+
+@dataclass(frozen=True)
+class BodyMesh:
+    """Mesh of a part.
+
+    Attributes:
+        name: name, also of its file.
+        mesh: mesh in the frame of the sensor, m.
+        colour: R, G, B and opacity, 0 to 1.
+        is_closed: whether it encloses a volume.
+        is_gel: whether it is of an elastomer.
+    """
+
+    name: str
+    mesh: TriangleMesh
+    colour: tuple[float, float, float, float]
+    is_closed: bool
+    is_gel: bool
+
+
+@dataclass(frozen=True)
+class SensorBody:
+    """Sensor as a rigid body, in the frame of the design but in metres.
+
+    Attributes:
+        name: name of the design, of letters, digits, '-' and '_'.
+        looks: meshes to be shown.
+        hulls: convex meshes for contacts.
+        mass: kg.
+        centre: (3,) centre of mass, m.
+        inertia: (3, 3) about the centre of mass along the axes of the frame, kg m^2.
+        camera: pose of the camera: x to the right and y down in the picture, z where it looks.
+        camera_angle: vertical angle of view of a pinhole camera, degrees.
+        resolution: width and height of the picture, pixels.
+        skin: pose of the skin: the origin is its point next to its centroid, z points out of the
+            sensor and x as near to the right of the picture as it can.
+        skin_box: middle and half the sides of a box around the skin, in the skin's frame, m.
+        friction: friction of the gel.
+        notes: what a user must know, one sentence each.
+    """
+
+    name: str
+    looks: list[BodyMesh]
+    hulls: list[BodyMesh]
+    mass: float
+    centre: FloatArray
+    inertia: FloatArray
+    camera: Frame
+    camera_angle: float
+    resolution: tuple[int, int]
+    skin: Frame
+    skin_box: tuple[FloatArray, FloatArray]
+    friction: float
+    notes: list[str] = field(default_factory=list)
+
+
+def sensor_body(
+    design: SensorDesign,
+    *,
+    mass: float | None = None,
+    densities: Mapping[str, float] | None = None,
+) -> SensorBody:
+    """Return a design as a rigid body.
+
+    Solids that overlap are cut out of each other as in the simulation: opaque parts out of
+    transparent ones, and those of higher priority out of others.
+
+    Args:
+        design: the design.
+        mass: mass of the whole sensor (g), such as a real one weighs; masses of parts are scaled to
+            it. Without it the mass is that of the parts.
+        densities: densities (g/cm^3) of parts by name; the others have those of
+            `optisense.robots._densities`.
+
+    Raises:
+        DesignError: a part has no mesh or lies outside of its cage; nothing of the sensor is solid;
+            there is no sensing surface; a mass or density is not above 0; or a density is of no
+            solid part.
+    """
+    made = shapes(design)
+    skin = next((each.mesh for each in made if each.role is Role.SENSING_SURFACE), None)
+    if skin is None:
+        raise DesignError("the design has no sensing surface", where=design.where("parts"))
+    solids = [each for each in made if each.is_solid]
+    given = dict(densities or {})
+    _check(design, solids, mass, given)
+    notes: list[str] = []
+    real = _without_overlaps(design, solids)
+    masses = [given.get(each.name, density_of(each)) * KILOGRAMS for each in solids]
+    total, centre, inertia = mass_properties([real[each.name] for each in solids], masses)
+    if mass is None:
+        of = ", ".join(f"{s.name} {m / KILOGRAMS:g}" for s, m in zip(solids, masses, strict=True))
+        notes.append(
+            f"the mass is {1e3 * total:.3g} g by densities in g/cm^3 ({of}), without the camera, "
+            "boards and screws; you can give what a real sensor weighs"
+        )
+    else:
+        inertia *= 1e-3 * mass / total
+        total = 1e-3 * mass
+    hulls = _hulls(solids, real, skin, notes)
+    camera = design.camera
+    right, up, forward = camera.axes()
+    skin_frame = _skin_frame(skin, right, up)
+    local = METRES * skin.vertices @ skin_frame.axes - skin_frame.origin @ skin_frame.axes
+    low, high = local.min(axis=0), local.max(axis=0)
+    _tell_of_camera(design, notes)
+    return SensorBody(
+        name=file_name(design.name),
+        looks=[_body_mesh(each.name, each.mesh, each) for each in made],
+        hulls=hulls,
+        mass=total,
+        centre=centre,
+        inertia=inertia,
+        camera=Frame(METRES * np.array(camera.position), np.stack([right, -up, forward], axis=1)),
+        camera_angle=_vertical_angle(design),
+        resolution=camera.resolution,
+        skin=skin_frame,
+        skin_box=((low + high) / 2.0, (high - low) / 2.0),
+        friction=_friction(design),
+        notes=notes,
+    )
+
+
+def _check(
+    design: SensorDesign, solids: list[Shape], mass: float | None, densities: dict[str, float]
+) -> None:
+    names = [each.name for each in solids]
+    if not names:
+        raise DesignError("no part of the design is solid", where=design.where("parts"))
+    for name in densities:
+        if name not in names:
+            raise DesignError(
+                f"there is no solid part '{name}' to have a density",
+                hint=f"The solid parts are {', '.join(names)}",
+            )
+    numbers = {f"the density of '{name}'": value for name, value in densities.items()}
+    if mass is not None:
+        numbers["the mass"] = mass
+    for what, value in numbers.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise DesignError(f"{what} is {value:g}", hint="Give a number above 0")
+
+
+def _without_overlaps(design: SensorDesign, solids: list[Shape]) -> dict[str, Any]:
+    """Return the space that each solid keeps, as manifolds by name."""
+    transparent = (Role.ELASTOMER, Role.SUPPORT)
+
+    def rank(name: str) -> tuple[bool, int]:
+        part = design.parts[name]
+        return part.role not in transparent, part.priority
+
+    bodies = {each.name: as_manifold(each.mesh) for each in solids}
+    meshes = design.deformed_meshes()
+    air = [name for name in design.parts if is_air(design, name) and meshes[name].is_closed]
+    bodies |= {name: as_manifold(meshes[name]) for name in air}
+    kept, taken = {}, None
+    for name in sorted(bodies, key=rank, reverse=True):
+        body = bodies[name]
+        kept[name] = body if taken is None else body - taken
+        taken = body if taken is None else taken + body
+    return kept
+
+
+def mass_properties(
+    bodies: list[Any], densities: list[float]
+) -> tuple[float, FloatArray, FloatArray]:
+    """Return the mass (kg), the centre (3,), m, and the inertia (3, 3), kg m^2, about it."""
+    total, moment, about_origin = 0.0, np.zeros(3), np.zeros((3, 3))
+    for body, density in zip(bodies, densities, strict=True):
+        mesh = body.to_mesh64()
+        a, b, c = np.moveaxis(
+            np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts)], 1, 0
+        )
+        # Each triangle and the origin span a tetrahedron, whose moments have closed forms.
+        volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
+        corners = np.stack([a, b, c], axis=1)
+        middle = corners.sum(axis=1)
+        total += density * float(volume.sum())
+        moment += density * METRES * (volume[:, None] * middle).sum(axis=0) / 4.0
+        squares = np.einsum("t,tci,tcj->ij", volume, corners, corners)
+        squares = (squares + np.einsum("t,ti,tj->ij", volume, middle, middle)) / 20.0
+        about_origin += density * METRES**2 * (np.trace(squares) * np.eye(3) - squares)
+    centre = moment / total
+    shift = total * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    return total, centre, about_origin - shift
+
+
+def _hulls(
+    solids: list[Shape], real: dict[str, Any], skin: TriangleMesh, notes: list[str]
+) -> list[BodyMesh]:
+    """Return the convex bodies for contacts."""
+    found: list[BodyMesh] = []
+    for shape in solids:
+        is_gel = shape.role is Role.ELASTOMER
+        if is_gel:
+            hulls, left_out = gel_hulls(real[shape.name], skin.vertices), False
+        else:
+            hulls, left_out = free_hulls(real[shape.name], skin.vertices)
+        if left_out:
+            notes.append(
+                f"a piece of {shape.name} takes no part in contacts, as its convex hull would "
+                "cover the skin"
+            )
+        off = 0.0
+        for number, hull in enumerate(hulls, start=1):
+            mesh = hull.to_mesh64()
+            vertices = np.asarray(mesh.vert_properties)[:, :3]
+            if is_gel:
+                off = max(off, float(depth_in(skin.vertices, ConvexHull(vertices)).max()))
+            found.append(
+                _body_mesh(
+                    f"{shape.name}-hull{f'-{number}' if len(hulls) > 1 else ''}",
+                    TriangleMesh(vertices, np.asarray(mesh.tri_verts).astype(np.int32)),
+                    shape,
+                )
+            )
+        if off > COVERED:
+            notes.append(f"the convex hulls of {shape.name} stand up to {off:.2g} mm off the skin")
+    return found
+
+
+def _body_mesh(name: str, mesh: TriangleMesh, shape: Shape) -> BodyMesh:
+    text, opacity = ROLE_LOOKS[shape.role.value]
+    red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    return BodyMesh(
+        name,
+        TriangleMesh(METRES * mesh.vertices, mesh.faces),
+        (red, green, blue, opacity),
+        shape.is_solid,
+        shape.role is Role.ELASTOMER,
+    )
+
+
+def _skin_frame(skin: TriangleMesh, right: FloatArray, up: FloatArray) -> Frame:
+    """Return the pose of the skin at its point next to its centroid."""
+    import trimesh
+
+    areas = np.linalg.norm(skin.face_vectors, axis=1)
+    centroid = (areas[:, None] * skin.triangles.mean(axis=1)).sum(axis=0) / areas.sum()
+    surface = trimesh.Trimesh(skin.vertices, skin.faces, process=False)
+    proximity: Any = trimesh.proximity  # without types
+    nearest, _, face = proximity.closest_point_naive(surface, centroid[None])
+    # Faces of the sensing surface are wound so that their normals point into the sensor.
+    z = -skin.face_normals[int(face[0])]
+    across = right if abs(right @ z) < 0.9 else up
+    x = across - (across @ z) * z
+    x /= np.linalg.norm(x)
+    return Frame(METRES * nearest[0], np.stack([x, np.cross(z, x), z], axis=1))
+
+
+def _vertical_angle(design: SensorDesign) -> float:
+    """Return the vertical angle of view of the pinhole camera, degrees."""
+    high = image_edges(design.camera)[1]
+    angle = 2.0 * (high if design.camera.projection == "equidistant" else np.arctan(high))
+    return float(min(np.degrees(angle), WIDEST_PINHOLE))
+
+
+def _tell_of_camera(design: SensorDesign, notes: list[str]) -> None:
+    """Say what a pinhole camera in a robot simulator leaves out."""
+    if design.camera.projection == "equidistant":
+        notes.append("the camera is a fisheye, and a simulator's camera is a pinhole")
+    if design.parts_of(Role.MIRROR):
+        notes.append("the camera looks by way of mirrors, which a simulator's camera does not")
+
+
+def _friction(design: SensorDesign) -> float:
+    """Return the friction of the first elastomer whose material gives one."""
+    for name in design.parts_of(Role.ELASTOMER):
+        material = design.materials.get(design.parts[name].material or "")
+        elasticity = getattr(material, "elasticity", None)
+        if elasticity is not None:
+            return float(elasticity.friction)
+    return USUAL_FRICTION

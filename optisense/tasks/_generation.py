@@ -1,0 +1,397 @@
+"""Generation of datasets: random contacts, rendered and labelled one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import asdict, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import load_design
+from optisense.design.storage import files_of
+from optisense.errors import ContactError, TaskError
+from optisense.folders import LOCK_FILE, FolderLock, held
+from optisense.geometry import Contact, Indenter
+from optisense.library import with_own_lights
+from optisense.mechanics import CONFORMING
+from optisense.optics.estimators import current_name
+from optisense.picture_files import write_picture
+from optisense.reading.camera_noise import add_camera_noise
+from optisense.reading.untouched import UntouchedSurface
+from optisense.sensors import save_design
+from optisense.tasks._camera_model import camera_model, ray_arrays
+from optisense.tasks._dataset_settings import DatasetSettings
+from optisense.tasks._digests import design_values, file_digest, mesh_digests
+from optisense.tasks._draws import DrawnContact, Places, is_cut, keeps_margin
+from optisense.tasks._records import CsvTable, refuse_differences, write_whole
+from optisense.tasks._splits import split_of
+from optisense.tasks.dataset import BACKGROUND, CAMERA, DESIGN, Dataset
+from optisense.tasks.dataset_tables import (
+    FAILURES,
+    INFO,
+    LABELS,
+    NUMBER_COLUMNS,
+    SCHEMA_VERSION,
+    columns_of,
+    read_failures,
+    read_info,
+    read_labels,
+)
+from optisense.writing import inside, write_json, written_whole
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, TactileImage
+
+ATTEMPTS = 50
+"""Number of contacts drawn for one sample before it is recorded as failed. A plate of 8 mm with a
+random rotation keeps clear of a GelSight Mini's edge in one draw of six, so that one sample in
+10,000 fails; a rejected draw takes chief rays but no rendering."""
+
+LEAST_PIXELS = 4
+"""Number of pixels below which a contact counts as unseen."""
+
+_CONTACT, _CAMERA, _SENSOR = 1, 2, 8
+"""Numbers that are hashed with the seed, one for each kind of random draw, so that the draws are
+independent. They are unique among the modules of this package."""
+
+
+def generate(
+    model: OpticalModel,
+    folder: str | Path,
+    count: int,
+    settings: DatasetSettings | None = None,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    mend: bool = False,
+) -> Dataset:
+    """Generate a dataset of `count` samples, or continue one until it has that many.
+
+    Args:
+        model: the sensor.
+        folder: folder of the dataset, created if needed; nothing is written outside it.
+        count: total number of samples.
+        settings: settings of the samples; the defaults if None.
+        progress: function that is called with the number of finished samples and `count`, first
+            with the existing samples.
+        mend: whether all existing samples are read, and those with missing or damaged files are
+            generated again with the same content.
+
+    Returns:
+        The dataset. Contacts that could not be made are among its failures.
+
+    Raises:
+        TaskError: the folder holds a dataset with other settings.
+        FolderInUseError: another process is writing to the folder.
+        ContactError, MeshError: an indenter cannot be read.
+        OutputError: the folder holds something else, or a file cannot be written.
+        KeyboardInterrupt: Ctrl-C was pressed; finished samples are kept, and a further call
+            continues.
+    """
+    if count < 1:
+        raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")
+    chosen = settings or DatasetSettings()
+    with held(folder) as lock, closing(_Maker(model, Path(folder), chosen, lock)) as maker:
+        whole = maker.undamaged() if mend else maker.done()
+        missing = [index for index in range(count) if index not in whole]
+        for number, index in enumerate(missing):
+            if progress is not None:
+                progress(count - len(missing) + number, count)
+            maker.make(index)
+        if progress is not None:
+            progress(count, count)
+    return Dataset.load(folder)
+
+
+def _too_small(resolution: tuple[int, int]) -> str:
+    """Return the reason to record for a contact of fewer pixels than a sample needs."""
+    width, height = resolution
+    return (
+        f"fewer than {LEAST_PIXELS} pixels of {width}x{height} show the contact: raise the "
+        "resolution, or press deeper or with something larger"
+    )
+
+
+class _Maker:
+    """The generation of one dataset."""
+
+    def __init__(
+        self, model: OpticalModel, folder: Path, settings: DatasetSettings, lock: FolderLock
+    ) -> None:
+        self._model = model
+        self._folder = folder
+        self._settings = settings
+        self._indenters = settings.contacts.parsed()
+        for indenter in self._indenters.values():
+            indenter.mesh(1.0)  # reads mesh files, so that errors are reported before any work
+        width, height = settings.resolution or model.design.camera.resolution
+        self._resolution = int(width), int(height)
+        self._exposure = self._exposure_of_all(lock)
+        rays = model.chief_rays(self._resolution)
+        self._untouched = UntouchedSurface.of(rays)
+        if not (folder / CAMERA).exists():  # release 0.1 wrote no such file
+            self._write_arrays(CAMERA, ray_arrays(rays))
+        self._places = Places.of(model)
+        self._larger_than_view = {
+            text for text, each in self._indenters.items() if not self._fits(each)
+        }
+        self._labels = CsvTable(folder / LABELS, columns_of(folder))
+        self._failures = CsvTable(folder / FAILURES, ("index", "reason"))
+        self._labelled = {row["index"] for row in read_labels(folder)}
+        self._failed = {int(row["index"]) for row in read_failures(folder)}
+
+    def done(self) -> set[int]:
+        """Return the indices of finished and of failed samples."""
+        return self._labelled | self._failed
+
+    def undamaged(self) -> set[int]:
+        """Return the indices of `done` except samples with damaged files; restore a damaged
+        background.
+        """
+        dataset = Dataset.load(self._folder)
+        try:
+            dataset.background()
+        except TaskError:
+            self._write_background(self._image(), self._exposure)
+        try:
+            dataset.camera_rays()
+        except TaskError:
+            self._write_arrays(CAMERA, ray_arrays(self._model.chief_rays(self._resolution)))
+        damaged = set()
+        for number, labels in enumerate(dataset.labels):
+            try:
+                dataset[number]
+            except TaskError:
+                damaged.add(labels["index"])
+        return self.done() - damaged
+
+    def close(self) -> None:
+        """Close the tables."""
+        self._labels.close()
+        self._failures.close()
+
+    def make(self, index: int) -> None:
+        """Generate one sample, or record why it cannot be generated."""
+        reason = ""
+        for attempt in range(ATTEMPTS):
+            rng = np.random.default_rng([self._settings.seed, index, _CONTACT, attempt])
+            drawn = self._settings.contacts.draw(self._indenters, self._places, rng)
+            try:
+                reason = self._why_not(drawn)
+            except ContactError as error:
+                reason = error.message
+            if reason:
+                continue
+            image = self._image(drawn.contact)
+            if image.contact_mask.sum() >= LEAST_PIXELS:
+                self._write(index, attempt, drawn, image)
+                return
+            reason = _too_small(self._resolution)
+        self._failures.add({"index": index, "reason": reason})
+
+    def _why_not(self, drawn: DrawnContact) -> str:
+        """Return the reason why a contact makes no sample, from its chief rays; empty if it makes
+        one.
+
+        Raises:
+            ContactError: the contact cannot be pressed in there.
+        """
+        mask = self._touched(drawn.contact)
+        if mask.sum() < LEAST_PIXELS:
+            return _too_small(self._resolution)
+        margin = self._settings.contacts.margin
+        if drawn.indenter not in self._larger_than_view and not keeps_margin(mask, margin):
+            return "the picture's edge cuts the contact, or is too near to it"
+        return ""
+
+    def _touched(self, contact: Contact) -> NDArray[np.bool_]:
+        """Return the mask (h, w) of the pixels that see a contact."""
+        rays = self._model.chief_rays(self._resolution, [contact], self._settings.skin)
+        return rays.contact_mask
+
+    def _fits(self, indenter: Indenter) -> bool:
+        """Return whether the view contains an indenter with its margin, pressed upright in the
+        middle.
+
+        The picture's edge cuts a larger indenter at every place.
+        """
+        draw = self._settings.contacts
+        x, y, z = self._places.middle.tolist()
+        contact = Contact(indenter, point=(x, y, z), depth=draw.depth[1], rotation=draw.rotation[0])
+        try:
+            mask = self._touched(contact)
+        except ContactError:
+            return True  # each draw reports the reason
+        return keeps_margin(mask, draw.margin)
+
+    def _exposure_of_all(self, lock: FolderLock) -> float:
+        """Check or write the data common to all samples; return the exposure."""
+        info_file = self._folder / INFO
+        before = read_info(self._folder) if info_file.exists() else None
+        if before is not None and "skin" not in before["settings"]:
+            # Release 0.1 had the conforming skin only; its datasets are continued with it.
+            self._settings = replace(self._settings, skin=CONFORMING)
+        common = self._common()
+        if before is not None:
+            kept = before["settings"]  # release 0.1 had no margin and other estimator names
+            kept["contacts"].setdefault("margin", 0.0)
+            kept["estimator"] = current_name(kept["estimator"])
+            kept.setdefault("skin", CONFORMING)
+            kept.setdefault("hold_out", [])
+            known = {key: before.get(key) for key in common}
+            known["design"] = design_values(load_design(self._folder / DESIGN))
+            now = common | {"design": design_values(with_own_lights(self._model.design))}
+            refuse_differences("a dataset", self._folder, known, now)
+            return float(before["exposure"])
+        lock.check_empty()
+        design = with_own_lights(self._model.design)
+        inner = [f"{DESIGN}/{file}" for file in (*files_of(design), LOCK_FILE)]
+        lock.will_make([*inner, BACKGROUND, CAMERA, INFO])
+        try:
+            exposure = self._begin(common)
+        except BaseException:
+            lock.undo()
+            raise
+        lock.is_whole()
+        return exposure
+
+    def _begin(self, common: dict[str, Any]) -> float:
+        """Write the data common to all samples; return the exposure."""
+        image = self._image()
+        asked = self._settings.exposure
+        exposure = float(image.auto_exposure() if asked == "auto" else asked)
+        save_design(self._model.design, self._folder / DESIGN)
+        self._write_background(image, exposure)
+        rays = self._model.chief_rays(self._resolution)
+        self._write_arrays(CAMERA, ray_arrays(rays))
+        info = {
+            "schema_version": SCHEMA_VERSION,
+            **common,
+            "exposure": exposure,
+            "versions": image.settings["versions"],
+            "units": {"length": "mm", "angle": "degrees", "radiance": "mW/(mm^2 sr)"},
+            "columns": NUMBER_COLUMNS,
+            "camera": camera_model(self._model.design.camera, rays),
+        }
+        write_json(self._folder / INFO, info, "the dataset")  # last: makes the folder a dataset
+        return exposure
+
+    def _image(self, *contacts: Contact) -> TactileImage:
+        return self._model.render(
+            contacts,
+            resolution=self._resolution,
+            photons=self._settings.photons,
+            seed=self._settings.seed,
+            estimator=self._settings.estimator,
+            skin=self._settings.skin,
+            partial=False,
+        )
+
+    def _write_background(self, image: TactileImage, exposure: float) -> None:
+        arrays = {
+            "image": image.without_noise().picture(exposure),
+            "points": image.points,
+            "normals": image.normals,
+        }
+        self._write_arrays(BACKGROUND, arrays)
+
+    def _write_arrays(self, name: str, arrays: dict[str, Any]) -> None:
+        with written_whole(self._folder / name, "the dataset") as temporary:
+            _save_arrays(arrays, temporary)
+
+    def _common(self) -> dict[str, Any]:
+        """Return the values that all samples share and that must not change when a dataset is
+        continued.
+        """
+        from optisense.optics.backend.versions import versions
+
+        values = asdict(self._settings)
+        values["resolution"] = self._resolution
+        made_with = versions(self._model.variant)
+        return {
+            "design_name": self._model.design.name,
+            "made_with": {name: made_with[name] for name in ("optisense", "mitsuba")},
+            "settings": values,
+            "mesh_files": {
+                text: file_digest(Path(str(indenter.source)))
+                for text, indenter in self._indenters.items()
+                if hasattr(indenter, "source")
+            },
+            "meshes": mesh_digests(self._model.design),
+        }
+
+    def _write(self, index: int, attempt: int, drawn: DrawnContact, image: TactileImage) -> None:
+        settings = self._settings
+        name = f"{index:06d}"
+        picture = add_camera_noise(
+            image.picture(self._exposure, (settings.seed, index, _SENSOR)),
+            settings.camera_noise,
+            [settings.seed, index, _CAMERA],
+        )
+        depth = self._untouched.image_depth(image)
+        arrays = {
+            "depth": depth,
+            "normals": image.normals,
+            "mask": image.contact_mask,
+            "points": np.where(np.isnan(depth)[..., None], np.nan, image.points),
+        }
+        force = {"force": "", "area": "", "pressure": ""}
+        maps = image.skin_maps()
+        if maps is not None:
+            named = {name: values.astype(np.float32) for name, values in maps._asdict().items()}
+            arrays |= named
+            press = image.settings["presses"][0]
+            of_press = press["force_n"], press["area_mm2"], press["greatest_pressure_mpa"]
+            force = dict(zip(force, of_press, strict=True))
+        if image.markers is not None:
+            arrays["markers"] = image.markers.rows()
+        picture_file = inside(self._folder, f"images/{name}.png")
+        write_whole(picture_file, lambda path: write_picture(path, picture))
+        write_whole(inside(self._folder, f"arrays/{name}.npz"), partial(_save_arrays, arrays))
+        if settings.radiance:
+            write_whole(inside(self._folder, f"radiance/{name}.exr"), image.save_radiance)
+        if index in self._labelled:  # an existing sample is restored
+            return
+        width, height = self._resolution
+        contact = drawn.contact
+        assert contact.point is not None
+        x, y, z = contact.point
+        radius = getattr(self._indenters[drawn.indenter], "radius", None)
+        self._labels.add(
+            {
+                "file_name": f"images/{name}.png",
+                "index": index,
+                "indenter": drawn.indenter,
+                "radius": "" if radius is None else float(radius),
+                "x": x,
+                "y": y,
+                "z": z,
+                "column": drawn.spot[0] * width,
+                "row": drawn.spot[1] * height,
+                "depth": contact.depth,
+                "rotation": contact.rotation,
+                "tilt_x": drawn.tilt_x,
+                "tilt_y": drawn.tilt_y,
+                "deepest": float(np.nanmax(depth)),
+                **force,
+                "contact_pixels": int(image.contact_mask.sum()),
+                "attempt": attempt,
+                "arrays": f"arrays/{name}.npz",
+                "radiance": f"radiance/{name}.exr" if settings.radiance else "",
+                "cut": int(is_cut(image.contact_mask)),
+                "split": split_of(
+                    settings.seed,
+                    drawn.indenter,
+                    (drawn.spot[0], drawn.spot[1] * height / width),
+                    settings.hold_out,
+                ),
+            }
+        )
+
+
+def _save_arrays(arrays: dict[str, Any], path: Path) -> None:
+    np.savez_compressed(path, **arrays)

@@ -1,0 +1,42 @@
+"""Outlines as DXF drawings of release 12, in mm, for cutters and board makers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+from optisense.workshop._placement import digits
+
+Pair = tuple[int, str | float]
+"""Group code and its value."""
+
+
+def dxf(entities: Iterable[Sequence[Pair]]) -> str:
+    """Return a drawing of entities."""
+    lines = ["0", "SECTION", "2", "ENTITIES"]
+    for entity in entities:
+        for code, value in entity:
+            lines += [str(code), value if isinstance(value, str) else digits(float(value), 4)]
+    return "\n".join([*lines, "0", "ENDSEC", "0", "EOF", ""])
+
+
+def line(layer: str, start: Sequence[float], end: Sequence[float]) -> list[Pair]:
+    """Return a straight line between two points (x, y)."""
+    return [(0, "LINE"), (8, layer), (10, start[0]), (20, start[1]), (30, 0.0),
+            (11, end[0]), (21, end[1]), (31, 0.0)]  # fmt: skip
+
+
+def arc(layer: str, centre: Sequence[float], radius: float, start: float, end: float) -> list[Pair]:
+    """Return an arc, anticlockwise from one direction (degrees) to another."""
+    return [(0, "ARC"), (8, layer), (10, centre[0]), (20, centre[1]), (30, 0.0), (40, radius),
+            (50, start), (51, end)]  # fmt: skip
+
+
+def circle(layer: str, centre: Sequence[float], radius: float) -> list[Pair]:
+    """Return a circle."""
+    return [(0, "CIRCLE"), (8, layer), (10, centre[0]), (20, centre[1]), (30, 0.0), (40, radius)]
+
+
+def closed(layer: str, corners: Sequence[Sequence[float]]) -> list[list[Pair]]:
+    """Return lines from each corner to the next, and back to the first."""
+    return [line(layer, a, b) for a, b in pairwise([*corners, corners[0]])]
