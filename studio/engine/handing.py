@@ -52,6 +52,18 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
     return {"data": document, "folder": str(folder)}
 
 
+def contents(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the scene's design without its meshes, and the digest of each part's mesh by name.
+
+    Raises:
+        EngineError: there is no engine, or the scene does not form a design.
+    """
+    given = design(scene)
+    parts, place = given["data"]["parts"], Path(given["folder"])
+    digests = {name: _written[str(place / part["mesh"])].hex() for name, part in parts.items()}
+    return given["data"], digests
+
+
 def contacts(scene: bpy.types.Scene) -> list[dict[str, Any]]:
     """Return the scene's active contacts as a field of requests to the engine.
 

@@ -9,6 +9,7 @@ from ..engine.layout import TAB, SidebarPanel, labelled, paragraph, show_job, sh
 from ..engine.preferences import HOW_TO_GET, engine_command
 from ..looks import footprint, markers
 from . import cad, tour
+from .warming import prepare
 
 
 class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
@@ -34,7 +35,9 @@ class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
         row.operator("optisense.save", icon="FILE_TICK")
         row.operator("optisense.save_as", icon="BLANK1")
         design = context.scene.optisense
-        if design.is_open:
+        if not design.is_open:
+            prepare()  # the user looks at this panel, and may soon open a sensor
+        else:
             column = labelled(layout)
             column.prop(design, "title")
             column.prop(design, "description")

@@ -7,8 +7,26 @@ import bpy
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
 
+START = "builtin:gelsight-mini"
+"""Sensor for which the engine is prepared before any is open: a new sensor is usually this one, and
+most of the work is the same for all."""
+
 _open: Request | None = None
 _is_put_off = False
+_prepared: int | None = None
+"""Process number of the engine that was prepared before a sensor was open."""
+
+
+def prepare() -> None:
+    """Let a running engine load the renderer and compile its code while no sensor is open; once for
+    each engine.
+    """
+    global _open, _prepared
+    engine = session.running()
+    if bpy.app.background or engine is None or engine.pid == _prepared:
+        return
+    _prepared = engine.pid
+    _open = engine.send("warm", design=START, contacts=True, drafts=True)
 
 
 def warm_up(scene: bpy.types.Scene) -> Request | None:

@@ -10,8 +10,8 @@ import bpy
 from ..core.engine import EngineError, Request
 from ..engine import handing, session
 from ..scene.collections import is_edited
-from ..sensor import warming
-from . import requests
+from ..sensor import opening, warming
+from . import requests, stored
 from .exposing import exposure
 
 NAME = "draft"
@@ -42,6 +42,8 @@ _pace = 0.0
 """Duration of the last draft, s."""
 _again: float | None = None
 """Time of one more draft if nothing changes before; None for none."""
+_opened = False
+"""Whether a sensor was opened whose first draft was not requested yet."""
 
 
 def wanted() -> None:
@@ -63,19 +65,21 @@ def _ask() -> None:
     """Request a draft if one is wanted. The newest waits behind the one in progress, so that the
     engine never idles between them.
     """
-    global _wanted, _sent, _began, _again
+    global _wanted, _sent, _began, _again, _opened
     scene = bpy.context.scene
-    if scene is None or not scene.optisense_simulation.draft or session.is_busy():
+    if scene is None or session.is_busy():
         return
     now = time.monotonic()
     _open[:] = [each for each in _open if not each.done]
     rested = _again is not None and now >= _again and not _open
-    if not (_wanted or rested) or len(_open) == MOST_OPEN:
+    wanted = scene.optisense_simulation.draft and (_wanted or rested)
+    if not (wanted or _opened) or len(_open) == MOST_OPEN:
         if not _open and _again is None and now - _began > REST and warming.is_put_off():
             warming.warm_up(scene)
         return
     if _open and now < max(_began + _pace - LEAD, _sent + RENEWED * (len(_open) > 1)):
         return
+    first, _opened = _opened, False
     _wanted, _sent, _again = False, now, None
     if not _open:
         _began = now
@@ -89,7 +93,7 @@ def _ask() -> None:
             session.engine().send(
                 "simulate",
                 on_result=_take,
-                on_error=_refused,
+                on_error=_ignored if first else _refused,
                 design=design,
                 contacts=contacts,
                 draft=True,
@@ -100,7 +104,19 @@ def _ask() -> None:
             )
         )
     except EngineError as error:
-        _refused(error)
+        (_ignored if first else _refused)(error)
+
+
+def _first(scene: bpy.types.Scene) -> None:
+    """Show the draft that is kept of a sensor that was opened, and schedule its first draft, even
+    if nobody wants drafts later.
+
+    A script says itself what it wants.
+    """
+    global _opened
+    if not bpy.app.background:
+        stored.show_kept(scene)
+        _opened = True
 
 
 def _take(result: dict[str, Any]) -> None:
@@ -112,8 +128,17 @@ def _take(result: dict[str, Any]) -> None:
     if session.state().note.startswith(NONE):
         session.state().note = ""
     settings = result["settings"]
-    if any(settings.get(each) for each in REUSED) and not _wanted:
+    if _wanted:
+        return
+    scene = bpy.context.scene
+    if scene.optisense_simulation.draft and any(settings.get(each) for each in REUSED):
         _again = time.monotonic() + REST
+    elif all(each.done for each in _open):
+        stored.keep(scene, result)
+
+
+def _ignored(_: EngineError) -> None:
+    """Say nothing about a draft that the user did not ask for: *Check* and *Simulate* do."""
 
 
 def _refused(error: EngineError) -> None:
@@ -124,11 +149,11 @@ def _refused(error: EngineError) -> None:
 
 def _leave() -> None:
     """Drop the open drafts before another .blend file is opened."""
-    global _wanted, _again
+    global _wanted, _again, _opened
     for each in _open:
         each.ignore()
     _open.clear()
-    _wanted, _again = False, None
+    _wanted, _again, _opened = False, None, False
 
 
 @bpy.app.handlers.persistent
@@ -139,6 +164,7 @@ def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 
 HOOKS = (
     (bpy.app.handlers.depsgraph_update_post, _changed),
+    (opening.when_opened, _first),
     (session.when_ticking, _ask),
     (session.when_leaving, _leave),
 )

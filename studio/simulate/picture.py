@@ -70,6 +70,13 @@ def enlarged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.f
     return pixels[rows[:, None], columns]
 
 
+def kind(now: bpy.types.PropertyGroup) -> str:
+    """Return the beginning of the line about the picture, if it is not a full one."""
+    if now.is_stored:
+        return "Draft of the last time, "
+    return "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
+
+
 def show_icon(name: str, pixels: NDArray[np.float32]) -> None:
     """Make a picture (h, w, 4), row 0 at the bottom, available to panels under a name."""
     if _previews is None:

@@ -77,6 +77,10 @@ class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
     shown: BoolProperty(options={"SKIP_SAVE"})
     is_draft: BoolProperty(options={"SKIP_SAVE"})
     is_relit: BoolProperty(options={"SKIP_SAVE"})
+    is_stored: BoolProperty(
+        description="Whether the picture is a draft from the last time that this sensor was open",
+        options={"SKIP_SAVE"},
+    )
     is_before: BoolProperty(
         description="Whether the picture shows the sensor that was open before",
         options={"SKIP_SAVE"},

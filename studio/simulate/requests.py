@@ -52,7 +52,7 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     relight.shown(result["lights"])
     now.shown = True
     now.is_draft = draft
-    now.is_relit = now.is_before = False
+    now.is_relit = now.is_before = now.is_stored = False
     now.file = result["files"].get("picture", "")
     now.summary = summary(result)
     now.presses = presses(result, [each.name for each in pressing(scene)])

@@ -46,8 +46,7 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
             layout.template_icon(icon_value=icon, scale=11.0)
         if now.is_before:
             layout.label(text="Picture of the sensor that was open before", icon="INFO")
-        kind = "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
-        paragraph(layout, kind + now.summary)
+        paragraph(layout, picture.kind(now) + now.summary)
         for line in now.presses.splitlines():
             paragraph(layout, line, "FORCE_FORCE")
         layout.operator("optisense.show_picture", icon="IMAGE_DATA")

@@ -228,9 +228,8 @@ def words(context: bpy.types.Context) -> list[str]:
     now, values = context.window_manager.optisense_picture, context.window_manager.optisense_view
     if not now.shown:
         return []
-    kind = "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
     old = "Of the sensor that was open before: " if now.is_before else ""
-    lines = [f"{old}{kind}{now.summary}"]
+    lines = [f"{old}{picture.kind(now)}{now.summary}"]
     if values.pinned and values.compare == "WIPE":
         lines.append(f"On the left: the pinned picture ({values.pinned})")
     elif values.pinned and values.compare == "DIFFERENCE":

@@ -1,0 +1,90 @@
+"""The drafts of sensors that were open before, which are shown as soon as such a sensor is opened.
+
+They are kept in the folder that Blender gives the extension for its own files.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..core.engine import EngineError
+from ..engine import handing, session
+from ..engine.preferences import PACKAGE
+from .exposing import exposure, shown_size
+from .picture import show
+
+MOST = 24
+"""Largest number of drafts that are kept. A draft is a file of 0.3 MB."""
+
+
+def folder() -> Path | None:
+    """Return the folder of the drafts; None if the extension is registered without being
+    installed, and then has no folder of its own.
+    """
+    try:
+        return Path(bpy.utils.extension_path_user(PACKAGE, path="drafts"))
+    except ValueError:
+        return None
+
+
+def keep(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
+    """Keep the draft in the engine's answer as that of the scene's sensor, unless contacts press on
+    it.
+
+    A draft that can't be written is not kept.
+    """
+    try:
+        file = _file(scene)
+        if file is None:
+            return
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part")
+        shutil.copyfile(result["files"]["pixels"], part)
+        part.replace(file)
+        newest = sorted(file.parent.glob("*.npy"), key=lambda each: each.stat().st_mtime)
+        for old in newest[:-MOST]:
+            old.unlink()
+    except (OSError, EngineError):
+        return
+
+
+def show_kept(scene: bpy.types.Scene) -> bool:
+    """Show the draft that is kept of the scene's sensor; return whether there is one."""
+    try:
+        file = _file(scene)
+        pixels = None if file is None else np.load(file)
+    except (OSError, ValueError, EngineError):  # there is none, or it is damaged
+        pixels = None
+    if pixels is None or pixels.ndim != 3 or pixels.shape[2] != 4:
+        return False
+    show(pixels, shown_size(scene))
+    now = bpy.context.window_manager.optisense_picture
+    now.shown = now.is_draft = now.is_stored = True
+    now.is_relit = now.is_before = False
+    now.image = now.file = now.presses = ""  # the engine does not know it
+    now.summary = f"{pixels.shape[1]} x {pixels.shape[0]}"
+    session.redraw()
+    return True
+
+
+def _file(scene: bpy.types.Scene) -> Path | None:
+    """Return the file of the draft of the scene's sensor without contacts; None with contacts.
+
+    Its name is a digest of all that the picture depends on, the engine's version included.
+
+    Raises:
+        EngineError: there is no engine, or the scene does not form a design.
+    """
+    place = folder()
+    if place is None or handing.contacts(scene):
+        return None
+    asked = [session.engine().version, exposure(scene), *handing.contents(scene)]
+    text = json.dumps(asked, sort_keys=True).encode()
+    return place / f"{hashlib.blake2b(text, digest_size=16).hexdigest()}.npy"

@@ -1,0 +1,49 @@
+"""Drafts that are kept for the next time that a sensor is opened."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from waiting import until
+
+from studio.simulate import drafts, picture, stored
+
+
+def shown() -> np.ndarray:
+    image = bpy.data.images[picture.IMAGE]
+    values = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(values)
+    return values
+
+
+def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
+    mini: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / "drafts"
+    monkeypatch.setattr(stored, "folder", lambda: place)
+    now, settings = bpy.context.window_manager.optisense_picture, mini.optisense_simulation
+    assert not stored.show_kept(mini)
+    drafts._opened = True  # as when a window opens a sensor
+    until(lambda: place.is_dir() and any(place.glob("*.npy")))
+    assert now.is_draft and not now.is_stored and not settings.draft
+    fresh = shown()
+    assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
+    assert now.is_before
+    picture.show(np.zeros((4, 4, 4), dtype=np.float32))
+    assert stored.show_kept(mini)
+    assert np.array_equal(shown(), fresh)
+    assert now.is_stored and not now.is_before and picture.kind(now).startswith("Draft of the last")
+
+    mini.optisense.light_groups[0].flux *= 2.0
+    assert not stored.show_kept(mini), "it is another sensor"
+    mini.optisense.light_groups[0].flux /= 2.0
+    bpy.ops.optisense.add_contact()
+    assert not stored.show_kept(mini), "a ball presses on it"
+    bpy.ops.optisense.clear_contacts()
+    file = next(place.glob("*.npy"))
+    file.write_bytes(b"damaged")
+    assert not stored.show_kept(mini)
