@@ -59,17 +59,8 @@ def contact_of(given: AnyContact) -> Contact:
     """
     if isinstance(given, str):
         return parse_contact(given)
-    return Contact(
-        indenter_from_plain(given.indenter),
-        at=given.at,
-        point=given.point,
-        depth=given.depth,
-        rotation=given.rotation,
-        along=given.along,
-        force=given.force,
-        shift=given.shift or Contact.shift,
-        twist=given.twist or Contact.twist,
-    )
+    numbers = given.model_dump(exclude={"indenter"}, exclude_none=True)
+    return Contact(indenter_from_plain(given.indenter), **numbers)
 
 
 def contacts_of(given: list[AnyContact]) -> list[Contact]:
@@ -131,15 +122,7 @@ def unseen(
 
 def plain_contact(contact: Contact, indenter: GivenIndenter) -> dict[str, Any]:
     """Return a contact as data that a request can give again."""
-    given = GivenContact(
-        indenter=indenter,
-        at=contact.at,
-        point=contact.point,
-        depth=contact.depth,
-        rotation=contact.rotation,
-        along=contact.along,
-        force=contact.force,
-        shift=None if contact.shift == Contact.shift else contact.shift,
-        twist=contact.twist or None,
-    )
-    return given.model_dump(exclude_none=True)
+    names = set(GivenContact.model_fields) - {"indenter"}
+    given = {name: getattr(contact, name) for name in names}
+    changed = {name: value for name, value in given.items() if value != getattr(Contact, name)}
+    return GivenContact(indenter=indenter, **changed).model_dump(exclude_none=True)

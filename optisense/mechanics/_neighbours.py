@@ -8,8 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.mechanics._displacement_field import DisplacementField, GridSpline
+from optisense.mechanics._displacement_field import DisplacementField
 from optisense.mechanics._footprint import Footprint
+from optisense.mechanics._grid_spline import GridSpline
 
 FloatArray = NDArray[np.float64]
 

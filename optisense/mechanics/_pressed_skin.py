@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from optisense.errors import ContactError
 from optisense.mechanics._displacement_field import (
     DisplacementField,
-    GridSpline,
-    binned,
     grid_response,
     sideways_beyond,
 )
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._gel_patch import GelPatch
+from optisense.mechanics._grid_spline import GridSpline, binned
 from optisense.mechanics._neighbours import Neighbours
 from optisense.mechanics._normal_contact import (
     TOLERANCE,
