@@ -32,6 +32,14 @@ SAMPLE_PHOTONS = PHOTONS["fine"]
 calibrations.
 """
 
+FIT_PHOTONS = 3_000_000
+"""Default number of photons of the last round of a fit to photographs; the noise of the light is
+then 1 to 5 % of the radiance, smooth over some eight pixels.
+"""
+
+QUICK_PHOTONS = 500_000
+"""Number of photons of a quick verification: a tenth of the usual number."""
+
 MOST_PHOTONS = 10_000_000_000
 """Largest number of photons of an image; it takes days, so more is a typing error."""
 

@@ -8,11 +8,7 @@ from optisense.calibration.families import USUAL
 from optisense.calibration.photographs import Photographs
 from optisense.errors import CalibrationError
 from optisense.near import suggestion
-
-FIT_PHOTONS = 3_000_000
-"""Number of photons of the light of the last round; the noise of the light is then 1 to 5 % of the
-radiance, smooth over some eight pixels.
-"""
+from optisense.quality import FIT_PHOTONS
 
 EARLIER_PHOTONS = 0.3
 """Number of photons of the earlier rounds, as a share of those of the last; their noise changes

@@ -163,10 +163,10 @@ def _beside_real(
     model: OpticalModel, image: TactileImage, interrupt: Interrupt
 ) -> RealComparison | None:
     """Return the comparison with the real picture of this sensor, or None if Ctrl-C ended it."""
-    from optisense.report.real_sensor import MOST_PHOTONS, compare_with_real
+    from optisense.report.real_sensor import compare_with_real
 
     # Use as many photons as were asked for, so that the cached light serves again.
-    photons = min(image.settings["photons_asked"] or image.settings["photons"], MOST_PHOTONS)
+    photons = min(image.settings["photons_asked"] or image.settings["photons"], PICTURE_PHOTONS)
     seed = image.settings["seed"]
     try:
         return compare_with_real(

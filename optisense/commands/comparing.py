@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import CommandOptions, OptionNotation, Photons, Seed
-from optisense.quality import PICTURE_PHOTONS
+from optisense.quality import FIT_PHOTONS, PICTURE_PHOTONS
 
 LARGEST_BALL = 1000.0
 """Largest diameter of a ball, mm; sensors are far smaller, so a larger value is an error of the
@@ -67,7 +67,7 @@ class CalibrateOptions(PhotographOptions):
         4, description="Number of rounds of rendering and fitting."
     )
     photons: Photons = Field(
-        3_000_000, description="Photons of the last round; the others have 0.3 times as many."
+        FIT_PHOTONS, description="Photons of the last round; the others have 0.3 times as many."
     )
     seed: Seed = Field(0, description="The same seed gives the same light.")
 

@@ -21,7 +21,7 @@ from optisense.commands.options import (
 )
 from optisense.mechanics.skins import ELASTIC
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE
-from optisense.quality import SAMPLE_PHOTONS
+from optisense.quality import QUICK_PHOTONS, SAMPLE_PHOTONS
 
 NOISE = 1.5
 """Noise of the pictures that tasks are read from, standard deviation in levels of 255, as of a real
@@ -171,9 +171,6 @@ QUICK_OBJECTS = ("screw-head", "coin", "cable", "wedge", "nut", "bean")
 """Objects of a quick verification: the fewest by which a difference can be detected, with different
 shapes.
 """
-
-QUICK_PHOTONS = 500_000
-"""Photons of a quick verification: a tenth of the usual number."""
 
 QUICK_WIDTH = 160
 """Width of the pictures of a quick verification, in pixels; objects of 5 mm then cover 1000 or

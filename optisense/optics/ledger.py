@@ -17,13 +17,10 @@ from optisense.optics.scene.surface_cells import build_cells, cells_near
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 from optisense.optics.transport.light_ledger import SIDES, Fate, trace_ledger
 from optisense.optics.transport.photons import TargetCells
+from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
-
-LEDGER_PHOTONS = 1_000_000
-"""Number of photons of a ledger; shares of a hundredth then have a relative error of some per
-cent."""
 
 VIEW_CELL = 0.5
 """Side (mm) of the cells of the sensing surface that record the part in the camera's view."""
@@ -161,7 +158,7 @@ class LightLedger:
 
 def light_ledger(
     model: OpticalModel,
-    photons: int = LEDGER_PHOTONS,
+    photons: int = PICTURE_PHOTONS,
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> LightLedger:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
-from optisense.optics.ledger import LEDGER_PHOTONS, cells_in_view
+from optisense.optics.ledger import cells_in_view
 from optisense.optics.scene.surface_cells import surface_samples
 from optisense.optics.transport.photons import TargetCells
 from optisense.optics.transport.place_light import (
@@ -23,6 +23,7 @@ from optisense.optics.transport.place_light import (
     LightWay,
     trace_to_place,
 )
+from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
@@ -124,7 +125,7 @@ class PlaceLight:
 def light_at(
     model: OpticalModel,
     at: Place,
-    photons: int = LEDGER_PHOTONS,
+    photons: int = PICTURE_PHOTONS,
     seed: int = 0,
     seen: TargetCells | None = None,
 ) -> PlaceLight:

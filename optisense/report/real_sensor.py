@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.design.colour import decode
 from optisense.geometry import Contact, Sphere
+from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, RenderProgress
@@ -36,9 +37,6 @@ BALL_PLACE = 261.8, 147.5
 
 CONTACT_RADIUS = 2.1
 """Radius of the contact in the picture, mm: 33.5 pixels, at about 0.0625 mm per pixel."""
-
-MOST_PHOTONS = 1_000_000
-"""Largest number of photons of the model's picture; its noise is then far below the differences."""
 
 AROUND = 1.6
 """Distance from the ball, in radii of its contact, beyond which the background is measured, since
@@ -101,7 +99,7 @@ def has_real_picture(design: SensorDesign) -> bool:
 
 def compare_with_real(
     model: OpticalModel,
-    photons: int = MOST_PHOTONS,
+    photons: int = PICTURE_PHOTONS,
     seed: int = 0,
     progress: Callable[[RenderProgress], None] | None = None,
 ) -> RealComparison | None:
