@@ -108,8 +108,7 @@ def search(
             stack.callback(study.close)
             result = run_study(
                 study,
-                workers=workers,
-                cluster=cluster,
+                workers=workers if cluster is None else cluster,
                 limit=options.budget,
                 variant=variant,
                 progress=show,

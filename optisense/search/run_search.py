@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +10,7 @@ from optisense.design import SensorDesign
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import FolderInUseError, OptiSenseError, SearchError
 from optisense.search.evaluation.evaluator import Evaluator, Goal
-from optisense.search.executors import (
-    DaskRunner,
-    ExecutorRunner,
-    ProcessPool,
-    Runner,
-    SerialRunner,
-)
+from optisense.search.executors import Runner, Workers, runner_of
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors, ToleranceDistribution
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.loop import StudyRun
@@ -35,9 +28,7 @@ def search(
     method: str = "cma-es",
     budget: int | None = None,
     seed: int = 0,
-    workers: int = 1,
-    cluster: str | None = None,
-    executor: Executor | None = None,
+    workers: Workers = 1,
     out: str | Path | None = None,
     resume: bool = False,
     options: Mapping[str, Any] | None = None,
@@ -66,9 +57,8 @@ def search(
         method: "cma-es", "grid", "random", "types", "pareto", ... (see docs/search.md).
         budget: number of trials; the method's default if None.
         seed: seed of the method and of every trial.
-        workers: number of processes on this machine; 1 scores the trials in this process.
-        cluster: address of a Dask scheduler, instead of `workers`.
-        executor: any executor with the protocol of `concurrent.futures`, instead of `workers`.
+        workers: number of processes on this machine (1 scores the trials in this process), the
+            address of a Dask scheduler, or any executor with the protocol of `concurrent.futures`.
         out: folder of the study, which can then be resumed and reported.
         resume: continue the study in `out`.
         options: options of the method.
@@ -121,8 +111,6 @@ def search(
     return run_study(
         study,
         workers=workers,
-        cluster=cluster,
-        executor=executor,
         limit=budget if resume else None,
         variant=variant,
         progress=progress,
@@ -132,10 +120,7 @@ def search(
 def run_study(
     study: Study,
     *,
-    workers: int = 1,
-    cluster: str | None = None,
-    executor: Executor | None = None,
-    own_process: bool = False,
+    workers: Workers = 1,
     limit: int | None = None,
     variant: str = "auto",
     progress: SearchProgressCallback | None = None,
@@ -146,8 +131,7 @@ def run_study(
 
     Args:
         study: new study, or one that was opened.
-        workers, cluster, executor: see `search`.
-        own_process: use a process of its own even for one worker.
+        workers: see `search`.
         limit: total number of trials; the study's budget if None.
         variant: variant of the renderer, see `search`.
         progress: function that is called a few times a second.
@@ -158,17 +142,9 @@ def run_study(
     Raises:
         OptiSenseError: see `search`.
     """
-    if cluster is not None and executor is not None:
-        raise SearchError("give a cluster or an executor, not both")
 
     def make_runner(evaluator: Evaluator) -> Runner:
-        if cluster is not None:
-            return DaskRunner(evaluator, cluster)
-        if executor is not None:
-            return ExecutorRunner(evaluator, executor)
-        if workers == 1 and not own_process:
-            return SerialRunner(evaluator, on_wait)
-        return ProcessPool(evaluator, workers)
+        return runner_of(evaluator, workers, on_wait)
 
     try:
         return StudyRun(study, make_runner, progress, limit, variant, time_left).go()

@@ -158,7 +158,7 @@ def test_without_dask_the_extra_is_named(
 ) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SetupError, match=r"optisense\[dask\]"):
-        search(mini, {"camera.fov": (40, 50)}, "aoap", budget=1, cluster="tcp://127.0.0.1:1")
+        search(mini, {"camera.fov": (40, 50)}, "aoap", budget=1, workers="tcp://127.0.0.1:1")
 
 
 @needs_dask
@@ -173,9 +173,9 @@ class TestDask:
     ) -> None:
         monkeypatch.setattr(remote, "CONNECT_SECONDS", 1.0)
         with pytest.raises(SetupError, match="is not the address"):
-            search(mini, LINE, goals.nearness, cluster="somewhere", out=tmp_path / "study")
+            search(mini, LINE, goals.nearness, workers="somewhere", out=tmp_path / "study")
         with pytest.raises(SetupError, match="no Dask scheduler answers") as told:
-            search(mini, LINE, goals.nearness, cluster="tcp://127.0.0.1:9", out=tmp_path / "study")
+            search(mini, LINE, goals.nearness, workers="tcp://127.0.0.1:9", out=tmp_path / "study")
         assert "dask scheduler" in str(told.value.hint)
         assert not (tmp_path / "study").exists()  # nothing was scored: nothing is left
 
@@ -209,7 +209,7 @@ class TestDask:
                 space,
                 goals.crowded,
                 method="grid",
-                cluster=address,
+                workers=address,
                 out=tmp_path / "study",
                 progress=add_one,
             )

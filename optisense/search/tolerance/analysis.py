@@ -20,7 +20,7 @@ from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
-from optisense.search.executors import ProcessPool, Runner, SerialRunner
+from optisense.search.executors import Runner, SerialRunner, Workers, runner_of
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.study.failures import cause_of
 from optisense.search.study.rescoring import fresh_seeds
@@ -162,7 +162,7 @@ def tolerance(
     *,
     sensors: int = SENSORS,
     seed: int = 0,
-    workers: int = 1,
+    workers: Workers = 1,
     settings: Mapping[str, Any] | None = None,
     variant: str = "auto",
     progress: ToleranceCallback | None = None,
@@ -177,7 +177,7 @@ def tolerance(
         errors: distributions by path (see `ManufacturingErrors`); `usual_errors` if None.
         sensors: approximate number of sensors; at least 8 for each source of error and 8 more.
         seed: seed of the errors and of the light.
-        workers: number of processes on this machine; 1 scores the sensors in this process.
+        workers: where the sensors are scored; see `optisense.search.search`.
         settings: settings of the objectives.
         variant: variant of the renderer: "auto", "llvm" or "cuda".
         progress: function that is called a few times a second.
@@ -208,7 +208,7 @@ def tolerance(
     nominal = bound.points(np.zeros(bound.size))
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
-    with _runner(evaluator, workers, on_wait) as runner:
+    with runner_of(evaluator, workers, on_wait) as runner:
         show = progress or (lambda done, of, left, doing: None)
         usual = evaluator.usual_trials()
         steps = tolerance_steps(len(jobs) - OWN_SCORES, usual, runner.workers)
@@ -296,10 +296,6 @@ def _score_distribution(
         percentiles={key: percentile_of(values, share) for key, share in PERCENTILES.items()},
         shares={source: shares[source] for source in order},
     )
-
-
-def _runner(evaluator: DesignEvaluator, workers: int, on_wait: Callable[[], None] | None) -> Runner:
-    return SerialRunner(evaluator, on_wait) if workers == 1 else ProcessPool(evaluator, workers)
 
 
 def _work(
