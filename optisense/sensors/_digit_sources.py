@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from optisense.design import Provenance, Status
 from optisense.sensors._led_flux import BALANCED
+from optisense.sensors._sources import provenance_of
 
 
 def provenance(frosted: Iterable[str]) -> dict[str, Provenance]:
@@ -63,4 +64,4 @@ def provenance(frosted: Iterable[str]) -> dict[str, Provenance]:
             "cut by a laser and not polished; with a polished edge the picture is brightest far "
             "from each LED, unlike published ones",
         )
-    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
+    return provenance_of(table)

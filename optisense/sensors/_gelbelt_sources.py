@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from optisense.design import Provenance, Status
+from optisense.sensors._sources import XP565, provenance_of
 
 
 @dataclass(frozen=True)
@@ -39,15 +40,8 @@ def gelbelt_sources(light_design: int, left_out: OmittedReturn) -> dict[str, Pro
         "coating": (sourced, f"aluminium powder ({paper})"),
         "coating.reflectance": (assumed, "aluminium powder is brighter than grey paint"),
         "coating.specularity": (sourced, f"below 0.3 is best ({paper}); 0.2 is assumed"),
+        **XP565,
         "materials.silicone-xp565.ior": (assumed, "no index in the maker's datasheet"),
-        "materials.silicone-xp565.elasticity": (
-            assumed,
-            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
-        ),
-        "materials.silicone-xp565.elasticity.youngs_modulus": (
-            assumed,
-            "as the gel of a GelSight Mini, fitted to measured forces (FEATS project)",
-        ),
         "materials.clear-tape.ior": (assumed, "polypropylene tape, usual value"),
         "materials.air-film.ior": (sourced, f"a thin layer of air is trapped ({paper})"),
         "materials.acrylic.ior": (sourced, "PMMA, Sultanova 2009 at 589 nm"),
@@ -97,4 +91,4 @@ def gelbelt_sources(light_design: int, left_out: OmittedReturn) -> dict[str, Pro
         "camera.fov": (derived, "Raspberry Pi camera module 2 (datasheet); the module is assumed"),
         "camera.resolution": (assumed, "small enough for video rates"),
     }
-    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
+    return provenance_of(table)

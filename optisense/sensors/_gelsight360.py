@@ -36,6 +36,7 @@ from optisense.sensors._led_boards import (
 )
 from optisense.sensors._led_flux import BALANCED, balanced_flux
 from optisense.sensors._shapes import revolve
+from optisense.sensors._sources import XP565, provenance_of
 from optisense.sensors._tip_shape import TipShape
 from optisense.sensors.dimensions import (
     Dimensions,
@@ -332,15 +333,7 @@ def _provenance(base_ring: str) -> dict[str, Provenance]:
             "semi-specular with aluminium flake, as on the sister sensor RainbowSight (Tippur and "
             "Adelson 2024); not stated for GelSight360",
         ),
-        "materials.silicone-xp565.ior": (assumed, "the gel's silicone is not published"),
-        "materials.silicone-xp565.elasticity": (
-            assumed,
-            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
-        ),
-        "materials.silicone-xp565.elasticity.youngs_modulus": (
-            assumed,
-            "as the gel of a GelSight Mini, fitted to measured forces (FEATS project)",
-        ),
+        **XP565,
         "materials.epoxy.ior": (
             sourced,
             "calibrated epoxy core of a round sensor (published code of arXiv 2012.13184)",
@@ -380,4 +373,4 @@ def _provenance(base_ring: str) -> dict[str, Provenance]:
             "12 LEDs that shine into the shell; that there is such a ring, coupled to the shell, "
             "is from the RainbowSight paper. Blue, because the eight groups hold red and green",
         )
-    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
+    return provenance_of(table)

@@ -30,6 +30,7 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors._led_flux import BALANCED, balanced_flux
+from optisense.sensors._sources import XP565, provenance_of
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,
@@ -367,11 +368,7 @@ def _provenance() -> dict[str, Provenance]:
     table: dict[str, tuple[Status, str]] = {
         "coating": (sourced, "opaque grey without metal flakes, Lambertian (gsrobotics FAQ)"),
         "coating.reflectance": (assumed, "near the calibrated albedo of a flat gel, about 0.45"),
-        "materials.silicone-xp565.ior": (assumed, "the gel's silicone is not published"),
-        "materials.silicone-xp565.elasticity": (
-            assumed,
-            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
-        ),
+        **XP565,
         "materials.silicone-xp565.elasticity.youngs_modulus": (
             sourced,
             "E is 6 C10 with C10 = 0.0725 MPa, fitted to measured forces on this sensor's gel "
@@ -401,4 +398,4 @@ def _provenance() -> dict[str, Provenance]:
         ),
         "camera.resolution": (sourced, "320 x 240 is the default of gsrobotics"),
     }
-    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
+    return provenance_of(table)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from optisense.design import Provenance, Status
 from optisense.sensors._led_flux import BALANCED
+from optisense.sensors._sources import XP565, provenance_of
 
 ANIMATION = (
     "side view in an animation on the first author's web site, digitised to about 1 pixel at an "
@@ -16,15 +17,8 @@ def provenance(tip: bool) -> dict[str, Provenance]:
     assumed, derived, sourced = Status.ASSUMED, Status.DERIVED, Status.SOURCED
     table: dict[str, tuple[Status, str]] = {
         "coating": (assumed, "opaque grey; the coating of the sensor is not published"),
+        **XP565,
         "materials.silicone-xp565.ior": (assumed, "the silicone of the skin is not published"),
-        "materials.silicone-xp565.elasticity": (
-            assumed,
-            "Poisson ratio usual for silicones; friction as the FEATS project takes it",
-        ),
-        "materials.silicone-xp565.elasticity.youngs_modulus": (
-            assumed,
-            "as the gel of a GelSight Mini, fitted to measured forces (FEATS project)",
-        ),
         "materials.mirror-silver": (assumed, "the mirrors' metal is not published"),
         "parts.skin": (
             derived,
@@ -83,4 +77,4 @@ def provenance(tip: bool) -> dict[str, Provenance]:
     }  # fmt: skip
     if tip:
         table["lights.blue"] = (assumed, "an option; not known to be in the sensor")
-    return {path: Provenance(status=s, source=text) for path, (s, text) in table.items()}
+    return provenance_of(table)
