@@ -29,8 +29,8 @@ from optisense.design import (
     Status,
 )
 from optisense.geometry import TriangleMesh
-from optisense.sensors._led_flux import BALANCED, balanced_flux
-from optisense.sensors._sources import XP565, provenance_of
+from optisense.sensors._gelsight_mini_sources import provenance
+from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,
@@ -155,7 +155,7 @@ def _flat(size: GelSightMiniDimensions) -> SensorDesign:
             direction=(0.0, 0.0, 1.0),
             up=(0.0, 1.0, 0.0),
         ),
-        provenance=_provenance(),
+        provenance=provenance(),
     )
     design.meshes.update(
         skin=_top(gel),
@@ -356,46 +356,3 @@ def _row(
         for offset in offsets
     ]
     return LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
-
-
-def _provenance() -> dict[str, Provenance]:
-    cad = "published CAD (gsmini_shell, 2022-10-24)"
-    order = (
-        "rows of 5 at 4 mm pitch on the guide's edges: count, pitch and place are not published; "
-        "which side has which colour agrees with the shading of published ball presses"
-    )
-    assumed, sourced = Status.ASSUMED, Status.SOURCED
-    table: dict[str, tuple[Status, str]] = {
-        "coating": (sourced, "opaque grey without metal flakes, Lambertian (gsrobotics FAQ)"),
-        "coating.reflectance": (assumed, "near the calibrated albedo of a flat gel, about 0.45"),
-        **XP565,
-        "materials.silicone-xp565.elasticity.youngs_modulus": (
-            sourced,
-            "E is 6 C10 with C10 = 0.0725 MPa, fitted to measured forces on this sensor's gel "
-            "(FEATS project, published simulation input)",
-        ),
-        "materials.acrylic.ior": (sourced, "PMMA, Sultanova 2009 at 589 nm"),
-        "parts.gel": (
-            sourced,
-            f"footprint 25.25 x 20.75 mm from the {cad}, thickness 4.25 mm from the datasheet "
-            "(second hand); drawn flat and without its 1.5 mm corner radius: its sag is 0.23 mm "
-            "over the field of view",
-        ),
-        "parts.skin": (sourced, "top face of the gel"),
-        "parts.tray": (sourced, f"28.23 x 23.73 x 1 mm from the {cad}; its material is assumed"),
-        "parts.guide": (assumed, "25.25 x 20.75 x 4 mm acrylic, in optical contact with the tray"),
-        "lights.red": (assumed, order),
-        "lights.green": (assumed, order),
-        "lights.blue": (assumed, order),
-        "lights.red.flux": (Status.DERIVED, BALANCED),
-        "lights.green.flux": (assumed, "as red"),
-        "lights.blue.flux": (assumed, "as red"),
-        "camera.position": (assumed, "pupil 17 mm behind the back of the tray"),
-        "camera.fov": (
-            Status.DERIVED,
-            "the width that shows 18.6 mm of the flat gel (datasheet, second hand), refracted "
-            "through 13 mm air, 5 mm acrylic and 4.25 mm gel; from the assumed pupil",
-        ),
-        "camera.resolution": (sourced, "320 x 240 is the default of gsrobotics"),
-    }
-    return provenance_of(table)
