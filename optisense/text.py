@@ -36,9 +36,9 @@ MOST_QUOTED = 80
 """Largest number of characters of a value that a message quotes; it fits a line of a terminal."""
 
 
-def brief(text: str, most: int = MOST_QUOTED) -> str:
+def brief(text: str) -> str:
     """Return a text for quoting in a message, cut off if it is long."""
-    return text if len(text) <= most else text[: most - 3] + "..."
+    return text if len(text) <= MOST_QUOTED else text[: MOST_QUOTED - 3] + "..."
 
 
 def one_line(text: str) -> str:

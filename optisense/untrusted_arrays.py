@@ -27,26 +27,26 @@ MOST_ARRAYS = 2048 * MEBIBYTE
 100 million pixels have 1.7 GB.
 """
 
+ARRAYS = "the arrays"
+"""Word for the content of an NPZ file in messages."""
 
-def read_arrays(
-    path: Path, error: Error, most: int = MOST_ARRAYS, what: str = "the arrays"
-) -> dict[str, NDArray[Any]]:
+
+def read_arrays(path: Path, error: Error, most: int = MOST_ARRAYS) -> dict[str, NDArray[Any]]:
     """Return the arrays of an NPZ file by name; pickled objects in it are refused.
 
     Args:
         path: path of the file.
         error: class of the error that is raised.
         most: largest size of all arrays together, unpacked, bytes.
-        what: word for the arrays in messages.
 
     Raises:
         error: the file is missing, truncated, damaged, or too large once it is unpacked.
     """
-    data = read_bytes(path, most, error, what)
+    data = read_bytes(path, most, error, ARRAYS)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             unpacked = sum(member.file_size for member in archive.infolist())
-        refuse_size(unpacked, most, path, error, what)
+        refuse_size(unpacked, most, path, error, ARRAYS)
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         for name, array in arrays.items():
@@ -56,16 +56,16 @@ def read_arrays(
     except OptiSenseError:
         raise
     except Exception as found:  # zipfile, zlib and NumPy raise many kinds on malformed files
-        raise damaged(path, error, what, found) from None
+        raise damaged(path, error, ARRAYS, found) from None
 
 
-def read_array(path: Path, error: Error, most: int = MOST_ARRAYS) -> NDArray[Any]:
+def read_array(path: Path, error: Error) -> NDArray[Any]:
     """Return the array of an NPY file; pickled objects in it are refused.
 
     Raises:
         error: the file is missing, truncated or damaged.
     """
-    data = read_bytes(path, most, error, "the array")
+    data = read_bytes(path, MOST_ARRAYS, error, "the array")
     try:
         return np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     except Exception as found:  # NumPy raises many kinds on malformed files

@@ -198,15 +198,12 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
     return found
 
 
-def read_table(
-    path: Path, error: Error, what: str = "the table", padded: bool = False
-) -> list[dict[str, str]]:
+def read_table(path: Path, error: Error, padded: bool = False) -> list[dict[str, str]]:
     """Return the rows of a CSV file as text, by column.
 
     Args:
         path: path of the file.
         error: class of the exception to raise.
-        what: name of the file's content in messages.
         padded: whether a row may have fewer values than there are columns, as in tables that are
             written by hand; the others are empty.
 
@@ -214,7 +211,7 @@ def read_table(
         error: the file can't be read, as in `read_text`, or is no such table; the message names the
             line.
     """
-    text = read_text(path, MOST_TABLE, error, what)
+    text = read_text(path, MOST_TABLE, error, "the table")
     reader = csv.DictReader(io.StringIO(text, newline=""), restval="" if padded else None)
     rows = []
     try:
@@ -228,7 +225,7 @@ def read_table(
         return rows
     except csv.Error as found:
         where = f"{path}:{reader.line_num}"
-        raise error(f"can't read {what}: {found}", where=where, hint=COPY_AGAIN) from None
+        raise error(f"can't read the table: {found}", where=where, hint=COPY_AGAIN) from None
 
 
 def inside(folder: Path, relative: str) -> Path | None:

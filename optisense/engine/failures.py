@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from optisense.design import Diagnostic, SensorDesign
@@ -59,17 +59,14 @@ class InvalidDesignError(OptiSenseError):
         self.source = source
 
 
-def as_data(
-    error: BaseException, design: SensorDesign | None = None, parts: Iterable[str] = ()
-) -> dict[str, Any]:
+def as_data(error: BaseException, design: SensorDesign | None = None) -> dict[str, Any]:
     """Return an error as data of the protocol.
 
     Args:
         error: an error of any kind; an `OptiSenseError` tells its place and a remedy.
         design: design of the request, in which the part is looked up.
-        parts: names of further parts.
     """
-    known = [*(design.parts if design is not None else ()), *parts]
+    known = [] if design is None else list(design.parts)
     if isinstance(error, Cancelled):
         return _row("Cancelled", "the request was cancelled", None, None, known, design)
     if isinstance(error, InvalidDesignError):

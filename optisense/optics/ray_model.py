@@ -252,11 +252,9 @@ class RayModel:
         """
         return self._view.gel.pressed(contacts, placed)
 
-    def _deformed_scenes(
-        self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh] | None = None
-    ) -> ContactScenes:
-        """Return the scenes of one image on an elastic skin; `placed` are the contacts' meshes."""
-        pressed = self.pressed(contacts, placed)
+    def _deformed_scenes(self, contacts: Sequence[Contact]) -> ContactScenes:
+        """Return the scenes of one image on an elastic skin."""
+        pressed = self.pressed(contacts)
         return self.scenes.deformed(self._view.gel.mesh(contacts), pressed)
 
 

@@ -85,16 +85,16 @@ class Pixels:
         return Pixels(self.picture[some], self.untouched[some], self.places[some])
 
 
-def tilt_grid(steepest: float, cell: float = CELL) -> FloatArray:
-    """Return the tilts (k, 2), degrees, of a square grid, up to the steepest.
+def tilt_grid(steepest: float) -> FloatArray:
+    """Return the tilts (k, 2), degrees, of a square grid of `CELL`, up to the steepest.
 
     A tilt is the angle between the normal and the untouched one, along the direction of the tilt
     (azimuthal equidistant).
     """
-    most = np.ceil(steepest / cell) * cell
-    steps = np.arange(-most, most + cell / 2, cell)
+    most = np.ceil(steepest / CELL) * CELL
+    steps = np.arange(-most, most + CELL / 2, CELL)
     grid = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
-    return grid[np.linalg.norm(grid, axis=1) <= steepest + cell / 2]
+    return grid[np.linalg.norm(grid, axis=1) <= steepest + CELL / 2]
 
 
 def tilts_to_normals(tilts: FloatArray) -> FloatArray:

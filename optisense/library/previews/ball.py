@@ -38,11 +38,9 @@ sequence).
 """
 
 
-def picture_of_ball(
-    material: Material | CoatingModel, size: int = 280, seed: int = 0
-) -> NDArray[np.uint8]:
+def picture_of_ball(material: Material | CoatingModel, size: int = 280) -> NDArray[np.uint8]:
     """Return a picture (size, size, 3) in sRGB of a ball of the material."""
-    offsets = np.random.default_rng(seed).random((size * size, 4))
+    offsets = np.random.default_rng(0).random((size * size, 4))
     medium, surface = medium_of(material), material.reflection()
     studio = white_studio(1.0 if medium is None else 0.3)
     if isinstance(material, CoatingModel):

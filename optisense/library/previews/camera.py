@@ -22,15 +22,19 @@ STEEPEST = 80.0
 """Largest angle from the axis up to which a footprint is drawn, degrees."""
 
 
-def border_directions(camera: CameraModel, points: int = 64) -> FloatArray:
-    """Return unit directions (4 points, 3) of the image's border: x right, y up, z ahead.
+SIDE_POINTS = 64
+"""Number of points on each side of the border of an image; an edge then looks smooth."""
+
+
+def border_directions(camera: CameraModel) -> FloatArray:
+    """Return unit directions (4 `SIDE_POINTS`, 3) of the image's border: x right, y up, z ahead.
 
     An equidistant camera's angle from the axis is proportional to the distance from the picture's
     middle; both projections see `fov` across the width.
     """
     width, height = camera.resolution
-    t = np.linspace(-1.0, 1.0, points, endpoint=False)
-    one = np.ones(points)
+    t = np.linspace(-1.0, 1.0, SIDE_POINTS, endpoint=False)
+    one = np.ones(SIDE_POINTS)
     u = np.concatenate([t, one, -t, -one])
     v = np.concatenate([-one, t, one, -t]) * height / width
     half = np.radians(camera.fov / 2.0)
