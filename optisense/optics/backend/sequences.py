@@ -6,7 +6,7 @@ ratio; Roberts 2018), so that every prefix of the sequence is spread evenly in f
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 
 import drjit as dr
 import mitsuba as mi
@@ -74,7 +74,7 @@ def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Poin
     return mi.Point2f(*out)
 
 
-@cache
+@lru_cache(maxsize=4)
 def lattice_multipliers(most: int) -> NDArray[np.uint32]:
     """Return the multiplier of the rank-1 lattice of n points, for n from 0 to ``most``.
 

@@ -16,6 +16,9 @@ from optisense.search.evaluation.outcome import Outcome
 
 _evaluators: dict[str, Evaluator] = {}
 _blobs: dict[str, bytes] = {}
+MOST_EVALUATORS = 64
+"""Largest number of pickled evaluators that a worker keeps. A search that ends removes its own; one
+whose process was killed does not."""
 _one_at_a_time = threading.Lock()
 """Lock that serves one trial at a time, since an evaluator keeps one model, whatever threads a
 worker has.
@@ -48,8 +51,10 @@ def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed:
 
 
 def store_evaluator(key: str, blob: bytes) -> None:
-    """Keep an evaluator for `score_trial` in this process."""
+    """Keep an evaluator for `score_trial` in this process, and drop the oldest of too many."""
     _blobs[key] = blob
+    while len(_blobs) > MOST_EVALUATORS:
+        del _blobs[next(iter(_blobs))]
 
 
 def forget(key: str) -> None:
