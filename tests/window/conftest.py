@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import shutil
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,6 +14,10 @@ from .bench import Bench, install
 from .desktop import Desktop
 
 BLENDER = "OPTISENSE_WINDOW_BLENDER"
+PICTURES = "OPTISENSE_WINDOW_PICTURES"
+
+SHOWN_HOME = Path(tempfile.gettempdir()) / "sensors"
+"""Home folder while pictures for the documentation are made, which show its name."""
 
 if not os.environ.get(BLENDER):
     collect_ignore_glob = ["test_*.py"]
@@ -20,7 +26,12 @@ if not os.environ.get(BLENDER):
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     """Blender with the extension, installed as a user does."""
-    blender, home = Path(os.environ[BLENDER]).resolve(), tmp_path_factory.mktemp("home")
+    blender = Path(os.environ[BLENDER]).resolve()
+    if os.environ.get(PICTURES):
+        home = SHOWN_HOME
+        home.mkdir()
+    else:
+        home = tmp_path_factory.mktemp("home")
     install(blender, home)
     desktop = Desktop()
     sitting = Bench(blender, desktop, home)
@@ -29,3 +40,5 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     finally:
         sitting.close()
         desktop.close()
+        if home == SHOWN_HOME:
+            shutil.rmtree(home)
