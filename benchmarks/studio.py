@@ -14,8 +14,10 @@ import argparse
 import atexit
 import os
 import shlex
+import shutil
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -60,7 +62,7 @@ def measured(what: str, times: int, target: str, work: Callable[[int], None], pi
     used = (processor_seconds(pid) - used) / times
     rate, slow = (f"{each / wall:6.1f} /s" for each in (1.0, SLOW / max(RATE, SLOW)))
     print(
-        f"{what:42s} {wall:7.3f} s {used:7.3f} s {rate:>10s}   {target:5s} {slow:>10s}", flush=True
+        f"{what:44s} {wall:7.3f} s {used:7.3f} s {rate:>10s}   {target:5s} {slow:>10s}", flush=True
     )
 
 
@@ -78,7 +80,7 @@ def main() -> None:
     from studio.scene import cages
     from studio.scene.collections import objects_of
     from studio.sensor.warming import warm_up
-    from studio.simulate import drafts, relight
+    from studio.simulate import drafts, relight, stored
 
     studio.register()
     atexit.register(studio.unregister)
@@ -98,7 +100,7 @@ def main() -> None:
     RATE = rays_per_second()
     print(f"the ray tracer alone: {RATE / 1e6:.1f} million rays a second")
     slow = f"at {SLOW / 1e6:.0f} M/s"
-    print(f"{'':42s} {'wall':>9s} {'processor':>9s} {'':10s}   target {slow:>10s}")
+    print(f"{'':44s} {'wall':>9s} {'processor':>9s} {'':10s}   target {slow:>10s}")
     opened = "Mini opened and the engine warm"
     bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     measured(opened, 1, "", lambda _: answered(warm_up(scene)), pid)
@@ -175,9 +177,19 @@ def main() -> None:
         while session.engine().waiting:
             time.sleep(session._tick() or 0.0)
 
-    for name in ("gelsight-svelte", "digit", "gelsight-mini-ideal"):
+    def kept_draft(_: int) -> None:
+        assert stored.show_kept(bpy.context.scene)
+
+    place = Path(tempfile.mkdtemp())
+    stored.folder = lambda: place
+    sensors = ("gelsight-svelte", "digit", "gelsight-mini-ideal")
+    for name in sensors:
         bpy.ops.optisense.new(sensor=name)
         measured(f"first draft of {name}, opened", 1, "0.5 s", first_draft, pid)
+    for name in sensors:
+        bpy.ops.optisense.new(sensor=name)
+        measured(f"kept draft of {name}, opened again", 1, "0.5 s", kept_draft, pid)
+    shutil.rmtree(place)
     scene = bpy.context.scene
     cage = _caged_sheet(scene)
 
