@@ -14,7 +14,7 @@ from ..engine.layout import labelled, show_job
 from ..engine.operators import fail, start
 from ..scene.kinds import ROLES
 from ..scene.paths import absolute
-from .opening import new_stage, open_stage
+from .opening import new_stage, open_stage, tell_opened
 from .workspace import show_sidebar
 
 READING, MAKING = "Reading the files", "Making the sensor"
@@ -179,7 +179,8 @@ class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
             now().bodies.clear()
             notes = result["notes"]
 
-            def tell(_: bpy.types.Scene) -> None:
+            def tell(scene: bpy.types.Scene) -> None:
+                tell_opened(scene)
                 session.state().note = "; ".join(notes) or session.state().note
 
             open_stage(scene, stage, wait=wait, then=tell)

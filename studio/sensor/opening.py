@@ -19,7 +19,13 @@ from ..scene.views import show_design
 from .warming import warm_up
 
 when_opened: list[Callable[[bpy.types.Scene], None]] = []
-"""Callbacks for a built-in sensor or a folder of the user being opened."""
+"""Callbacks for a sensor being opened: a built-in one, a folder of the user, or CAD files."""
+
+
+def tell_opened(scene: bpy.types.Scene) -> None:
+    """Call these callbacks."""
+    for each in when_opened:
+        each(scene)
 
 
 def new_stage() -> Path:
@@ -50,11 +56,7 @@ def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool)
     def written(_: dict[str, Any]) -> None:
         scene = bpy.data.scenes.get(name)
         if scene is not None:
-            open_stage(scene, stage, wait=wait, folder=folder, then=tell)
-
-    def tell(scene: bpy.types.Scene) -> None:
-        for each in when_opened:
-            each(scene)
+            open_stage(scene, stage, wait=wait, folder=folder, then=tell_opened)
 
     # The engine reads all formats that users have, and writes the one that the extension reads.
     done = session.start_job(

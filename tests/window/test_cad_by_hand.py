@@ -6,10 +6,13 @@ import shutil
 import time
 from pathlib import Path
 
+import pytest
+
 from .bench import Bench
 from .test_by_hand import SIMULATE
 
 PARTS = Path(__file__).parents[2] / "docs" / "examples" / "pad-sensor"
+ASSETS = Path(__file__).parents[1] / "assets"
 FILES = ("gel.stl", "window.stl", "housing.stl", "leds.stl", "lens.stl")
 
 MOST_ACTIONS = 60
@@ -18,6 +21,12 @@ a body is has to be corrected."""
 
 SECONDS_OF_ACTION = 5.0
 """Seconds in which a person finds a control and uses it; for the handling that is told."""
+
+BOX = (10.0, 8.0, 4.0)
+"""Sides (mm) of the body in box.step."""
+
+SHAPES = 1
+"""Place of the panel Shapes in the sidebar; the first is 0."""
 
 TABLE = 330
 """Pixels from the top of the sidebar to below the table of five bodies."""
@@ -140,3 +149,15 @@ def mark_all_files(bench: Bench) -> None:
     left, top, width, height = bench.see("place('FILE_BROWSER', 'EXECUTE')")
     bench.desktop.click(left + width - 70, top + height / 2)
     bench.until("len(manager.windows) == 1")
+
+
+def test_a_step_file_is_read(bench: Bench) -> None:
+    shutil.copy(ASSETS / "box.step", bench.home)
+    bench.only(SHAPES)
+    bench.press("optisense.add_mesh")
+    bench.choose_file("box.step")
+    bench.rest()
+    bench.until("len(bpy.data.collections['Reference'].objects) == 1")
+    size = bench.see("list(bpy.data.collections['Reference'].objects[0].dimensions)")
+    assert size == pytest.approx(BOX)
+    bench.photograph("step-file")
