@@ -19,6 +19,11 @@ class Step(NamedTuple):
     is_done: Callable[[bpy.types.Context], bool]
 
 
+def _is_simulated(picture: bpy.types.PropertyGroup) -> bool:
+    """Return whether there is a picture that was asked for, not the draft of an opened sensor."""
+    return picture.shown and not picture.is_draft
+
+
 STEPS = (
     Step(
         "Choose New Sensor > GelSight Mini, just below.",
@@ -30,7 +35,7 @@ STEPS = (
     ),
     Step(
         "Press Simulate: some seconds later the picture is there that the camera takes.",
-        lambda c: c.window_manager.optisense_picture.shown,
+        lambda c: _is_simulated(c.window_manager.optisense_picture),
     ),
     Step(
         "Change a flux or a colour under Relight: the picture follows at once.",

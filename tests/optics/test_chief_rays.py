@@ -16,7 +16,7 @@ from optisense.optics.transport.chief_rays import (
     pixel_stretching,
     trace_chief_rays,
 )
-from optisense.sensors import gelbelt
+from optisense.sensors import gelbelt, load
 
 # Single precision over some 10 mm, and rays that start RAY_OFFSET (0.0002 mm) off each surface.
 PLACE = 2e-3
@@ -154,3 +154,8 @@ def test_stretching_is_unknown_where_nothing_is_seen() -> None:
     found = pixel_stretching(rays)
     assert np.isnan(found[~rays.hit]).all()
     assert np.isfinite(found).any()
+
+
+def test_rays_in_a_plane_of_symmetry_miss_no_triangle() -> None:
+    # A picture with an odd number of rows has one row in the plane y = 0 of DIGIT.
+    assert OpticalModel(load("digit")).chief_rays((160, 213)).hit.all()
