@@ -66,7 +66,7 @@ def test_a_picture_from_cad_files_takes_few_actions(bench: Bench) -> None:
     bench.until("scene().optisense.is_open and not state().busy")
     bench.only(SIMULATE)
     bench.press("optisense.simulate")
-    bench.until("manager.optisense_picture.shown")
+    bench.until("manager.optisense_picture.shown and not manager.optisense_picture.is_draft")
     bench.rest()
     bench.photograph("cad-picture")
 

@@ -141,8 +141,8 @@ def test_a_simulation_is_given_up(bench: Bench) -> None:
     bench.press("optisense.cancel", across=0.9)
     bench.rest()
     assert bench.see("state().note") == "Cancelled"
-    assert not bench.see("manager.optisense_picture.shown")
+    assert bench.see("manager.optisense_picture.is_draft"), "that of the opened sensor"
     assert len(bench.see(CONTACTS)) == 1
     bench.press("optisense.simulate")
-    bench.until("manager.optisense_picture.shown")
+    bench.until("not manager.optisense_picture.is_draft")
     bench.rest()
