@@ -165,16 +165,11 @@ def main() -> None:
     scene.optisense_simulation.draft = False
 
     def first_draft(_: int) -> None:
-        """Wait for the first draft of the sensor that was opened."""
-        opened = bpy.context.scene
-        opened.optisense_simulation.draft = True
+        """Wait for the first draft of the sensor that was opened, as in a window."""
+        drafts._opened = True
         before = shown
-        while shown == before:
-            drafts.wanted()
+        while shown == before or session.engine().waiting:
             drafts._ask()
-            time.sleep(session._tick() or 0.0)
-        opened.optisense_simulation.draft = False
-        while session.engine().waiting:
             time.sleep(session._tick() or 0.0)
 
     def kept_draft(_: int) -> None:
