@@ -36,6 +36,9 @@ RANGE = 4.0
 the start."""
 SIZE = (160, 120)
 """Size (pixels) of the photographs, that of the fit."""
+FINER = 3
+"""Number of pixels whose mean is one of the photographs along each axis, as in photographs that are
+larger than the fit."""
 PLACES = ((0.3, 0.35), (0.7, 0.35), (0.5, 0.5), (0.3, 0.65), (0.7, 0.65), (0.5, 0.3))
 """Places of the presses, as shares of width and height of what the camera sees of the skin."""
 RADIUS, DEPTH = 3.0, 0.8
@@ -131,7 +134,10 @@ def photographed(real: SensorDesign) -> Photographs:
             }
         )
         balls.append(ball)
-    clean = photograph_model(model, balls, resolution=SIZE, photons=PHOTONS, seed=SEED, noise=0.0)
+    finer = (FINER * SIZE[0], FINER * SIZE[1])
+    clean = photograph_model(
+        model, balls, resolution=finer, photons=PHOTONS, seed=SEED, noise=0.0
+    ).scaled(SIZE[0])
     presses = [
         replace(press, picture=by_camera(press.picture, number), **label)
         for number, (press, label) in enumerate(zip(clean.presses, labels, strict=True), start=1)

@@ -15,6 +15,7 @@ from optisense.calibration.contact_placing import (
     placed,
     scaled_contact,
 )
+from optisense.calibration.covered_view import CoveredView
 from optisense.calibration.gauss_newton import LayeredFit, Solution
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
@@ -28,7 +29,7 @@ from optisense.calibration.view_slopes import view_changes, with_view
 from optisense.design import SensorDesign
 
 if TYPE_CHECKING:
-    from optisense.optics import ChiefRays, OpticalModel
+    from optisense.optics import OpticalModel
 
 FloatArray = NDArray[np.float64]
 
@@ -37,15 +38,21 @@ DIFFERENCE = 0.35
 large because renderings have noise.
 """
 
-VIEW_DIFFERENCE = 0.05
-"""Step of the difference quotients of numbers of the view, in plausible ranges; chief rays have no
-noise.
+VIEW_DIFFERENCE = 0.25
+"""Step of the difference quotients of numbers of the view, in plausible ranges. Chief rays have no
+noise, but the coverage of a pixel changes in steps of a sixteenth.
 """
 
 VIEW_SOLVES, VIEW_MOVED = 3, 0.03
 """Largest number of fits to the layers of one rendering, and the change of the view, in plausible
 ranges, at which they end. Pictures with sharp borders change linearly for shifts of a pixel only,
 and a fit to linear changes finds about half of a larger shift.
+"""
+
+BLURS = 6.0, 3.0, 0.0
+"""Standard deviations, pixels, by which pictures are blurred in the successive fits of a rough
+round. Details fit over displacements of about their size only, and the start is off by up to a
+tenth of the width.
 """
 
 ROUGH_SHARE, ROUGH_PIXELS = 0.5, 36.0
@@ -145,20 +152,22 @@ class FitRounds:
                 small, seen, layers, self._chosen, self.exposure, steps, slopes, pixels
             )
             return fit.solve(steps, contacts)
-        rendered = self._rays(small, steps)
-        start, shown, rays = steps.copy(), layers, rendered
-        for _ in range(VIEW_SOLVES):
-            every = slopes | self._view_slopes(small, seen, start, shown, rays)
-            fit = LayeredFit(small, seen, shown, self._chosen, self.exposure, start, every, pixels)
+        rendered = self._view(small, steps)
+        start, shown, view = steps.copy(), layers, rendered
+        for blur in (0.0,) * VIEW_SOLVES if pixels is None else BLURS:
+            every = slopes | self._view_slopes(small, seen, start, shown, view)
+            fit = LayeredFit(
+                small, seen, shown, self._chosen, self.exposure, start, every, pixels, blur
+            )
             found = fit.solve(steps, contacts)
             steps, contacts = found.steps, found.contacts
             moved = float(np.abs(steps[views] - start[views]).max())
-            if moved < VIEW_MOVED:
+            if moved < VIEW_MOVED and not blur:
                 break
             start = start.copy()
             start[views] = steps[views]
-            rays = self._rays(small, start)
-            shown = with_view(layers, seen, rendered, rays)
+            view = self._view(small, start)
+            shown = with_view(layers, seen, rendered, view)
         return found
 
     def places(self, fitted: SensorDesign, exposure: float) -> list[SeenContact]:
@@ -215,22 +224,22 @@ class FitRounds:
         seen: Sequence[SeenContact],
         steps: FloatArray,
         layers: LayeredPictures,
-        rays: ChiefRays,
+        view: CoveredView,
     ) -> dict[int, list[NDArray[np.float32]]]:
-        """Return the slopes of the numbers of the view, by index, at layers with these rays."""
+        """Return the slopes of the numbers of the view, by index, at layers with this view."""
         found: dict[int, list[NDArray[np.float32]]] = {}
         for number in self._rendering:
             if self._chosen[number].views:
                 other = self._other(number, steps, VIEW_DIFFERENCE)
                 size = np.float32(other[number] - steps[number])
-                changes = view_changes(layers, seen, rays, self._rays(small, other))
+                changes = view_changes(layers, seen, view, self._view(small, other))
                 found[number] = [change / size for change in changes]
         return found
 
-    def _rays(self, small: Photographs, steps: FloatArray) -> ChiefRays:
+    def _view(self, small: Photographs, steps: FloatArray) -> CoveredView:
         moved = [self._chosen[number] for number in self._rendering]
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
-        return self._model.chief_rays(small.size)
+        return CoveredView.of(self._model, small.size)
 
     def _other(self, number: int, steps: FloatArray, by: float) -> FloatArray:
         """Return steps with one of them changed, downwards if the number is at its upper limit."""

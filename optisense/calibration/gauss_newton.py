@@ -11,9 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
 
 from optisense.calibration.correlated_errors import ErrorScale, error_scale
 from optisense.calibration.layered_pictures import LayeredPictures, contact_slopes
@@ -132,6 +134,7 @@ class LayeredFit:
         start: FloatArray,
         slopes: dict[int, list[NDArray[np.float32]]],
         pixels: float | None = None,
+        blur: float = 0.0,
     ) -> None:
         """Prepare a round.
 
@@ -146,16 +149,17 @@ class LayeredFit:
                 the background and of each press per plausible range.
             pixels: number of pixels for which there is one independent error; estimated from the
                 errors if None.
+            blur: standard deviation, pixels, by which both pictures are blurred: details of blurred
+                pictures fit over larger displacements.
         """
-        self._pixels = pixels
+        self._pixels, self._blur = pixels, blur
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
         self._start, self._slopes = start, slopes
         limits = np.array([each.limits() for each in chosen]).reshape(-1, 2)
         self._low, self._high = limits[:, 0], limits[:, 1]
-        self._real = np.clip(photographs.background.astype(np.float64), *LEVELS)
+        self._real = self._compared(photographs.background)
         self._responses = [
-            np.clip(press.picture.astype(np.float64), *LEVELS) - self._real
-            for press in photographs.presses
+            self._compared(press.picture) - self._real for press in photographs.presses
         ]
         shape = self._real.shape[:2]
         self._masks = [distances(shape, place) <= NEAR for place in seen]
@@ -192,7 +196,14 @@ class LayeredFit:
         radiance = np.tensordot(factors.astype(np.float32), moved, axes=1)
         chain = chain_with(self._layers.chain, self._chosen, steps)
         levels = levels_of(np.maximum(radiance, 0.0), chain, self._exposure)
-        return np.clip(levels, *LEVELS)
+        return self._compared(levels)
+
+    def _compared(self, levels: NDArray[Any]) -> FloatArray:
+        """Return the levels of a picture that are compared: within limits, and blurred."""
+        found = np.clip(levels.astype(np.float64), *LEVELS)
+        if self._blur:
+            found = gaussian_filter(found, (self._blur, self._blur, 0.0))
+        return np.asarray(found)
 
     def solve(
         self,

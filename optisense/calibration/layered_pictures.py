@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.calibration.covered_view import CoveredView, with_smooth_outline
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact, contact_of
@@ -81,6 +82,7 @@ def layered_pictures(
             contact_of(press, place, model, rays)
             for press, place in zip(photographs.presses, seen, strict=True)
         ]
+    coverage = CoveredView.of(model, photographs.size).coverage
     pictures: list[FloatArray] = []
     for number, pressed in enumerate([(), *((contact,) for contact in contacts)]):
         progress(number)
@@ -90,7 +92,7 @@ def layered_pictures(
             (photographs.size, photons, seed),
             partial(_rendered, model, pressed, photographs.size, photons, seed),
         )
-        pictures.append(np.stack(list(layers.values())))
+        pictures.append(with_smooth_outline(np.stack(list(layers.values())), coverage))
     return LayeredPictures(
         tuple(model.design.lights), pictures[0], tuple(pictures[1:]),
         model.picture_chain.without_noise(), tuple(contacts),

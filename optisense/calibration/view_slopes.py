@@ -3,7 +3,8 @@
 A camera that moves sees the same light on other places of the skin. So the derivative follows from
 the chief rays of two cameras and from the rendered layers alone. A difference quotient of two
 renderings would contain their noise: a step of a few per cent changes a smooth background less than
-the noise of the light does.
+the noise of the light does. At the outline of the skin, such as the edge of a small mirror, the
+share of a pixel that sees skin changes.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
+from optisense.calibration.covered_view import CoveredView, outline_of
 from optisense.calibration.layered_pictures import LayeredPictures
 from optisense.calibration.seen_contacts import SeenContact
 
@@ -34,8 +36,8 @@ larger one see another part of the skin, such as by another mirror.
 def view_changes(
     layers: LayeredPictures,
     seen: Sequence[SeenContact],
-    before: ChiefRays,
-    after: ChiefRays,
+    before: CoveredView,
+    after: CoveredView,
 ) -> list[NDArray[np.float32]]:
     """Return the changes of the layers of the background and of each press by a change of the view.
 
@@ -46,11 +48,17 @@ def view_changes(
     Args:
         layers: layers before the change.
         seen: contacts in the photographs.
-        before, after: chief rays before and after the change, at the size of the layers.
+        before, after: views before and after the change, at the size of the layers.
     """
-    columns, rows = displacements(before, after)
-    ground = _moved(layers.background, columns, rows) - layers.background
-    scales = [_pixel_sizes(rays) for rays in (before, after)]
+    columns, rows = displacements(before.rays, after.rays)
+    outline = outline_of(before.coverage, after.coverage)
+    skin = layers.background if outline is None else outline.continued(layers.background)
+    ground = _moved(skin, columns, rows) - layers.background
+    if outline is not None:
+        more = (after.coverage - before.coverage)[outline.where, None].astype(np.float32)
+        ground[:, outline.outside] = 0.0
+        ground[:, outline.where] = more * outline.contrast(layers.background)
+    scales = [_pixel_sizes(view.rays) for view in (before, after)]
     found = [ground]
     for picture, place in zip(layers.presses, seen, strict=True):
         row, column = int(place.centre[1]), int(place.centre[0])
@@ -63,8 +71,8 @@ def view_changes(
 def with_view(
     layers: LayeredPictures,
     seen: Sequence[SeenContact],
-    before: ChiefRays,
-    after: ChiefRays,
+    before: CoveredView,
+    after: CoveredView,
 ) -> LayeredPictures:
     """Return layers after a change of the view, see `view_changes`."""
     ground, *presses = view_changes(layers, seen, before, after)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,6 +12,7 @@ import optisense as ots
 from optisense.calibration import photograph_model
 from optisense.calibration.calibrating import calibrate
 from optisense.calibration.camera_changes import with_camera_turned
+from optisense.calibration.covered_view import CoveredView, with_smooth_outline
 from optisense.calibration.layered_pictures import LayeredPictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
@@ -77,12 +79,12 @@ def test_distortion_moves_the_corners_of_a_picture_and_not_its_middle(mini: Opti
 
 
 def test_responses_grow_with_the_skin_that_a_pixel_sees(mini: OpticalModel) -> None:
-    before, after = mini.chief_rays(SIZE), seen_from((0.06, 0.0, 0.0)).chief_rays(SIZE)
+    before, after = (CoveredView.of(each, SIZE) for each in (mini, seen_from((0.06, 0.0, 0.0))))
     ground = np.ones((1, SIZE[1], SIZE[0], 3), np.float32)
     layers = LayeredPictures(("white",), ground, (ground + 0.5,), mini.picture_chain, ())
     found = view_changes(layers, [SeenContact((80.0, 60.0), 10.0)], before, after)
     assert np.abs(found[0]).max() < 1e-6  # an even background looks the same from anywhere
-    wider = np.ptp(after.points[60, :, 0]) / np.ptp(before.points[60, :, 0])
+    wider = np.ptp(after.rays.points[60, :, 0]) / np.ptp(before.rays.points[60, :, 0])
     assert found[1] == pytest.approx(np.full_like(ground, 0.5 * (wider - 1.0)), rel=0.1)
 
 
@@ -97,3 +99,46 @@ def test_a_hidden_view_is_found() -> None:
     assert right.after == pytest.approx(HIDDEN[1], abs=0.12)
     assert up.after == pytest.approx(HIDDEN[2], abs=0.12)
     assert all(each.determined for each in found.numbers)
+
+
+def test_the_outline_of_the_skin_moves_by_fractions_of_a_pixel() -> None:
+    """Rendered pixels are skin or not; averages of finer ones change with any displacement."""
+    design = ots.load("gelsight-svelte")
+    x, y, z = design.camera.position
+    moved = ots.set_value(design, "camera.position", [x, y + 0.1, z])
+    before, after = (CoveredView.of(ots.OpticalModel(each), SIZE) for each in (design, moved))
+    white, seen = (view.rays.hit[None, ..., None].astype(np.float32) for view in (before, after))
+    assert set(np.unique(white)) == {0.0, 1.0}
+    smooth = with_smooth_outline(np.repeat(white, 3, axis=-1), before.coverage)
+    assert smooth[0, ..., 0] == pytest.approx(before.coverage, abs=1e-6)
+    layers = LayeredPictures(("white",), smooth, (), ots.OpticalModel(design).picture_chain, ())
+    (change,) = view_changes(layers, [], before, after)
+    outline = (before.coverage > 0.0) & (before.coverage < 1.0)
+    shown = np.abs(change[0, ..., 0][outline]) > 0.01
+    flipped = (white != seen)[0, ..., 0][outline]
+    assert shown.mean() > 2.0 * flipped.mean() > 0.0
+    assert change[0, ..., 0] == pytest.approx(after.coverage - before.coverage, abs=1e-6)
+
+
+def test_a_fisheye_whose_view_is_far_from_the_start_is_found() -> None:
+    """Details of the round sensor's picture are smaller than the displacement at its edge, so that
+    only blurred pictures lead to the view.
+    """
+    design, hidden, size = ots.load("gelsight360"), 118.0, (120, 90)
+    real = ots.OpticalModel(ots.set_value(design, "camera.fov", hidden))
+    points = real.chief_rays(size).points
+    places = [(45, 45), (45, 75)]
+    balls = [
+        ots.Contact(ots.Sphere(3.0), point=tuple(points[place].astype(float).tolist()), depth=0.6)
+        for place in places
+    ]
+    taken = photograph_model(real, balls, resolution=size, photons=PHOTONS, seed=7, noise=1.0)
+    labelled = [
+        replace(press, centre=(column + 0.5, row + 0.5), radius=2.3)
+        for press, (row, column) in zip(taken.presses, places, strict=True)
+    ]
+    settings = CalibrationSettings(families=("view",), rounds=1, refine=False, photons=PHOTONS)
+    found = calibrate(design, replace(taken, presses=tuple(labelled)), settings)
+    (field,) = found.numbers
+    assert abs(field.before - hidden) == pytest.approx(10.0)
+    assert abs(field.after - hidden) < 6.0
