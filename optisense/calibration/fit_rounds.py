@@ -16,7 +16,7 @@ from optisense.calibration.contact_placing import (
     scaled_contact,
 )
 from optisense.calibration.covered_view import CoveredView
-from optisense.calibration.gauss_newton import LayeredFit, Solution
+from optisense.calibration.gauss_newton import LayeredFit, RoughFit
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.model_pictures import matched_exposure
@@ -25,6 +25,7 @@ from optisense.calibration.quantities import designed
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
+from optisense.calibration.solution import Solution
 from optisense.calibration.view_slopes import view_changes, with_view
 from optisense.design import SensorDesign
 
@@ -123,8 +124,7 @@ class FitRounds:
                 slopes = self._slopes(small, seen, steps, layers)
             self.report_step("fitting")
             rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
-            pixels = ROUGH_PIXELS if rough else None
-            found = self._solution(small, seen, layers, steps, slopes, pixels)
+            found = self._solution(small, seen, layers, steps, slopes, rough)
             if number:
                 found = found.with_changes(found.steps - steps)
             solution, steps = found, found.steps
@@ -140,7 +140,7 @@ class FitRounds:
         layers: LayeredPictures,
         steps: FloatArray,
         slopes: dict[int, list[NDArray[np.float32]]],
-        pixels: float | None,
+        rough: bool,
     ) -> Solution:
         """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
         displaced to it and fitted again.
@@ -149,16 +149,18 @@ class FitRounds:
         contacts = np.zeros((len(seen), 3))
         if not views:
             fit = LayeredFit(
-                small, seen, layers, self._chosen, self.exposure, steps, slopes, pixels
-            )
+                small, seen, layers, self._chosen, self.exposure, steps, slopes,
+                RoughFit(ROUGH_PIXELS) if rough else None,
+            )  # fmt: skip
             return fit.solve(steps, contacts)
         rendered = self._view(small, steps)
         start, shown, view = steps.copy(), layers, rendered
-        for blur in (0.0,) * VIEW_SOLVES if pixels is None else BLURS:
+        for blur in BLURS if rough else (0.0,) * VIEW_SOLVES:
             every = slopes | self._view_slopes(small, seen, start, shown, view)
             fit = LayeredFit(
-                small, seen, shown, self._chosen, self.exposure, start, every, pixels, blur
-            )
+                small, seen, shown, self._chosen, self.exposure, start, every,
+                RoughFit(ROUGH_PIXELS, blur) if rough else None,
+            )  # fmt: skip
             found = fit.solve(steps, contacts)
             steps, contacts = found.steps, found.contacts
             moved = float(np.abs(steps[views] - start[views]).max())

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optisense.calibration.gauss_newton import Solution
 from optisense.calibration.quantity import FitQuantity
+from optisense.calibration.solution import Solution
 from optisense.design import SensorDesign
 
 UNDETERMINED = 0.7

@@ -10,7 +10,7 @@ added. Huber's weights limit the influence of dust and scratches.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from optisense.calibration.quantities import chain_with, power_factors
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.realism import distances
 from optisense.calibration.seen_contacts import SeenContact
+from optisense.calibration.solution import Solution
 
 FloatArray = NDArray[np.float64]
 
@@ -69,9 +70,6 @@ SMALL_GAIN = 0.02
 uncertainty adds 1.
 """
 
-MEDIAN_SQUARE = 0.455
-"""Median of the square of a normally distributed number of variance 1."""
-
 LARGEST_STEP = 1.0
 """Largest change of a number in one step, in plausible ranges; the model is nearly linear there."""
 
@@ -81,44 +79,23 @@ ranges.
 """
 
 
-@dataclass(frozen=True)
-class Solution:
-    """Solution of one round of the fit.
-
-    Attributes:
-        steps: steps (n,) of the quantities, in plausible ranges from their starts.
-        contacts: changes (presses, 3) of column and row, pixels, and of the logarithm of the
-            radius.
-        covariance: covariance (n, n) of the steps: that of the posterior, plus that of errors which
-            are correlated within tiles, plus that of the changes since an earlier solution.
-        errors: root mean square errors of the background and of the responses, levels.
-        outlying: root mean square error of each press's response, levels.
-    """
-
-    steps: FloatArray
-    contacts: FloatArray
-    covariance: FloatArray
-    errors: tuple[float, float]
-    outlying: FloatArray
-
-    def with_changes(self, changes: FloatArray) -> Solution:
-        """Return the solution with the variance of the changes (n,) of its steps since an earlier
-        one, whose light had other noise: it shows what noise does, and how far the fit is from its
-        end.
-
-        A single change may be small by chance. If most changes are larger than the stated
-        deviations explain, all deviations are enlarged by their typical ratio (Birge 1932).
-        """
-        moved = changes != 0.0  # the others are at a limit
-        if not moved.any():
-            return self
-        ratios = changes[moved] ** 2 / np.diag(self.covariance)[moved]
-        scale = max(float(np.median(ratios)) / (2.0 * MEDIAN_SQUARE), 1.0)
-        return replace(self, covariance=scale * self.covariance + np.diag(changes**2))
-
-
 Scales = tuple[ErrorScale, ErrorScale]
 """Errors of the background and of the responses."""
+
+
+@dataclass(frozen=True)
+class RoughFit:
+    """Comparison of pictures in a rough round.
+
+    Attributes:
+        pixels: number of pixels for which there is one independent error; otherwise it is estimated
+            from the errors.
+        blur: standard deviation, pixels, by which both pictures are blurred: details of blurred
+            pictures fit over larger displacements.
+    """
+
+    pixels: float
+    blur: float = 0.0
 
 
 class LayeredFit:
@@ -133,8 +110,7 @@ class LayeredFit:
         exposure: float,
         start: FloatArray,
         slopes: dict[int, list[NDArray[np.float32]]],
-        pixels: float | None = None,
-        blur: float = 0.0,
+        rough: RoughFit | None = None,
     ) -> None:
         """Prepare a round.
 
@@ -147,12 +123,10 @@ class LayeredFit:
             start: steps (n,) of the quantities at which the layers were rendered.
             slopes: slopes of quantities that need a rendering, by index: changes of the layers of
                 the background and of each press per plausible range.
-            pixels: number of pixels for which there is one independent error; estimated from the
-                errors if None.
-            blur: standard deviation, pixels, by which both pictures are blurred: details of blurred
-                pictures fit over larger displacements.
+            rough: how pictures are compared in a rough round; None in the others.
         """
-        self._pixels, self._blur = pixels, blur
+        self._pixels = None if rough is None else rough.pixels
+        self._blur = 0.0 if rough is None else rough.blur
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
         self._start, self._slopes = start, slopes
         limits = np.array([each.limits() for each in chosen]).reshape(-1, 2)

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
-import sqlite3
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -14,11 +11,10 @@ import numpy as np
 import pytest
 
 from optisense.design import SensorDesign, save_design, set_value
-from optisense.errors import FolderInUseError, OutputError, SearchError
+from optisense.errors import SearchError
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search import Plan, SearchProgress, SearchSpace, Study, search
 from optisense.search.run_search import run_study
-from optisense.search.study.store import START, STORE_VERSION
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
 
@@ -318,91 +314,6 @@ class TestResume:
         with pytest.raises(SearchError, match="was edited") as told:
             run_study(Study.open(folder, goals=[score]))
         assert told.value.where == str(rule)
-
-
-class TestFolder:
-    @pytest.fixture
-    def folder(self, mini: SensorDesign, goals: ModuleType, tmp_path: Path) -> Path:
-        search(mini, SPACE, goals.nearness, budget=5, out=tmp_path / "study").study.close()
-        return tmp_path / "study"
-
-    def test_holds_all_of_it(self, folder: Path) -> None:
-        study = Study.open(folder)
-        assert study.settings.method == "cma-es"
-        assert [trial.number for trial in study.trials] == list(range(6))
-        assert study.store.rows()[0].generation == START
-        assert study.best is not None
-        assert study.best.fresh
-
-    def test_a_study_is_not_begun_over_another(
-        self, folder: Path, mini: SensorDesign, goals: ModuleType, tmp_path: Path
-    ) -> None:
-        with pytest.raises(SearchError, match="a study in this folder already"):
-            search(mini, SPACE, goals.nearness, budget=5, out=folder)
-        (tmp_path / "mine").mkdir()
-        (tmp_path / "mine" / "design").write_text("something of mine")
-        with pytest.raises(OutputError, match="not empty"):
-            search(mini, SPACE, goals.nearness, budget=5, out=tmp_path / "mine")
-        assert (tmp_path / "mine" / "design").read_text() == "something of mine"
-
-    def test_a_bad_plan_leaves_no_folder(
-        self, mini: SensorDesign, goals: ModuleType, tmp_path: Path
-    ) -> None:
-        with pytest.raises(SearchError):
-            search(mini, SPACE, goals.nearness, method="cma", out=tmp_path / "new")
-        assert not (tmp_path / "new").exists()
-
-    def test_a_store_of_a_newer_version_is_refused(self, folder: Path) -> None:
-        with sqlite3.connect(folder / "trials.sqlite") as file:
-            file.execute(f"pragma user_version = {STORE_VERSION + 1}")
-        with pytest.raises(SearchError, match="version 2; this release reads 1") as told:
-            Study.open(folder)
-        assert "update" in str(told.value.hint)
-
-    def test_a_study_of_a_newer_version_is_refused(self, folder: Path) -> None:
-        path = folder / "study.json"
-        path.write_text(json.dumps({**json.loads(path.read_text()), "study_version": 2}))
-        with pytest.raises(SearchError, match="version 2; this release reads 1"):
-            Study.open(folder)
-
-    def test_an_edited_study_is_refused(self, folder: Path) -> None:
-        path = folder / "study.json"
-        path.write_text(json.dumps({**json.loads(path.read_text()), "seed": 99}))
-        with pytest.raises(SearchError, match="was edited"):
-            Study.open(folder)
-
-    def test_broken_files_are_told(self, folder: Path, tmp_path: Path) -> None:
-        with pytest.raises(SearchError, match="no study here"):
-            Study.open(tmp_path)
-        (folder / "trials.sqlite").write_bytes(b"not a database, certainly not one" * 100)
-        with pytest.raises(SearchError, match="not a study's store"):
-            Study.open(folder)
-        (folder / "study.json").write_text("{")
-        with pytest.raises(SearchError, match="not JSON"):
-            Study.open(folder)
-
-    def test_two_processes_do_not_run_one_study(self, folder: Path, goals: ModuleType) -> None:
-        one, other = (Study.open(folder, goals=[goals.nearness]) for _ in range(2))
-        one.lock()
-        with pytest.raises(FolderInUseError, match=f"process {os.getpid()} on"):
-            run_study(other, limit=10)
-        one.unlock()
-        assert len(run_study(other, limit=10).trials) == 11
-
-    def test_a_full_disk_is_told_and_loses_nothing(self, folder: Path, goals: ModuleType) -> None:
-        """SQLite's own limit on the number of pages stands for the end of the disk."""
-        study = Study.open(folder, goals=[goals.nearness])
-        study.lock()
-        pages = study.store._writer.execute("pragma page_count").fetchone()[0]
-        study.store._writer.execute(f"pragma max_page_count = {pages}")
-        with pytest.raises(OutputError, match="disk is full") as told:
-            run_study(study, limit=2000)
-        assert "--resume" in str(told.value.hint)
-        study.close()
-        again = Study.open(folder, goals=[goals.nearness])
-        kept = len(again.trials)
-        assert kept >= 6
-        assert len(run_study(again, limit=kept + 20).trials) == kept + 21
 
 
 @pytest.mark.parametrize(
