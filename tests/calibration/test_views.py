@@ -13,6 +13,8 @@ from optisense.calibration import photograph_model
 from optisense.calibration.calibrating import calibrate
 from optisense.calibration.camera_changes import with_camera_turned
 from optisense.calibration.covered_view import CoveredView, with_smooth_outline
+from optisense.calibration.fit_rounds import FitRounds
+from optisense.calibration.kept_renderings import KEPT_NOWHERE
 from optisense.calibration.layered_pictures import LayeredPictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
@@ -137,8 +139,14 @@ def test_a_fisheye_whose_view_is_far_from_the_start_is_found() -> None:
         replace(press, centre=(column + 0.5, row + 0.5), radius=2.3)
         for press, (row, column) in zip(taken.presses, places, strict=True)
     ]
+    chosen = quantities_of(design, ["view"])
     settings = CalibrationSettings(families=("view",), rounds=1, refine=False, photons=PHOTONS)
-    found = calibrate(design, replace(taken, presses=tuple(labelled)), settings)
-    (field,) = found.numbers
-    assert abs(field.before - hidden) == pytest.approx(10.0)
-    assert abs(field.after - hidden) < 6.0
+    seen = [SeenContact((column + 0.5, row + 0.5), 2.3) for row, column in places]
+    rounds = FitRounds(
+        design, ots.OpticalModel(design), replace(taken, presses=tuple(labelled)), seen, chosen,
+        settings, KEPT_NOWHERE, lambda what, done, count: None,
+    )  # fmt: skip
+    solution = rounds.run()
+    (field,) = chosen
+    assert abs(field.value(0.0) - hidden) == pytest.approx(10.0)
+    assert abs(field.value(float(solution.steps[0])) - hidden) < 6.0
