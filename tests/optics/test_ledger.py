@@ -24,13 +24,14 @@ from optisense.optics.ledger import (
     light_ledger,
 )
 from optisense.optics.light_at_camera import projected_solid_angles
+from optisense.sensors import SENSORS as BUILT_IN
 
 PHOTONS = 200_000
 
 CLOSES = 1e-5
 """The sum of a group is 1 up to the rounding of single precision."""
 
-SENSORS = ("gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
+SENSORS = tuple(BUILT_IN.names())
 
 
 def ledger_of(design: ots.SensorDesign, photons: int = PHOTONS) -> LightLedger:
