@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from optisense.design import SensorDesign
 
 cage_app = typer.Typer(
-    help="Cages: control points that bend parts of a design.", no_args_is_help=True
+    help="Bend parts of a design by cages of control points.", no_args_is_help=True
 )
 
 CageArgument = Annotated[

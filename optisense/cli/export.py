@@ -58,7 +58,7 @@ def export(
         ),
     ] = None,
 ) -> None:
-    """Export a design to the workshop: its parts in mm, its LEDs and a bill of materials.
+    """Export parts, LEDs and a bill of materials for the workshop, or a model for robot simulators.
 
     Writes each part as it is deformed by its cages, pick-and-place.csv with the place of each
     LED, and bill-of-materials.csv and .md into the folder. With --for, writes a model for a robot

@@ -24,7 +24,8 @@ is wrapped at this width, so that every entry stays on one line.
 """
 
 library_app = typer.Typer(
-    help="Materials, coatings, lights and cameras that designs can name.", no_args_is_help=True
+    help="List, show and add materials, coatings, lights and cameras for designs.",
+    no_args_is_help=True,
 )
 
 
