@@ -18,6 +18,13 @@ use_variant(os.environ.get("OPTISENSE_TEST_VARIANT", "llvm"))
 RADIUS = 1.5
 
 
+@pytest.fixture(scope="module")
+def model() -> Any:
+    from optisense import OpticalModel, load
+
+    return OpticalModel(load("gelsight-mini-ideal"), "llvm")
+
+
 def press(
     colour: Callable[[np.ndarray], np.ndarray],
     depth: float = 0.3,

@@ -34,11 +34,6 @@ SMALL: dict[str, Any] = {
 
 
 @pytest.fixture(scope="module")
-def model() -> OpticalModel:
-    return OpticalModel(load("gelsight-mini-ideal"), "llvm")
-
-
-@pytest.fixture(scope="module")
 def evaluation(model: OpticalModel) -> Evaluation:
     return Evaluation(model, Settings(**SMALL))
 

@@ -6,20 +6,8 @@ from typing import Any
 
 import pytest
 
-from optisense import OpticalModel, evaluate, load
+from optisense import OpticalModel, evaluate
 from optisense.errors import ObjectiveError
-
-SMALL: dict[str, Any] = {
-    "resolution": (160, 120),
-    "ray_resolution": (80, 60),
-    "photons": 300_000,
-    "places": ((0.0, 0.0), (4.0, 3.0)),
-}
-
-
-@pytest.fixture(scope="module")
-def model() -> OpticalModel:
-    return OpticalModel(load("gelsight-mini-ideal"), "llvm")
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 from recording import draw
+from shown_picture import shown
 from waiting import until
 
 from studio.core.engine import EngineError
@@ -17,21 +18,12 @@ from studio.lights.choosing import _follow
 from studio.scene import remembering
 from studio.scene.build import build
 from studio.scene.collections import object_of, objects_of
-from studio.simulate import drafts, picture, relight
+from studio.simulate import drafts, picture
 from studio.simulate.exposing import resolution
 
 
 def small(scene: Any) -> None:
     scene.optisense_simulation.size, scene.optisense_simulation.noise = "320", 50.0
-
-
-def pixels() -> np.ndarray:
-    """(h, w, 4) of the picture, once the engine has answered."""
-    until(lambda: relight._open is None or relight._open.done)
-    image = bpy.data.images[picture.IMAGE]
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    return values.reshape(image.size[1], image.size[0], 4)
 
 
 def test_a_draft_takes_the_place_of_the_picture_whole(mini: Any) -> None:
@@ -46,9 +38,9 @@ def test_a_draft_takes_the_place_of_the_picture_whole(mini: Any) -> None:
     finally:
         picture.when_resized.remove(told.append)
         mini.optisense_simulation.draft = False
-    shown = pixels()
-    assert shown.shape == (240, 320, 4) and not told
-    assert np.array_equal(shown[::2, ::2], shown[1::2, 1::2]), "each pixel of the draft four times"
+    whole = shown()
+    assert whole.shape == (240, 320, 4) and not told
+    assert np.array_equal(whole[::2, ::2], whole[1::2, 1::2]), "each pixel of the draft four times"
     assert bpy.context.window_manager.optisense_picture.summary.startswith("160 x 120")
 
 
@@ -70,13 +62,13 @@ def test_relighting_never_blows_out_and_automatic_exposure_is_kept(mini: Any) ->
     first = settings.exposure
     for group in mini.optisense.light_groups:
         group.flux = 50.0
-    assert (pixels()[..., :3].min(axis=2) > 0.99).mean() < 0.05
+    assert (shown()[..., :3].min(axis=2) > 0.99).mean() < 0.05
     assert settings.exposure < 0.2 * first
-    before = pixels()
+    before = shown()
     settings.auto_exposure = False
-    assert np.array_equal(pixels(), before), "as bright as it was"
+    assert np.array_equal(shown(), before), "as bright as it was"
     settings.exposure *= 0.5
-    assert pixels().mean() < before.mean()
+    assert shown().mean() < before.mean()
 
 
 def test_the_longer_side_of_a_picture_is_as_asked(mini: Any) -> None:

@@ -12,6 +12,7 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Vector
+from shown_picture import shown
 from waiting import until
 
 from studio.engine import session
@@ -21,14 +22,6 @@ from studio.scene.objects_at import objects_at
 from studio.sensor import warming
 from studio.sensor.warming import warm_up
 from studio.simulate import drafts, picture, relight
-
-
-def shown() -> np.ndarray:
-    image = bpy.data.images[picture.IMAGE]
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    width, height = image.size
-    return values.reshape(height, width, 4)
 
 
 def small(scene: Any) -> None:

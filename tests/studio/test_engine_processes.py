@@ -14,20 +14,6 @@ from waiting import until
 from studio.core.engine import Engine, EngineError
 from studio.engine import session
 from studio.scene.gather import gather_document
-from studio.simulate import picture
-
-
-def shown() -> np.ndarray:
-    image = bpy.data.images[picture.IMAGE]
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    width, height = image.size
-    return values.reshape(height, width, 4)
-
-
-def small(scene: Any) -> None:
-    scene.optisense_simulation.size = "160"
-    scene.optisense_simulation.noise = 50.0
 
 
 def test_the_engine_may_die_midway(mini: Any) -> None:

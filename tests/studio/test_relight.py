@@ -6,18 +6,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from waiting import until
-
-from studio.simulate import picture, relight
-
-
-def shown() -> np.ndarray:
-    """(n,) what the picture's pixels are, once the engine has answered."""
-    until(lambda: relight._open is None or relight._open.done)
-    image = bpy.data.images[picture.IMAGE]
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    return values
+from shown_picture import shown
 
 
 def test_undo_relights_the_picture(mini: Any) -> None:

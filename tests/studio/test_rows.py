@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from waiting import until
+from shown_picture import shown
 
 from studio.core import rows
 from studio.lights.choosing import lights_of
@@ -16,7 +16,6 @@ from studio.looks.drawing import outline
 from studio.scene.collections import objects_of, select_only
 from studio.scene.gather import gather_document
 from studio.scene.lamps import light_pose
-from studio.simulate import picture, relight
 
 
 def places(scene: Any, group: str = "red") -> np.ndarray:
@@ -68,24 +67,20 @@ def test_a_group_alone_is_what_the_picture_shows(mini: Any) -> None:
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     was = gather_document(mini)["lights"]
 
-    def shown() -> np.ndarray:
-        until(lambda: relight._open is None or relight._open.done)
-        image = bpy.data.images[picture.IMAGE]
-        values = np.empty(len(image.pixels), dtype=np.float32)
-        image.pixels.foreach_get(values)
-        return values.reshape(-1, 4)[:, :3].mean(axis=0)
+    def mean_colour() -> np.ndarray:
+        return shown()[..., :3].mean(axis=(0, 1))
 
-    whole = shown()
+    whole = mean_colour()
     assert bpy.ops.optisense.solo_group(group="red") == {"FINISHED"}
-    red = shown()
+    red = mean_colour()
     assert red[0] > 0.5 * whole[0] and red[1] < 0.5 * whole[1] and red[2] < 0.5 * whole[2]
     assert all(each.hide_get() == (each.optisense.group != "red")
                for each in objects_of(mini, "LIGHT"))  # fmt: skip
     assert gather_document(mini)["lights"] == was  # the design keeps its lights
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
-    np.testing.assert_allclose(shown(), red, rtol=0.1, atol=0.01)
+    np.testing.assert_allclose(mean_colour(), red, rtol=0.1, atol=0.01)
     assert bpy.ops.optisense.solo_group(group="red") == {"FINISHED"}
-    np.testing.assert_allclose(shown(), whole, rtol=0.1, atol=0.01)
+    np.testing.assert_allclose(mean_colour(), whole, rtol=0.1, atol=0.01)
     with pytest.raises(RuntimeError, match="no light group 'pink'"):
         bpy.ops.optisense.solo_group(group="pink")
 

@@ -8,16 +8,10 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from shown_picture import shown
 from waiting import until
 
 from studio.simulate import drafts, picture, stored
-
-
-def shown() -> np.ndarray:
-    image = bpy.data.images[picture.IMAGE]
-    values = np.empty(len(image.pixels), dtype=np.float32)
-    image.pixels.foreach_get(values)
-    return values
 
 
 def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
