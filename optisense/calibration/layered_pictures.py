@@ -76,13 +76,12 @@ def layered_pictures(
         CalibrationError: a contact is not on the skin.
         OptiSenseError: the model can't be rendered, or a rendering can't be stored.
     """
+    view = CoveredView.of(model, photographs.size)
     if contacts is None:
-        rays = model.chief_rays(photographs.size)
         contacts = [
-            contact_of(press, place, model, rays)
+            contact_of(press, place, model, view.rays)
             for press, place in zip(photographs.presses, seen, strict=True)
         ]
-    coverage = CoveredView.of(model, photographs.size).coverage
     pictures: list[FloatArray] = []
     for number, pressed in enumerate([(), *((contact,) for contact in contacts)]):
         progress(number)
@@ -92,7 +91,7 @@ def layered_pictures(
             (photographs.size, photons, seed),
             partial(_rendered, model, pressed, photographs.size, photons, seed),
         )
-        pictures.append(with_smooth_outline(np.stack(list(layers.values())), coverage))
+        pictures.append(with_smooth_outline(np.stack(list(layers.values())), view.coverage))
     return LayeredPictures(
         tuple(model.design.lights), pictures[0], tuple(pictures[1:]),
         model.picture_chain.without_noise(), tuple(contacts),

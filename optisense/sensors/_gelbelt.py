@@ -68,11 +68,11 @@ LED = "smd-3528"
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ALONG_X, ALONG_Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 TAPE_INDEX = 1.49
-"""Refractive index of the clear tape; its provenance is in `gelbelt_sources`."""
+"""Refractive index of the clear tape; its provenance is in `_gelbelt_sources`."""
 
 ROLLER_CLEARANCE = 1.0
 """Distance in mm between the window and the small roller; its provenance is in
-`gelbelt_sources`."""
+`_gelbelt_sources`."""
 WHEEL_GAP = 0.02
 """Smallest air gap between belt and wheels, mm, so that they are not in optical contact."""
 BESIDE_WINDOW = 0.5

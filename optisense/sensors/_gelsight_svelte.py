@@ -60,7 +60,7 @@ PALM_OUTLINE = (
     (18.1, 67.6), (19.2, 76.6), (20.3, 84.6), (19.2, 89.5), (15.3, 92.4),
 )  # fmt: skip
 """Outline of the palm as (x, z) in mm, from its base to its tip; its provenance is in
-`svelte_sources`.
+`_svelte_sources`.
 """
 
 BACK_OUTLINE = (
