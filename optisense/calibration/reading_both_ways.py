@@ -47,6 +47,11 @@ FEWEST = 3
 places.
 """
 
+FEWEST_ALONE = 7
+"""Smallest number of presses of which each is read by a reader that is calibrated on the others.
+Six places determine the six terms of a polynomial of degree two of the place.
+"""
+
 DEGREE = 2
 """Degree of the reader's polynomial. If photographs of a GelSight Mini are read by readers that are
 calibrated on the others, the largest error is 7 degrees with degree 2, and 30 with degree 3.
@@ -148,10 +153,12 @@ def read_both_ways(
     of_model, of_photographs = _Reader(shown, balls), _Reader(real, balls)
     found = []
     for index, (press, ball) in enumerate(zip(photographs.presses, balls, strict=True)):
-        others = _Reader(real[:index] + real[index + 1 :], balls[:index] + balls[index + 1 :])
         forth = _judged(of_model.normals(real[index]), ball)
         back = _judged(of_photographs.normals(shown[index]), ball)
-        alone = _judged(others.normals(real[index]), ball)
+        alone: tuple[float | None, float | None] = None, None
+        if len(balls) >= FEWEST_ALONE:
+            others = _Reader(real[:index] + real[index + 1 :], balls[:index] + balls[index + 1 :])
+            alone = _judged(others.normals(real[index]), ball)
         found.append(ReadBothWays(press.name, *forth, *back, *alone))
     return tuple(found)
 

@@ -113,7 +113,8 @@ class ReadBothWays:
         radius_back, degrees_back: the same of a reader that is calibrated on the photographs, in
             the model's picture.
         radius_alone, degrees_alone: the same of a reader that is calibrated on the other
-            photographs, in this photograph: what the photographs permit without any model.
+            photographs, in this photograph: what the photographs permit without any model; None if
+            they are too few.
     """
 
     name: str
@@ -121,8 +122,8 @@ class ReadBothWays:
     degrees: float
     radius_back: float
     degrees_back: float
-    radius_alone: float
-    degrees_alone: float
+    radius_alone: float | None
+    degrees_alone: float | None
 
 
 @dataclass(frozen=True)
@@ -169,9 +170,9 @@ class Realism:
 
     def median_reading(self, name: str) -> float:
         """Return the median over the presses of one of the figures of readings; NaN without
-        readings.
+        it.
         """
-        values = [getattr(each, name) for each in self.readings]
+        values = [value for each in self.readings if (value := getattr(each, name)) is not None]
         return float(np.median(values)) if values else math.nan
 
     def as_data(self) -> dict[str, Any]:

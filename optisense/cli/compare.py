@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -104,6 +105,7 @@ def reading_lines(found: Realism) -> list[str]:
             ("the photographs", "the model", "radius_back", "degrees_back"),
             ("the photographs", "other photographs", "radius_alone", "degrees_alone"),
         )
+        if not math.isnan(found.median_reading(radius))
     ]
 
 

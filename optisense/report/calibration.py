@@ -113,7 +113,9 @@ def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
         rows.append((words, *medians, f"{noise:.3f}"))
     for name, words in READINGS.items():
         values = [math.nan if each is None else each.median_reading(name) for each in columns]
-        rows.append((words, *("" if math.isnan(value) else f"{value:.2f}" for value in values), ""))
+        if not all(map(math.isnan, values)):  # else there are too few presses for these readers
+            cells = ("" if math.isnan(value) else f"{value:.2f}" for value in values)
+            rows.append((words, *cells, ""))
     ratios = [side.realism.background.ratio for side in (found.before, found.after)]
     rows.append(("background, dB", *(f"{ratio:.1f}" for ratio in ratios), "", "", ""))
     return rows

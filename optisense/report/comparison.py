@@ -132,20 +132,16 @@ def noise_row(found: Realism) -> tuple[str, ...]:
 
 def reading_rows(found: Realism) -> list[tuple[str, ...]]:
     """Return the readings of each contact by readers that were calibrated on the model, on the
-    photographs, and on the other photographs.
+    photographs, and on the other photographs if these are enough.
     """
-    return [
-        (
-            each.name,
-            f"{each.radius:.2f}",
-            f"{each.degrees:.1f}",
-            f"{each.radius_back:.2f}",
-            f"{each.degrees_back:.1f}",
-            f"{each.radius_alone:.2f}",
-            f"{each.degrees_alone:.1f}",
-        )
-        for each in found.readings
-    ]
+    rows = []
+    for each in found.readings:
+        pairs = [(each.radius, each.degrees), (each.radius_back, each.degrees_back)]
+        if each.radius_alone is not None and each.degrees_alone is not None:
+            pairs.append((each.radius_alone, each.degrees_alone))
+        cells = [text for one, other in pairs for text in (f"{one:.2f}", f"{other:.1f}")]
+        rows.append((each.name, *cells))
+    return rows
 
 
 def press_section(found: Comparison, index: int) -> dict[str, Any]:

@@ -13,7 +13,13 @@ import pytest
 from typer.testing import CliRunner
 
 import optisense as ots
-from optisense.calibration import PhotographedPress, Photographs, compare, save_photographs
+from optisense.calibration import (
+    PhotographedPress,
+    Photographs,
+    compare,
+    photograph_model,
+    save_photographs,
+)
 from optisense.calibration.contact_finding import find_contact
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.reading_both_ways import read_both_ways
@@ -225,6 +231,7 @@ def test_readers_of_pictures_that_are_alike_read_each_others_balls(
     assert found.realism.median_reading("radius") == pytest.approx(1.0, abs=0.15)
     assert found.realism.median_reading("radius_back") == pytest.approx(1.0, abs=0.15)
     assert found.realism.median_reading("degrees") < 8.0
+    assert all(each.degrees_alone is None for each in found.realism.readings)  # two can't tell
     weaker = found.pictures.background
     half = replace(
         found.pictures,
@@ -236,3 +243,15 @@ def test_readers_of_pictures_that_are_alike_read_each_others_balls(
     assert np.median([each.radius for each in read]) < 0.93
     assert np.median([each.radius_back for each in read]) > 1.07
     assert read_both_ways(photographs.subset([0, 1]), found.seen[:2], half, rays, axes, 2.0) == ()
+
+
+def test_seven_presses_tell_what_readers_of_the_photographs_alone_achieve(
+    mini: OpticalModel,
+) -> None:
+    places = [(x, y) for x in (-4.0, 0.0, 4.0) for y in (-3.0, 3.0)] + [(1.0, 0.0)]
+    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in places]
+    taken = photograph_model(mini, balls, resolution=SIZE, photons=PHOTONS, seed=5, noise=1.0)
+    found = compare(mini, taken, photons=PHOTONS, seed=5).realism
+    assert len(found.readings) == len(places)
+    assert found.median_reading("radius_alone") == pytest.approx(1.0, abs=0.15)
+    assert found.median_reading("degrees_alone") < 8.0
