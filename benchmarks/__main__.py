@@ -78,7 +78,7 @@ def _options() -> argparse.Namespace:
     parser.add_argument("--dry", action="store_true", help="print only, write no results")
     options = parser.parse_args()
     if options.seeds < 2:
-        parser.error("--seeds must be 2 or more: their scatter tells the reference's noise")
+        parser.error("--seeds must be 2 or more: the scatter over seeds gives the noise")
     return options
 
 

@@ -34,10 +34,12 @@ FOLDER = Path(__file__).parent
 CACHE = FOLDER / ".cache"
 SENSORS = ("gelsight-mini-ideal", "gelsight-svelte", "gelbelt", "gelsight360")
 COATINGS = {"diffuse": 0.0, "metallic": 0.6}
-"""Specularity of each coating."""
+"""Specularity (0 to 1) of each coating: no metallic share, and more than half."""
 RESOLUTION = (160, 120)
+"""Width and height (pixels) of the images, half those of `benchmarks.case`, since eight references
+are rendered."""
 PHOTONS = 600_000
-"""Number of photons of an image."""
+"""Number of photons of an image, near the 560,000 of `benchmarks.case`."""
 SEEDS = (1, 2)
 """Seeds of the images; the first run also compiles kernels, so that the last run is timed."""
 RUNS = 4
@@ -45,11 +47,13 @@ RUNS = 4
 REFERENCE_PHOTONS = 6_000_000
 """Largest number of photons of each seed of the reference."""
 REFERENCE_SEEDS = (101, 102)
+"""Seeds of the two reference images, which no judged image has; the difference of the two gives the
+noise of the reference."""
 BOX = 3
 """Side (pixels) of the square over which pictures are averaged before they are compared, which
 removes most of the reference's noise."""
 RADIUS, DEPTH = 1.5, 0.8
-"""Radius and depth (mm) of the ball that is pressed in."""
+"""Radius and depth (mm) of the ball, those of `benchmarks.case`."""
 ERRORS = ("error_in_contact", "error_elsewhere")
 TIMES = ("cpu_s_new_light", "cpu_s_kept_light")
 
@@ -66,12 +70,12 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True)
 class Ablation:
-    """Something that is switched off.
+    """An acceleration or refinement that is switched off.
 
     Attributes:
-        name: of it.
-        changes: gives what is replaced; called when Mitsuba is loaded.
-        light: whether the light in the cache depends on it, and not only what is read from there.
+        name: its name in the table.
+        changes: function that returns the values to replace; it is called after Mitsuba is loaded.
+        light: whether the content of the radiance cache depends on it, and not only the shading.
     """
 
     name: str
@@ -88,7 +92,7 @@ class Ablation:
 
 
 def ablations() -> list[Ablation]:
-    """All of them; those of shading alone first, as they share one light."""
+    """Return all ablations; those of shading alone come first, since they share one cache."""
     import drjit as dr
     import mitsuba as mi
 
@@ -225,7 +229,13 @@ def main() -> None:
 
 
 def measure(name: str, coating: str, only: Sequence[str]) -> Iterator[tuple[str, dict[str, float]]]:
-    """What each ablation gives on a sensor; first "nothing", with all that there is."""
+    """Yield the results of each ablation on a sensor; the first is "nothing", with every feature.
+
+    Args:
+        name: built-in sensor.
+        coating: key of `COATINGS`.
+        only: words; an ablation is measured if its name contains one of them.
+    """
     model = OpticalModel(set_value(sensors.build(name), "coating.specularity", COATINGS[coating]))
     place = model.nine_contacts()[4].point
     assert place is not None
@@ -248,14 +258,14 @@ def measure(name: str, coating: str, only: Sequence[str]) -> Iterator[tuple[str,
 def judged(
     model: OpticalModel, ball: Contact, truth: FloatArray, noise: FloatArray, light: bool
 ) -> dict[str, float]:
-    """Errors, bias and processor seconds of images.
+    """Return errors, bias and processor seconds of images.
 
     Args:
-        model: the sensor.
-        ball: what presses.
-        truth: (h, w, 3) of the reference.
-        noise: its variance in each mask of `masks`.
-        light: whether the light is traced anew, with its pilot pass, and timed.
+        model: sensor.
+        ball: contact.
+        truth: smoothed radiance (h, w, 3) of the reference.
+        noise: variance of the reference's noise in each of the two masks of `masks`.
+        light: whether photons are traced again, with the pilot pass, and timed.
     """
     errors, ratios, cpu = [], [], {}
     if light:
@@ -278,7 +288,7 @@ def judged(
     cpu["cpu_s_kept_light"] = min(kept)
     if not light:
         del cpu["cpu_s_new_light"]
-    if light:  # the others read both of these lights
+    if light:  # ablations of shading alone read the radiance caches of both seeds
         model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[0], skin=CONFORMING)
     means = [truth[mask].mean() for mask in where]
     square = np.maximum(np.mean(errors, axis=0) - noise, 0.0)
@@ -293,17 +303,25 @@ def judged(
 
 
 def masks(contact: NDArray[np.bool_], truth: FloatArray) -> list[NDArray[np.bool_]]:
-    """Return masks of the pixels in the contact, and of all others that are not dark."""
+    """Return masks (h, w) of the pixels in the contact, and of all others that are not dark.
+
+    Args:
+        contact: contact mask (h, w).
+        truth: radiance (h, w, 3) of the reference.
+    """
     return [contact, ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())]
 
 
 def smooth(image: FloatArray) -> FloatArray:
-    """Return a picture averaged over squares of `BOX` pixels."""
+    """Return an image (h, w, 3), averaged over squares of `BOX` pixels."""
     return np.asarray(uniform_filter(image.astype(np.float64), (BOX, BOX, 1)))
 
 
 def reference(model: OpticalModel, ball: Contact, name: str) -> tuple[FloatArray, FloatArray]:
-    """The smoothed reference, and the variance of its noise in each mask; kept in a file."""
+    """Return the smoothed reference (h, w, 3) and the variance (2,) of its noise in each mask.
+
+    Both are kept in a file of `CACHE`.
+    """
     CACHE.mkdir(exist_ok=True)
     path = CACHE / f"ablation-{name}-{REFERENCE_PHOTONS}.npz"
     if not path.is_file():
@@ -323,7 +341,7 @@ def reference(model: OpticalModel, ball: Contact, name: str) -> tuple[FloatArray
 
 
 def changes(rows: dict[str, dict[str, float]], what: str) -> dict[str, float]:
-    """What the lack of something adds to each error and time, relative to having it."""
+    """Return the relative increase of each error and time without a feature."""
     with_it, without = rows["nothing"], rows[what]
     return {
         key: without[key] / with_it[key] - 1

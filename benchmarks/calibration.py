@@ -1,8 +1,8 @@
 """Fits to photographs of simulated sensors with hidden numbers, on four sensors.
 
 ``python -m benchmarks.calibration [--only NAME] [--dry]`` writes calibration.json and
-calibration.md beside this file. The photographs have noise, dust and blur, and the light of another
-seed than that of the fit. Hidden are all numbers that `optisense calibrate` fits by default.
+calibration.md beside this file. The photographs have noise, dust and blur, and photons of another
+seed than the fit. All numbers that `optisense calibrate` fits by default are hidden.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ SEED = 21
 HIDDEN = 1.0
 """Largest distance of a hidden number from its start, in plausible ranges."""
 RANGE = 4.0
-"""Length of the range of a number, of which errors are shares: two plausible ranges to each side of
-the start."""
+"""Length of the range of a number, in plausible ranges: two to each side of the start. Errors are
+given as shares of it."""
 SIZE = (160, 120)
 """Size (pixels) of the photographs, that of the fit."""
 FINER = 3
@@ -44,8 +44,8 @@ PLACES = ((0.3, 0.35), (0.7, 0.35), (0.5, 0.5), (0.3, 0.65), (0.7, 0.65), (0.5, 
 RADIUS, DEPTH = 3.0, 0.8
 """Radius and depth (mm) of the ball."""
 PHOTONS = 10_000_000
-"""Photons of the photographs: real light has no such noise, and that of a fit is larger with its
-3 million."""
+"""Number of photons of the photographs, whose noise is then below that of a fit with 3 million;
+real photographs have no such noise."""
 NOISE, BLUR = 1.0, 0.4
 """Standard deviation of the noise (levels) and of the blur (pixels): those of photographs of 320
 pixels with 2 levels and 0.8 pixels that are averaged to 160."""

@@ -18,6 +18,7 @@ DESIGN = "gelsight-mini-ideal"
 RADIUS, DEPTH = 1.5, 0.8
 """Radius and depth (mm) of the ball in the OptiSense paper."""
 RESOLUTION = (320, 240)
+"""Width and height (pixels) of the images, as in the OptiSense paper."""
 PHOTONS = 560_000
 """Number of photons of an image, about the smallest for an error of 3 % in the contact."""
 CONTACT_TEXT = f"sphere:{RADIUS}@0,0:{DEPTH}"
@@ -52,11 +53,14 @@ class Case:
 def relative_error(
     image: FloatArray, truth: FloatArray, mask: NDArray[np.bool_], truth_noise: float = 0.0
 ) -> float:
-    """Relative RMS error inside a mask: the RMS of the difference over pixels and channels, by the
-    mean of the truth.
+    """Return the RMS difference over pixels and channels, divided by the mean of the reference.
 
-    ``truth_noise``, the truth's own error in the same measure, is subtracted in quadrature; 0 if
-    that is the larger.
+    Args:
+        image: radiance (h, w, 3).
+        truth: radiance (h, w, 3) of the reference.
+        mask: mask (h, w) of the pixels that are compared.
+        truth_noise: the reference's own error in the same measure, which is subtracted in
+            quadrature; the result is 0 where it is larger than the difference.
     """
     difference = image[mask].astype(np.float64) - truth[mask]
     square = (difference**2).mean() / truth[mask].astype(np.float64).mean() ** 2

@@ -91,7 +91,10 @@ CASES = {
         "gelsight-mini-ideal", {"coating.specularity": (0.0, 0.8, 41)}, "rgb2normal", "grid", None
     ),
 }
-"""Searches by name."""
+"""Searches by name, of some minutes each with full scores. Lights move over the height of the guide
+or the housing (mm), specularity (0 to 1) varies over what spray coatings have, and the field of
+view (degrees) up to that of the built-in camera. 48 trials are four generations of CMA-ES; 41
+coatings are steps of 0.02."""
 
 
 def main() -> None:

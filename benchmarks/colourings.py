@@ -34,9 +34,11 @@ FOLDER = Path(__file__).parent
 OBJECTIVES = ("rgb2normal", "normdiff")
 COLOURS = {"lights.lg*.colour": ["R", "G", "B"]}
 DRAWN = 5
+"""Number of colourings that are rendered separately, which takes far longer than scoring layers."""
 OTHER_SEED = 999
-"""Seed of the separate renderings of colourings."""
+"""Seed of the separate renderings of colourings, which no image of the search has."""
 TARGET_SECONDS = 600.0
+"""Longest time (s) that scoring all colourings may take on two cores; the goal is ten minutes."""
 
 PAPERS = ("GRRGGRRG", "GBBRRGGB", "GRRBBGGR", "GBRBRGBR", "RGBRGBRG")
 """The colourings of the OptiSense paper's table, the original first."""
@@ -45,7 +47,7 @@ Scores = dict[str, float]
 
 
 def main() -> None:
-    """Search, draw five, render them, and write what came of it after each part."""
+    """Search, render some colourings separately, and write the results after each part."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--photons", type=float, default=5.0, help="millions an image")
     parser.add_argument("--out", help="keep the study in this folder", metavar="STUDY")
@@ -108,7 +110,7 @@ def write(found: dict[str, Any]) -> None:
 
 
 def letters(trial: Trial) -> str:
-    """The colours of the groups, as RGBRGBRG."""
+    """Return the colours of the groups as one word, such as RGBRGBRG."""
     return "".join(str(value)[0].upper() for value in _named(trial).values())
 
 
@@ -147,9 +149,9 @@ class KeptRunner:
 def compared(
     result: SearchResult, evaluator: Evaluator, trials: list[Trial], photons: int, console: Console
 ) -> Iterator[dict[str, Any]]:
-    """Five colourings, drawn at random: scored from layers and rendered by themselves.
+    """Yield the scores of random colourings, from layers and from renderings of their own.
 
-    The noise of an objective is the standard deviation over seeds, pooled over the five.
+    The noise of an objective is the standard deviation over seeds, pooled over the colourings.
     """
     drawn = np.random.default_rng(5).choice(len(trials), DRAWN, replace=False)
     chosen = [trials[number] for number in drawn]
@@ -185,7 +187,7 @@ def compared(
 
 
 def rendered(design: SensorDesign, photons: int, seed: int) -> Scores:
-    """Scores of a design from a model and images of its own."""
+    """Return the scores of a design from a new model and new images."""
     plain = set_value(design, "name", "by itself")
     return scores_of(Evaluation(OpticalModel(plain), Settings(photons=photons, seed=seed)))
 
@@ -197,7 +199,7 @@ def scores_of(evaluation: Evaluation) -> Scores:
 
 
 def markdown(runs: dict[str, Any]) -> str:
-    """The results for people."""
+    """Return the results of all runs as Markdown."""
     lines = [
         "# All colourings of GelSight360",
         "",

@@ -34,7 +34,11 @@ class Engine:
         self.ask("hello", protocol=1, folder=folder)
 
     def ask(self, do: str, **fields: Any) -> dict[str, Any]:
-        """Make a request and wait for its answer."""
+        """Make a request, wait for its answer and return its result.
+
+        Raises:
+            SystemExit: the engine answers with an error.
+        """
         assert self.process.stdin is not None and self.process.stdout is not None
         self.number += 1
         line = json.dumps({"id": self.number, "do": do, **fields}) + "\n"
@@ -47,7 +51,7 @@ class Engine:
         return dict(message["result"])
 
     def processor_seconds(self) -> float:
-        """Processor time that the engine has used; NaN if the system does not report it."""
+        """Return the processor time (s) of the engine; NaN where the system does not report it."""
         stat = Path(f"/proc/{self.process.pid}/stat")
         if not stat.exists():
             return float("nan")

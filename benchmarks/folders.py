@@ -1,8 +1,9 @@
-"""``python -m benchmarks.folders [--repeats 12] [--only NAME]``: is work in folders ever lost?
+"""Loss of work when several commands use one folder, or when one is killed.
 
-Each case is tried several times with real processes, started at once or one while the other works.
-It prints one line a case: how often something was lost. It needs only the command line, so that it
-can be run with an earlier release: ``--optisense /path/to/its/bin/optisense``.
+``python -m benchmarks.folders [--repeats 12] [--only NAME]`` tries each case several times with
+real processes, which start together or one while the other works. It prints for each case how often
+something was lost. It needs only the command line, so it can test an earlier release: ``--optisense
+/path/to/its/bin/optisense``.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class Bench:
         }
 
     def start(self, *words: object) -> subprocess.Popen[str]:
-        """A running command."""
+        """Start a command and return its process."""
         return subprocess.Popen(
             [*self._program, *map(str, words)],
             stdin=subprocess.DEVNULL,
@@ -68,13 +69,13 @@ class Bench:
         )
 
     def run(self, *words: object) -> int:
-        """The exit code of a command."""
+        """Run a command and return its exit code."""
         process = self.start(*words)
         process.communicate()
         return process.returncode
 
     def search(self, *more: object) -> list[object]:
-        """The words of a search of three trials."""
+        """Return the arguments of a search of three trials."""
         mine = self.here / "mine.py"
         mine.write_text(OBJECTIVE)
         return ["search", "gelsight-mini-ideal", "--vary", "coating.specularity=0:1", "--budget", 3,
@@ -82,7 +83,7 @@ class Bench:
                 "--out", self.here / "study", *more]  # fmt: skip
 
     def waiting(self) -> subprocess.Popen[str]:
-        """A search that waits in its first trial."""
+        """Start a search that waits in its first trial, and return its process."""
         pipe, asked = self.here / "wait", self.here / "asked"
         os.mkfifo(pipe)
         os.mkfifo(asked)

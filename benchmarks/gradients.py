@@ -44,24 +44,30 @@ FOLDER = Path(__file__).parent
 SENSORS = ("gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
 OBJECTIVES = ("aoap", "2to3pw")
 DIRECTIONS = 10
+"""Number of random directions along which derivatives are compared; the differences of ten need 640
+evaluations of a sensor."""
 STEPS = (0.02, 0.01)
 """Steps of the central differences to either side, as fractions of the parameters' ranges."""
 STABLE = 0.05
-"""Differences over the two steps that agree to this part of themselves are what derivatives are
-compared with."""
+"""Largest relative difference of the differences over the two steps; derivatives are compared only
+where they agree so well."""
 WITHIN = 0.05
-"""A gradient is right if it is off by at most this part of the difference along each direction, or
-of the slope that random directions have on average where the difference is smaller."""
+"""Largest relative error of a correct gradient: of the difference along a direction, or of the
+average slope of random directions where the difference is smaller."""
 RAYS = (480, 360)
+"""Number of chief rays across and down of a true score."""
 SHIFTS = 16
-"""The differences are those of the mean of so many scores, whose rays go through other points of
-the pixels: an edge that is parallel to a row of pixels moves past all of the row's rays at once."""
+"""Number of scores, each with rays through other points of the pixels, whose mean is a true score:
+an edge that is parallel to a row of pixels moves past all of the row's rays at once."""
 CAMERA = {"camera.position": Around(1.0), "camera.turn": Around(3.0), "camera.fov": Around(3.0)}
 """Range of the camera's position (mm) and rotation (degrees)."""
 CAGE = Around(1.0)
+"""Range of each coordinate of a cage's points (mm), that of the camera's position."""
 VIEW = {"camera.position.z": (0.0, 8.0), "camera.fov": Around(20.0)}
 """Parameters of the search on GelSight360, in mm and degrees."""
 VIEW_BUDGET = {"gradient": 40, "cma-es": 200}
+"""Number of trials of the search on GelSight360 by each method; CMA-ES, which has
+no derivatives, gets five times as many."""
 
 
 def main() -> None:
@@ -84,7 +90,10 @@ def main() -> None:
 
 
 def sensor(name: str) -> dict[str, Any]:
-    """Both objectives of a built-in sensor, by its camera and the points of its cage if any."""
+    """Return the derivatives of both objectives of a built-in sensor, beside true differences.
+
+    The parameters are the pose and field of view of its camera and the points of its cages.
+    """
     design = optisense.load(name)
     ranges: dict[str, Any] = dict(CAMERA)
     ranges |= {f"cages.{cage}.points": CAGE for cage in design.cages}
@@ -110,7 +119,7 @@ def sensor(name: str) -> dict[str, Any]:
 
 
 class TrueScores:
-    """The mean of each objective over rays through several points of the pixels."""
+    """Mean of each objective over rays through several points of the pixels."""
 
     def __init__(self, space: BoundSpace) -> None:
         self.space = space
@@ -131,7 +140,7 @@ class TrueScores:
 
 
 class _Shifted(OpticalModel):
-    """A model whose camera sends its rays beside the middles of the pixels."""
+    """Model whose camera sends its rays through points beside the middles of the pixels."""
 
     shift: FloatArray = np.zeros(2)
 
@@ -143,7 +152,11 @@ class _Shifted(OpticalModel):
 
 @dataclasses.dataclass(frozen=True)
 class _ShiftedCamera(RayCamera):
-    """`shift`: pixels to the right and down."""
+    """Camera whose rays are shifted.
+
+    Attributes:
+        shift: shift of the rays to the right and down, pixels.
+    """
 
     shift: tuple[float, float] = (0.0, 0.0)
 
@@ -156,7 +169,14 @@ class _ShiftedCamera(RayCamera):
 def _compared(
     space: BoundSpace, objective: str, ways: list[FloatArray], differences: FloatArray
 ) -> dict[str, Any]:
-    """What the method decides at the start, beside the differences (directions, steps)."""
+    """Return the gradient that the method uses at the start, beside the true differences.
+
+    Args:
+        space: search space.
+        objective: name of the objective.
+        ways: unit vectors (parameters,) of the directions, in shares of the ranges.
+        differences: central differences (directions, steps) of the true score.
+    """
     problem = Problem(space, (objective,), DIRECTIONS)
     method = Gradient(problem)
     evaluator = method.evaluator(DesignEvaluator(space, [objective], apart=False))
@@ -182,7 +202,7 @@ def _compared(
 
 
 def searches() -> dict[str, Any]:
-    """The view of GelSight360 by AOAP: by gradient, and by CMA-ES."""
+    """Search the view of GelSight360 by AOAP with the gradient method and with CMA-ES."""
     found: dict[str, Any] = {}
     for method, budget in VIEW_BUDGET.items():
         result: SearchResult = search(

@@ -28,27 +28,35 @@ FILE = Path(__file__).with_suffix(".md")
 THICKNESS, RADIUS = 4.25, 1.5
 """Thickness of GelSight Mini's gel and radius of the ball, mm."""
 GEL = Elasticity(youngs_modulus=0.435, poisson_ratio=0.49)
+"""Elasticity (MPa) of XP-565, the first gel of the library; a Poisson ratio of 0.49 is nearly
+incompressible."""
 INDENTATIONS = (0.01, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
-"""Depths over the thickness."""
+"""Depths of the ball over the thickness of the layer, from small strains, where the linear
+layer is accurate, to a third of it."""
 WIDTH = 25.0
 """Distance (mm) from the axis to the free side, six thicknesses."""
 ACROSS, DOWN = 64, 28
-"""Elements along the radius and through the thickness; the finest are 0.05 mm at the contact."""
+"""Number of elements along the radius and through the thickness; the finest are 0.05 mm wide at the
+contact."""
 STEP = 0.01
 """Indentation, over the thickness, between two solutions of Newton's method."""
 STIFFNESS = 400.0
-"""MPa/mm of the penalty: the ball enters the skin by 0.001 mm under the greatest pressures."""
+"""Stiffness of the penalty, MPa/mm: the ball enters the skin by 0.001 mm under the greatest
+pressures."""
 MOST_ITERATIONS = 100
+"""Largest number of Newton steps for one depth; a solution that needs more counts as divergent."""
 ENOUGH = 1e-8
 """Residual force (N) over the force on the ball at which Newton's method ends."""
 SMALLEST_PART = 0.01
 """Share of Newton's step below which the step is taken even if residuals grow, as they do when
 nodes come into contact."""
 LINE_POINTS = 130
-"""Grid points across the linear solution."""
+"""Number of grid points across the linear solution; the contact covers more than half of them."""
 
 POINTS = np.array([(x, y) for y in (-1, 1) for x in (-1, 1)]) / math.sqrt(3.0)
+"""Local coordinates (4, 2) of an element's Gauss points, for 2 x 2 Gauss-Legendre quadrature."""
 CORNERS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=np.float64)
+"""Local coordinates (4, 2) of an element's corners."""
 
 
 class Press(NamedTuple):
@@ -59,8 +67,14 @@ class Press(NamedTuple):
 
 
 class State(NamedTuple):
-    """Residual force of each freedom (N), stiffness, how far each node of the skin has entered the
-    ball (mm), and the force on the ball (N)."""
+    """Equilibrium of the layer for given displacements.
+
+    Attributes:
+        residual: residual force (2 n,) of each degree of freedom, N.
+        matrix: sparse stiffness matrix (2 n, 2 n), N/mm.
+        entered: depth (skin nodes,) of each node of the skin inside the ball, mm.
+        on_ball: force on the ball, N.
+    """
 
     residual: FloatArray
     matrix: Any
@@ -69,7 +83,7 @@ class State(NamedTuple):
 
 
 class Layer:
-    """The axisymmetric model. Nodes have displacements along r and z, z upward."""
+    """Axisymmetric finite element model; nodes have displacements along r and z, z upward."""
 
     def __init__(self) -> None:
         share = np.linspace(0.0, 1.0, ACROSS + 1)
@@ -87,7 +101,7 @@ class Layer:
         held = np.column_stack([on_axis | at_base, at_base]).ravel()
         self.free = np.flatnonzero(~held)
         edges = np.concatenate([[r[0]], 0.5 * (r[1:] + r[:-1]), [r[-1]]])
-        self.areas = math.pi * np.diff(edges**2)  # of the skin around each of its nodes
+        self.areas = math.pi * np.diff(edges**2)  # area of the skin around each of its nodes
         self.moved = np.zeros_like(self.nodes)
         self._shape()
 
@@ -116,9 +130,13 @@ class Layer:
         self.freedoms = (2 * self.elements[:, :, None] + np.arange(2)).reshape(count, 8)
 
     def forces(self) -> tuple[FloatArray, FloatArray]:
-        """(e, 8) inner forces and (e, 8, 8) stiffness of the elements where they are now.
+        """Return inner forces (e, 8) and stiffness (e, 8, 8) of the deformed elements, in N and mm.
 
-        The energy is mu / 2 (J^(-2/3) I1 - 3), and K / 2 (mean J - 1)^2 of the element's mean.
+        The energy density is mu / 2 (J^(-2/3) I1 - 3) + K / 2 (J_e - 1)^2, where J_e is the mean of
+        J over the element (mean dilatation, Nagtegaal, Parks and Rice 1974).
+
+        Raises:
+            FloatingPointError: an element is turned inside out.
         """
         mu = GEL.shear_modulus
         bulk = GEL.youngs_modulus / (3.0 * (1.0 - 2.0 * GEL.poisson_ratio))
@@ -165,7 +183,11 @@ class Layer:
         return force, stiff + (bulk / total)[:, None, None] * spread[:, :, None] * spread[:, None]
 
     def press(self, depth: float) -> Press:
-        """Push the ball to a depth (mm) from where it is, by Newton's method with damping."""
+        """Push the ball from its current depth to another one (mm), by damped Newton steps.
+
+        Raises:
+            RuntimeError: Newton's method does not converge.
+        """
         state = self._state(depth)
         for _ in range(MOST_ITERATIONS):
             off = state.residual[self.free]
@@ -223,7 +245,11 @@ class Layer:
         return State(residual, matrix, entered, float((push * -out[:, 1]).sum()))
 
     def _rim(self, entered: FloatArray) -> float:
-        """Radius (mm) at which the pressure, whose square falls evenly there, ends."""
+        """Return the radius (mm) of the contact, where the squared pressure extrapolates to 0.
+
+        Args:
+            entered: depth (skin nodes,) of the nodes inside the ball, mm.
+        """
         at = (self.nodes + self.moved)[self.skin, 0]
         last = int(np.flatnonzero(entered > 0.0).max())
         square = entered**2
@@ -233,7 +259,7 @@ class Layer:
 
 
 def linear(depth: float) -> Press:
-    """The same press into the linear layer that the simulator uses."""
+    """Return the press to a depth (mm) into the linear layer that the simulator uses."""
     width = 2.4 * math.sqrt(max(RADIUS**2 - (RADIUS - depth) ** 2, 0.0))
     pitch = width / LINE_POINTS
     x = (np.arange(LINE_POINTS) - (LINE_POINTS - 1) / 2) * pitch

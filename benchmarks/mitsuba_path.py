@@ -16,12 +16,13 @@ from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import Region
 
 PASS_SAMPLES = 16
+"""Number of samples per pixel in one call of Mitsuba, few enough for snapshots near their times."""
 DEPTH = 32
 """Largest number of surfaces of a path; longer paths carry less than 0.1 % of the light."""
 
 
 def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:
-    """The parts of the sensor, and all pieces with the ball's."""
+    """Return the assembly of the sensor, and the pieces of the sensor and the ball."""
     model = case.model
     parts = assembly.assemble(model.design)
     coat = assembly.coating_surface(
@@ -33,7 +34,10 @@ def case_pieces(case: Case) -> tuple[assembly.Assembly, list[Piece]]:
 
 
 def render_path(case: Case, budget: float) -> list[Snapshot]:
-    """Images of the whole budget (seconds) and of halves of it; kernels are compiled before."""
+    """Return images after the whole budget (s) and after halves of it.
+
+    Kernels are compiled before the time begins.
+    """
     model = case.model
     parts, pieces = case_pieces(case)
     flux = [tuple(model.design.lights[name].channel_flux().tolist()) for name in parts.groups]

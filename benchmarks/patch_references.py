@@ -57,10 +57,11 @@ SPPM_SAMPLES = 8
 """Camera samples of each pixel in a pass, whose discs together cover the pixel several times. With
 one, the noise is twice as large."""
 FIRST_SEED = 9_000
+"""Seed of the first batch of photons, far from the seeds of the judged images."""
 
 
 class Referee(StrEnum):
-    """Settings of a reference."""
+    """Renderer of a reference."""
 
     PATH = "path"
     SPPM = "sppm"
@@ -68,11 +69,11 @@ class Referee(StrEnum):
 
 @dataclass(frozen=True)
 class Reference:
-    """Return independent pictures of a reference renderer.
+    """Independent pictures of a reference renderer.
 
     Attributes:
-        batches: (n, h, w, 3) radiance, zero outside the window.
-        seconds: of processor time that they took.
+        batches: radiance (n, h, w, 3), zero outside the window.
+        seconds: processor time of all pictures, s.
     """
 
     batches: FloatArray
@@ -85,11 +86,11 @@ def reference(
     """Return the pictures of a reference renderer, which are cached in a file.
 
     Args:
-        referee: which.
-        model: the sensor.
-        contact: the one that presses.
-        image: what is judged; its contact mask and points tell the window.
-        margin: pixels around the contact.
+        referee: reference renderer.
+        model: sensor.
+        contact: contact.
+        image: image that is judged; its contact mask determines the window.
+        margin: width of the margin around the contact, pixels.
     """
     kind = f"{SPPM_PASSES}-{SPPM_SAMPLES}-{SPPM_RADIUS:g}"
     if referee is Referee.PATH:
@@ -116,9 +117,7 @@ def reference(
 
 
 def _digest(design: SensorDesign, more: list[str]) -> str:
-    """A name for a design (its values, save those left as they are by default, and its meshes) and
-    for more that was asked.
-    """
+    """Return a name for a design (its values that are not defaults, its meshes) and for texts."""
     digest = hashlib.sha256(design.model_dump_json(exclude_defaults=True).encode())
     for name, mesh in sorted(design.meshes.items()):
         digest.update(name.encode())

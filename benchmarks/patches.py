@@ -4,8 +4,8 @@
 this file. A ball is pressed into a sensor. What the radiance cache gives in the contact is averaged
 over patches (bands of tilt times quarters of azimuth), likewise in a ring of untouched skin around
 it; the row of pixels between both, where skin and flank reflect each other at grazing angles, is
-told apart. The path tracer knows nothing of photons, cells or bins. Its pictures are kept in
-benchmarks/.cache, and its noise is taken off.
+reported separately. The path tracer knows nothing of photons, cells or bins. Its pictures are kept
+in benchmarks/.cache, and its noise is subtracted in quadrature.
 """
 
 from __future__ import annotations
@@ -37,33 +37,37 @@ from optisense.optics import TactileImage
 
 FloatArray = NDArray[np.floating]
 RESOLUTION = (160, 120)
+"""Width and height (pixels) of the images, half those of `benchmarks.case`, since the path tracer
+needs 131,072 samples for each pixel."""
 RESOLUTIONS = {"gelbelt": (320, 240), "gelsight-svelte": (320, 240), "gelsight360": (480, 360)}
-"""Resolutions for the sensors whose pictures of `RESOLUTION` show a contact in few pixels."""
+"""Resolutions (pixels) for the sensors on whose images of `RESOLUTION` a contact has few pixels."""
 RADIUS = 1.5
-"""Radius (mm) of the ball that is pressed in."""
+"""Radius (mm) of the ball, that of `benchmarks.case`."""
 PHOTONS = 10_000_000
-"""Number of photons of each image."""
+"""Number of photons of each image, far more than usual, so that noise is below the errors."""
 SEEDS = (1, 2)
 """Seeds of the images, which are averaged to reduce their noise."""
 TILTS = 5
-"""Bands of tilt in the contact, each of as many pixels."""
+"""Number of bands of tilt in the contact, each with as many pixels."""
 QUARTERS = 4
-"""Sectors of azimuth."""
+"""Number of sectors of azimuth, of 90 degrees each: GelSight Mini has a light on each side."""
 RING = 12
 """Width (pixels) of the ring of skin around the contact, beyond the rim."""
 MARGIN = RING + 2
+"""Width (pixels) of the margin around the contact in the reference: the ring and the rim."""
 
 
 @dataclass(frozen=True)
 class PatchCase:
-    """A sensor with a coating and a ball.
+    """Sensor with a coating and a contact.
 
     Attributes:
-        sensor: its name; "gelsight360" gets a perspective camera, as Mitsuba has no other.
-        specularity: of the coating.
-        place: number of the place of `OpticalModel.nine_contacts`; 4 is the middle.
-        depth: mm.
-        referee: what the reference is made by.
+        sensor: built-in sensor; "gelsight360" gets a perspective camera, since Mitsuba has no
+            fisheye.
+        specularity: specularity of the coating, 0 to 1.
+        place: index of the place in `OpticalModel.nine_contacts`; 4 is the middle.
+        depth: depth of the ball, mm.
+        referee: reference renderer.
     """
 
     sensor: str
@@ -74,17 +78,17 @@ class PatchCase:
 
     @property
     def name(self) -> str:
-        """For tables."""
+        """Name of the case in tables."""
         where = f"place {self.place}, {self.depth:g} mm"
         return f"{self.sensor}, {self.specularity:g}, {where}, by {self.referee}"
 
     @property
     def resolution(self) -> tuple[int, int]:
-        """Resolution of its images."""
+        """Width and height of the images, pixels."""
         return RESOLUTIONS.get(self.sensor, RESOLUTION)
 
     def design(self) -> SensorDesign:
-        """The sensor's design."""
+        """Return the sensor's design."""
         design = set_value(sensors.build(self.sensor), "coating.specularity", self.specularity)
         if self.sensor == "gelsight360":
             design = set_value(design, "camera.projection", "perspective")
@@ -92,7 +96,7 @@ class PatchCase:
         return design
 
     def contact(self, model: OpticalModel) -> Contact:
-        """The ball."""
+        """Return the contact of the ball."""
         place = model.nine_contacts()[self.place].point
         assert place is not None
         return Contact(Sphere(radius=RADIUS), point=place, depth=self.depth)
@@ -109,16 +113,19 @@ CASES = [
     *(PatchCase("gelsight-svelte", s) for s in (0.0, 0.3, 0.6, 1.0)),
     *(PatchCase("gelsight360", s) for s in (0.0, 0.3, 0.6, 1.0)),
 ]
+"""Cases: flat and curved gels, the middle of the view and its corner (place 0), and coatings of a
+specularity (0 to 1) from diffuse to mirroring. The cylindrical gel is pressed by 0.3 mm, the depth
+of scores."""
 
 
 @dataclass(frozen=True)
 class Patches:
-    """Numbers (h, w) of the patch that each pixel belongs to, -1 for none.
+    """Index (h, w) of the patch of each pixel, -1 for none.
 
     Attributes:
-        contact: by tilt and azimuth, `TILTS` times `QUARTERS`.
-        skin: the ring around, by azimuth.
-        rim: the row of pixels between, by azimuth.
+        contact: patches of the contact by tilt and azimuth, `TILTS` times `QUARTERS`.
+        skin: patches of the ring around the contact, by azimuth.
+        rim: patches of the row of pixels between contact and ring, by azimuth.
     """
 
     contact: NDArray[np.integer]
@@ -127,7 +134,7 @@ class Patches:
 
     @classmethod
     def of(cls, image: TactileImage) -> Patches:
-        """The patches of an image with one contact."""
+        """Return the patches of an image with one contact."""
         inside = image.contact_mask
         normals = image.normals
         around = ndimage.distance_transform_edt(~inside)
@@ -149,25 +156,26 @@ class Patches:
 
 
 def means(image: FloatArray, patch: NDArray[np.integer]) -> FloatArray:
-    """(patches, 3) means of an image (h, w, 3) over the patches that have pixels."""
+    """Return the means (patches, 3) of an image (h, w, 3) over the patches that have pixels."""
     return np.array([image[patch == n].mean(axis=0) for n in np.unique(patch[patch >= 0])])
 
 
 def compare(
     images: FloatArray, truth: Reference, patch: NDArray[np.integer], scale: FloatArray
 ) -> dict[str, float]:
-    """Errors of images over patches.
+    """Return errors of images over patches.
 
     Args:
-        images: (n, h, w, 3), of several seeds.
-        truth: what they are compared with.
-        patch: (h, w) number of the patch of each pixel.
-        scale: (3,) by which differences of channels are divided.
+        images: radiance (n, h, w, 3) of images with different seeds.
+        truth: reference.
+        patch: index (h, w) of the patch of each pixel.
+        scale: radiance (3,) by which the differences of each channel are divided.
 
     Returns:
-        rms: of the mean of the images, over all patches and channels, both noises taken off.
-        worst: of one patch. noise: RMS of the reference. image_noise: RMS of the mean of the
-        images. red, green, blue: relative error of the whole.
+        rms: RMS error of the mean of the images over all patches and channels, with the noise of
+        both subtracted in quadrature. worst: error of the worst patch. noise: RMS noise of the
+        reference. image_noise: RMS noise of the mean of the images. red, green, blue: relative
+        error of the mean over all patches.
     """
     (whole, noise), (mean, image_noise) = (
         _mean_and_variance(np.array([means(picture, patch) for picture in pictures]) / scale)
@@ -176,7 +184,7 @@ def compare(
     off = mean - whole
     everywhere = truth.batches.mean(axis=0)[patch >= 0].mean(axis=0)
     ratio = images.mean(axis=0)[patch >= 0].mean(axis=0)
-    # A sensor may have no light of a colour.
+    # Some sensors have no light of a colour.
     ratio = np.where(everywhere > 0, ratio / np.where(everywhere > 0, everywhere, 1.0) - 1, 0.0)
     found = {
         "rms": float(np.sqrt(max((off**2).mean() - noise - image_noise, 0.0))),
@@ -189,7 +197,7 @@ def compare(
 
 
 def _mean_and_variance(each: FloatArray) -> tuple[FloatArray, float]:
-    """The mean of independent values (n, ...), and its mean squared noise."""
+    """Return the mean of independent values (n, ...), and the mean variance of that mean."""
     return each.mean(axis=0), float(each.var(axis=0, ddof=1).mean() / len(each))
 
 

@@ -32,6 +32,7 @@ LOOK_EVERY = 0.5
 """Time (s) between two readings of the screen."""
 
 ROWS = 50
+"""Number of rows of the terminal, enough for all messages of a command."""
 SHARES = (0.1, 0.25, 0.5, 0.75)
 """Shares of the total time at which the predicted total is compared with the real one."""
 
@@ -43,7 +44,13 @@ LIVE = re.compile(r"[━─╸╺]|" + CLOCK.pattern)
 
 @dataclass
 class DesignView:
-    """Content of the screen at one time."""
+    """Progress line at one time.
+
+    Attributes:
+        seconds: time since the start, s.
+        line: progress line.
+        left: time left that it states, s; None if it states none.
+    """
 
     seconds: float
     line: str
@@ -52,15 +59,15 @@ class DesignView:
 
 @dataclass
 class Watched:
-    """A whole run.
+    """Observations of a whole run.
 
     Attributes:
-        looks: at the progress line, in order.
-        seconds: the run took.
-        code: its exit code; minus the signal that killed it.
-        obeyed: seconds from the first Ctrl-C to the end, None where none was pressed.
-        answered: seconds from Ctrl-C until the screen said something about it.
-        screen: what it showed in the end.
+        looks: readings of the progress line, in order.
+        seconds: duration of the run, s.
+        code: exit code; minus the number of the signal that ended the run.
+        obeyed: time from the first Ctrl-C to the end, s; None if none was pressed.
+        answered: time from Ctrl-C until the screen mentioned it, s; None if it never did.
+        screen: lines of the last screen.
     """
 
     looks: list[DesignView] = field(default_factory=list)
@@ -72,7 +79,13 @@ class Watched:
 
 
 def watch(command: list[str], columns: int, presses: list[float]) -> Watched:
-    """Run a command in a terminal of so many columns; Ctrl-C after each of ``presses`` seconds."""
+    """Run a command in a terminal, and observe its screen.
+
+    Args:
+        command: program and arguments.
+        columns: width of the terminal.
+        presses: times (s) after which Ctrl-C is pressed.
+    """
     pid, terminal = pty.fork()
     if pid == 0:
         os.execvp(command[0], command)
@@ -116,7 +129,7 @@ def _answers(screen: pyte.Screen) -> bool:
 
 
 def _line(screen: pyte.Screen) -> str:
-    """The progress line: the lowest one with a bar or a clock, with the line that it runs over."""
+    """Return the progress line: the lowest one with a bar or a clock, or else the lowest one."""
     lines = [line.rstrip() for line in screen.display]
     for number in range(len(lines) - 1, -1, -1):
         if LIVE.search(lines[number]):
@@ -133,13 +146,13 @@ def _left(line: str) -> float | None:
 
 
 def _stage(line: str) -> str:
-    """A line without what changes while a stage lasts."""
+    """Return a line without its bar, clock and numbers, which change while a stage lasts."""
     plain = re.sub(r"[━─╸╺]+", " ", CLOCK.sub("", line))
     return re.sub(r"\s+", " ", re.sub(r"[-+]?\d[\d.,e]*", "#", plain)).strip()
 
 
 def summary(found: Watched) -> dict[str, object]:
-    """The figures of a run."""
+    """Return the figures of a run."""
     stages: list[str] = []
     for look in found.looks:
         stage = _stage(look.line)
@@ -150,7 +163,7 @@ def summary(found: Watched) -> dict[str, object]:
     for look in found.looks:
         still, line = (look.seconds, look.line) if look.line != line else (still, line)
         longest = max(longest, look.seconds - still)
-        # The same but for the clock: nothing but time goes by.
+        # Compared without the clock, which always advances.
         shown = CLOCK.sub("", look.line)
         bare, before = (look.seconds, shown) if shown != before else (bare, before)
         longest_bare = max(longest_bare, look.seconds - bare)

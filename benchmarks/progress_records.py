@@ -91,7 +91,7 @@ COMMANDS = {
 
 
 class IdleClock:
-    """Clock that returns the times of a record."""
+    """Clock that returns the times of a record, s."""
 
     def __init__(self) -> None:
         """Start at 0."""
@@ -104,7 +104,7 @@ class IdleClock:
 
 @contextmanager
 def noted(found: list[dict[str, Any]]) -> Iterator[None]:
-    """Record the calls of each `TimeLeft`; one dict for each that has steps."""
+    """Record the calls of each `TimeLeft` in one dictionary for each that has steps."""
     methods = {name: getattr(TimeLeft, name) for name in ("__init__", "begin", "expect", "advance")}
 
     def begun(self: TimeLeft, steps: Any, workers: int = 1, clock: Any = time.monotonic) -> None:
@@ -138,7 +138,7 @@ def noted(found: list[dict[str, Any]]) -> Iterator[None]:
 
 
 def record(arguments: list[str]) -> dict[str, Any]:
-    """Run a command of optisense here, and note its progress as on an idle machine."""
+    """Run a command of optisense in this process, and record its progress."""
     from optisense.cli.app import app
 
     usual_times.crowding = lambda: 1.0
@@ -156,7 +156,14 @@ def record(arguments: list[str]) -> dict[str, Any]:
 
 
 def promised(record: dict[str, Any], shares: tuple[float, ...] = SHARES) -> list[float]:
-    """The promised total over the real one at parts of the whole time; NaN where none is shown."""
+    """Return the predicted total time over the real one at shares of the total time.
+
+    The last value is the total time, s. A value is NaN where no time left is shown.
+
+    Args:
+        record: record of a command.
+        shares: shares of the total time, 0 to 1.
+    """
     clock = IdleClock()
     names = [step["name"] for step in record["steps"]]
     known = names[0] in SERIAL
@@ -188,7 +195,7 @@ def promised(record: dict[str, Any], shares: tuple[float, ...] = SHARES) -> list
 
 
 def page(records: dict[str, dict[str, Any]]) -> str:
-    """The table of all commands."""
+    """Return the table of all commands as Markdown."""
     heads = " | ".join(f"{share:.0%}" for share in SHARES)
     rows = []
     for name, each in records.items():
@@ -213,7 +220,7 @@ def page(records: dict[str, dict[str, Any]]) -> str:
 
 
 def file_of(name: str) -> Path:
-    """Where the record of a command is kept."""
+    """Return the path of the record of a command."""
     return RECORDS / (name.replace(",", "").replace(" ", "-") + ".json")
 
 

@@ -22,12 +22,15 @@ from optisense.optics.scene.ray_scene import Ray, RayScene, SurfaceHit
 from optisense.optics.transport.photons import Emission, trace_photons
 
 PHOTONS = 1_000_000
+"""Number of photons of a timed pass, the default number of an image."""
 PURE_RAYS = 4_000_000
+"""Number of rays with which the ray tracer alone is timed; they take some tenths of a second."""
 RUNS = 5
+"""Number of timed runs, whose median is reported."""
 
 
 def photon_rates(case: Case) -> dict[str, Any]:
-    """Photons and rays a second of the photon pass alone, and the pure ray rate."""
+    """Return photons and rays per second of the photon pass, and of the ray tracer alone."""
     model = case.model
     table = model.scenes.emitter_table
     per_light = PHOTONS // table.count
@@ -54,7 +57,10 @@ def photon_rates(case: Case) -> dict[str, Any]:
 
 
 def _pure_rate(scene: Any) -> float:
-    """Incoherent first hits a second: origins and directions drawn evenly from the scene's box."""
+    """Return the first hits per second of incoherent rays.
+
+    Origins are uniform in the bounding box of the scene, and directions on the sphere.
+    """
     lower, upper = (np.asarray(bound, dtype=float) for bound in scene.bounds)
     rng = np.random.default_rng(0)
     points = lower + rng.random((PURE_RAYS, 3)) * (upper - lower)

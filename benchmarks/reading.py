@@ -4,7 +4,7 @@
 writes reading.json and reading.md beside this file, sensor by sensor; what is there is not measured
 again. Each built-in sensor is given coatings from diffuse to shiny. Scores are those of
 `optisense.evaluate`; the error beside them is that of `optisense.tasks.reconstruct`: 24 balls at
-random places, a network, three other things to read, an elastic skin.
+random places, a network, three other shapes to reconstruct, an elastic skin.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ SENSORS = (
     "gelsight360",
 )
 SPECULARITIES = (0.0, 0.2, 0.4, 0.6, 0.8)
+"""Specularities (0 to 1) of the coatings, from diffuse to shiny."""
 WIDE = 320
 """Width (pixels) of the pictures of the scores; twice as many where contacts are small."""
 SMALL_CONTACTS = ("gelsight360", "gelsight-svelte")
@@ -41,16 +42,16 @@ SMALL_CONTACTS = ("gelsight360", "gelsight-svelte")
 TASK_WIDE = 160
 """Width (pixels) of the pictures of the task."""
 BALLS = 24
-"""Presses that the task's network learns from; 40 are usual, and take longer."""
+"""Number of presses that the task's network learns from; 40 are usual, and take longer."""
 PHOTONS = 300_000
-"""Number of photons of each image."""
+"""Number of photons of each image, fewer than usual, since each task renders many."""
 OBJECTIVES = ("reading", "rgb2normal", "normdiff")
 SCORES = {"reading": -1.0, "mean_of_places": -1.0, "rgb2normal": 1.0, "normdiff": 1.0}
-"""Scores of a row, with 1 if a higher value is better and -1 otherwise."""
+"""Sign of each score of a row: 1 if a higher value is better and -1 otherwise."""
 
 
 def main() -> None:
-    """Measure what is missing, and write both files after each sensor and coating."""
+    """Measure the missing rows, and write both files after each sensor and coating."""
     options = _options()
     console = Console()
     about = machine()
@@ -107,7 +108,7 @@ def _measure(
 
 
 def agreement(rows: list[dict[str, Any]], score: str) -> tuple[float, int]:
-    """Spearman's rank correlation of a score's goodness with the task's, and of how many rows."""
+    """Return Spearman's rank correlation of a score with the task, and the number of rows."""
     known = [row for row in rows if row[score] is not None]
     if len(known) < 3:
         return float("nan"), len(known)

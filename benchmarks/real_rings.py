@@ -27,16 +27,25 @@ from optisense.mechanics import CONFORMING, ELASTIC
 WIDTH = 320
 """Width (pixels) of the pictures; photographs are scaled to it."""
 INSIDE, RING = 0.9, (1.1, 1.6)
-"""Contact radii up to which the contact's signal is taken, and between which the ring's is."""
+"""Radius of the disc, and radii of the ring, in which signals are averaged, in contact radii; the
+rim between both is left out."""
 DEEPEST = 2.5
 """Largest depth (mm), 60 % of the gel, at which linear elasticity is no longer accurate."""
 PHOTONS = 1_000_000
+"""Number of photons of each picture, whose noise is then below that of the photographs."""
 
 Picture = NDArray[np.uint8]
 
 
 def ring_share(picture: Picture, background: Picture) -> tuple[float, float]:
-    """Mean difference in the ring over that in the contact, and the contact's radius (pixels).
+    """Return the mean difference in the ring over that in the contact, and the contact's radius.
+
+    Args:
+        picture: picture (h, w, 3) of a press, 8 bits.
+        background: picture (h, w, 3) without contact, 8 bits.
+
+    Returns:
+        Ratio, and radius in pixels.
 
     Raises:
         ValueError: no contact is found.
@@ -53,7 +62,13 @@ def ring_share(picture: Picture, background: Picture) -> tuple[float, float]:
 
 
 def depth_of(model: ots.OpticalModel, ball: float, radius: float, skin: str) -> float:
-    """The depth (mm) at which a ball touches a disc of a radius (mm).
+    """Return the depth (mm) at which a ball touches a disc of a given radius.
+
+    Args:
+        model: sensor.
+        ball: radius of the ball, mm.
+        radius: radius of the disc, mm.
+        skin: model of the skin.
 
     Raises:
         ValueError: no depth up to `DEEPEST` gives that radius.

@@ -1,4 +1,4 @@
-"""The converged image of the case, by progressive photon mapping, kept in a file.
+"""Converged image of the case by progressive photon mapping, which is kept in a file.
 
 Photons are traced through the scene with the ball in it and gathered one by one within a small
 radius, which shares neither the pooling nor the shading of the radiance cache that is judged. Only
@@ -28,37 +28,50 @@ from optisense.optics.transport.photons import Emission
 
 CACHE = Path(__file__).parent / ".cache"
 SEEDS = 6
+"""Number of independent images, whose scatter gives the noise of their mean."""
 PHOTONS = 60_000_000
-"""Number of photons of each seed."""
+"""Number of photons of each image; the noise of the mean of six was 2.2 %."""
 FIRST_RADIUS = 0.12
 """Gather radius (mm) of the first pass, two pixels. That of pass n is smaller by a factor of
 n^(1/6), so that most are within one pixel."""
 PASS_PHOTONS = 1_000_000
+"""Number of photons of a pass; the gather radius shrinks from pass to pass."""
 MARGIN = 10
-"""Width (pixels) of the margin around the contact."""
+"""Width (pixels) of the margin around the contact, beyond which errors are not measured."""
 FIRST_SEED = 7_000
+"""Seed of the first image, far from the seeds of the judged images."""
 
 
 @dataclass(frozen=True)
 class WindowCamera(RayCamera):
-    """A part of another camera's image; ``left`` and ``top`` in its pixels."""
+    """Camera that renders a part of another camera's image.
+
+    Attributes:
+        whole: the other camera.
+        left, top: first column and row of the part, in pixels of the whole image.
+    """
 
     whole: RayCamera | None = None
     left: int = 0
     top: int = 0
 
     def rays(self, x: mi.Float, y: mi.Float) -> tuple[mi.Point3f, mi.Vector3f]:
-        """Rays through film positions of the window."""
+        """Return the rays through film positions (n,) of the window, pixels."""
         assert self.whole is not None
         return self.whole.rays(x + self.left, y + self.top)
 
 
 @dataclass(frozen=True)
 class Reference:
-    """radiance (h, w, 3) within ``known`` (h, w), a box around the contact; zero elsewhere.
+    """Converged image.
 
-    noise: relative RMS error inside the contact, from the scatter of independent seeds.
-    photons: of all seeds. seconds: what it took.
+    Attributes:
+        radiance: radiance (h, w, 3); zero where it is not known.
+        known: mask (h, w) of the rendered box around the contact.
+        noise: relative RMS error inside the contact, from the scatter of independent seeds.
+        photons: number of photons of all seeds.
+        seeds: number of seeds.
+        seconds: wall time of the rendering, s.
     """
 
     radiance: FloatArray
@@ -75,7 +88,14 @@ def make_reference(
     photons: int = PHOTONS,
     tell: Callable[[str], None] = print,
 ) -> Reference:
-    """The reference, from the cache if this design was rendered before with these settings."""
+    """Return the reference, from the cache if it was rendered before with these settings.
+
+    Args:
+        case: case.
+        seeds: number of independent images.
+        photons: number of photons of each.
+        tell: function that is called with a line of text after each image.
+    """
     radius = FIRST_RADIUS
     key = _key(case.model.design, seeds, photons, radius)
     path = CACHE / f"reference-{key}.npz"
@@ -116,7 +136,7 @@ def make_reference(
 
 
 def box_around(mask: NDArray[np.bool_], margin: int = MARGIN) -> tuple[slice, slice]:
-    """Rows and columns of the box around a mask."""
+    """Return the rows and columns of the box around a mask (h, w), with a margin in pixels."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     height, width = mask.shape
     return (
@@ -128,7 +148,7 @@ def box_around(mask: NDArray[np.bool_], margin: int = MARGIN) -> tuple[slice, sl
 def _one_seed(
     case: Case, window: tuple[slice, slice], photons: int, seed: int, radius: float
 ) -> tuple[FloatArray, int]:
-    """(rows, columns, 3) radiance in the window, and the photons traced."""
+    """Return the radiance (rows, columns, 3) in the window, and the number of photons."""
     model = case.model
     whole = model.camera(RESOLUTION)
     rows, columns = window
@@ -163,7 +183,7 @@ def _one_seed(
 
 
 def _key(design: SensorDesign, seeds: int, photons: int, radius: float) -> str:
-    """A name for what was asked: the design's numbers and meshes, the contact and the settings."""
+    """Return a name for the design's numbers and meshes, the contact and the settings."""
     digest = hashlib.sha256()
     asked = [DESIGN, CONTACT_TEXT, RESOLUTION, seeds, photons, radius, FIRST_SEED]
     digest.update(json.dumps(asked).encode())

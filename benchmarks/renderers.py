@@ -1,4 +1,4 @@
-"""Other renderers on the same scene, compared at equal error inside the contact."""
+"""Comparison with other renderers on the same scene, at equal error inside the contact."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from optisense.mechanics import CONFORMING
 
 MITSUBA = "Mitsuba path"
 BUDGET = 60.0
-"""Time (s) for each renderer."""
+"""Rendering time (s) of each renderer, some 150 times that of our image."""
 
 
 def compare_renderers(
@@ -32,12 +32,20 @@ def compare_renderers(
     budget: float,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    """Time that each renderer needs to our error, as a dictionary ready for JSON.
+    """Return the time that each renderer needs to reach our error, as plain data for JSON.
 
-    Each renders for ``budget`` seconds; error is measured on the way. Before that an image is
-    scaled to the reference's mean inside the contact, so that a unit or an energy that differs is
-    not held against a renderer; the scale is told. Time to the target is that of the last image
-    times (error / target)^2: Monte Carlo noise falls so, bias does not, which favours the others.
+    Each image is scaled to the reference's mean inside the contact before its error is measured, so
+    that another unit of radiance does not count as an error; the scale is reported. A renderer that
+    does not reach the target in time gets the time of its last image times (error / target)^2.
+    Monte Carlo noise falls at this rate and bias does not, so this favours the other renderers.
+
+    Args:
+        case: case.
+        reference: converged image.
+        target_error: relative RMS error of our image.
+        our_seconds: time of our image, s.
+        budget: rendering time of each renderer, s.
+        tell: function that is called with a line of text before each renderer.
     """
     ours = case.model.render([ball()], resolution=RESOLUTION, skin=CONFORMING).radiance
     rows: list[dict[str, Any]] = []
@@ -114,7 +122,7 @@ def _row(
 
 
 def _save_pictures(images: dict[str, FloatArray]) -> None:
-    """PNG files of all renderers at one exposure, to be looked at; each scaled to one mean."""
+    """Write PNG files (h, w, 3) of all renderers with one exposure, each scaled to one mean."""
     import mitsuba as mi
 
     folder: Path = CACHE / "pictures"

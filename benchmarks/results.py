@@ -1,4 +1,4 @@
-"""Results as a JSON file, and as tables for people."""
+"""Results as JSON files, and as tables in Markdown and on the terminal."""
 
 from __future__ import annotations
 
@@ -47,13 +47,13 @@ def measure_parts(
     measures: Mapping[str, Callable[[], Mapping[str, Any]]],
     table: Callable[[dict[str, Any]], str],
 ) -> None:
-    """The command line of a benchmark of several parts: measure, print and write.
+    """Run the command line of a benchmark of several parts: measure, print and write.
 
     Args:
-        name: of its files, NAME.json and NAME.md, in this folder.
-        about: what the command says of itself.
-        measures: what measures each part.
-        table: makes Markdown of what was found, by part.
+        name: name of its files, NAME.json and NAME.md, in this folder.
+        about: description in the help text.
+        measures: function that measures each part.
+        table: function that returns the results of all parts as Markdown.
     """
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("--only", choices=measures, help="measure one part only")
@@ -80,7 +80,7 @@ def say_if_busy(console: Console, about: Mapping[str, Any]) -> None:
 
 
 def machine() -> dict[str, Any]:
-    """What the numbers were measured on and with; no names of hosts or people."""
+    """Return processor, system, versions and load, without names of hosts or people."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.is_file():
@@ -106,7 +106,7 @@ def machine() -> dict[str, Any]:
 
 
 def merged(part: str, values: dict[str, Any], about: dict[str, Any]) -> dict[str, Any]:
-    """Results so far with one part replaced; each part says what it was measured on."""
+    """Return the results so far with one part replaced, and the machine of that part."""
     kept = json.loads(JSON.read_text()) if JSON.is_file() else {}
     kept[part] = {"machine": about, **values}
     return kept

@@ -33,15 +33,24 @@ DESIGN = "gelsight-mini-ideal"
 SEEDS = 20
 """Number of seeds; 20 give a standard deviation to a sixth of its value."""
 TIMED_SEEDS = 5
+"""Number of seeds with which scores are timed; the median of the times is reported."""
 WARM_UP_SEED = 1000
+"""Seed of the evaluation that compiles kernels, which no timed evaluation has."""
 RAY_RUNS = 7
+"""Number of timed evaluations of chief rays, whose median is reported."""
 IMAGES = ("rgb2normal", "normdiff")
 RAYS = ("aoap", "2to3pw")
 DIRECTIONS = (0.0, 45.0, 90.0, 135.0)
+"""Directions (degrees) of the lines on which RGB2Normal is computed: each second one of the usual
+eight, whose opposites lie on the same line."""
 ANGLES = (20.0, 25.0, 30.0)
+"""Largest tilts (degrees) to which the normals of a line are restricted; a ball pressed in by 0.3
+mm has tilts up to 37 degrees."""
 DEPTHS = (0.1, 0.2, 0.5)
+"""Depths (mm) of the ball beside the usual 0.3 mm."""
 PIXEL_NOISE = 1.5 / 255
-"""Noise of a pixel of a real GelSight Mini, which is 1.1 to 1.9 grey levels."""
+"""Standard deviation of a pixel's noise, as a share of full scale: that of a real GelSight Mini is
+1.1 to 1.9 grey levels of 255."""
 
 TARGETS = {
     "rgb2normal": "standard deviation 0.003; 10 s for all nine places, light included",
@@ -54,7 +63,7 @@ Responses = list[NDArray[np.float32]]
 
 
 class GivenPresses:
-    """Stands for an evaluation, where an objective reads presses only."""
+    """Replacement of an evaluation for objectives that read presses only."""
 
     def __init__(self, presses: Sequence[Press]) -> None:
         self.presses = list(presses)
@@ -99,10 +108,10 @@ def main() -> None:
 def measure_seeds(
     model: OpticalModel, seeds: int, tell: Callable[[str], None]
 ) -> tuple[dict[str, Any], list[Press], list[Responses]]:
-    """Scores with several seeds, each with light of its own; and what the camera read.
+    """Return scores with several seeds, the last presses, and the responses of all seeds.
 
-    They are scored together, as most people will. With some seeds RGB2Normal is timed before by
-    itself, in new light and once more in that light.
+    Each seed has photons of its own. Both scores are computed together, as is usual; with the first
+    `TIMED_SEEDS`, RGB2Normal is timed before by itself, with new photons and with kept ones.
     """
     values: dict[str, list[float]] = {name: [] for name in IMAGES}
     times: dict[str, list[Time]] = {name: [] for name in ("new light", "kept light", "more")}
@@ -148,7 +157,7 @@ def measure_seeds(
 
 
 def measure_rays(model: OpticalModel) -> dict[str, Any]:
-    """Scores of chief rays, each with rays of its own."""
+    """Return scores of chief rays, each from rays of its own."""
     found = {}
     for name in RAYS:
         scores: list[Score] = []
@@ -161,10 +170,10 @@ def measure_rays(model: OpticalModel) -> dict[str, Any]:
 
 
 def measure_more_light(presses: list[Press], responses: list[Responses]) -> dict[str, Any]:
-    """Scores of the mean of several images, and from them the score with endless light.
+    """Return scores of the mean of several images, extrapolated to infinitely many photons.
 
-    The error of a score falls as 1 over the light: mean over single images, s(1), and the score
-    of the mean of all k images, s(k), give s(k) + (s(k) - s(1)) / (k - 1).
+    The bias of a score falls as 1 over the number of photons. The mean score of single images,
+    s(1), and the score of the mean of all k images, s(k), give s(k) + (s(k) - s(1)) / (k - 1).
     """
     count = len(responses)
     found: dict[str, Any] = {}
@@ -185,7 +194,7 @@ def measure_more_light(presses: list[Press], responses: list[Responses]) -> dict
 def measure_one_image(
     model: OpticalModel, seed: int, presses: list[Press], responses: Responses
 ) -> dict[str, Any]:
-    """All nine contacts in one image against one by one, in the same light."""
+    """Compare all nine contacts in one image with one image each, with the same photons."""
     evaluations: list[Evaluation] = []
     time = timed(lambda: evaluations.append(_pressed(model, seed, together=True)))
     alone = timed(lambda: evaluations.append(_pressed(model, seed, together=False)))
@@ -208,7 +217,7 @@ def measure_one_image(
 
 
 def measure_reading(presses: list[Press]) -> Iterator[dict[str, Any]]:
-    """RGB2Normal of the same images, read in other ways."""
+    """Yield RGB2Normal of the same images with other choices of pixels, values and places."""
     rng = np.random.default_rng(0)
     yield _row("the mean image of all seeds", presses)
     for most in ANGLES:
@@ -225,7 +234,7 @@ def measure_reading(presses: list[Press]) -> Iterator[dict[str, Any]]:
 def measure_presses(
     model: OpticalModel, seed: int, scatter: dict[str, Any]
 ) -> Iterator[dict[str, Any]]:
-    """RGB2Normal of other images with the light of one seed."""
+    """Yield RGB2Normal of other images with the photons of one seed."""
     value = scatter["rgb2normal"]["values"][seed]
     yield {"what": f"one image a place, seed {seed}", "value": value}
     changes: list[tuple[str, dict[str, Any]]] = [
@@ -239,8 +248,7 @@ def measure_presses(
 
 
 def measure_without_guide(seed: int) -> dict[str, Any]:
-    """RGB2Normal where the assumed light guide is air: the same LEDs at the same places shine
-    freely at the tray."""
+    """Return RGB2Normal without the assumed light guide: the same LEDs shine through air."""
     design = optisense.load(DESIGN)
     design.materials["air"] = library.material("air")
     design.parts["guide"].material = "air"
@@ -271,7 +279,7 @@ def _value(name: str, presses: Sequence[Press]) -> float:
 
 
 def _lit(presses: list[Press], responses: list[Responses]) -> list[Press]:
-    """The presses with the mean of what the camera read."""
+    """Return the presses with the mean response over seeds."""
     found = []
     for number, press in enumerate(presses):
         response = np.zeros_like(press.response)

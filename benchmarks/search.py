@@ -33,18 +33,24 @@ MIRROR = {
 (the housing leaves 1.1 mm), and along the finger."""
 
 COATINGS = {"coating.specularity": (0.0, 1.0, 11)}
+"""Grid of specularities: from 0 to 1 in steps of 0.1."""
 COATING_WORKERS = 2
+"""Number of worker processes of the search over coatings, one for each core of the machine."""
 OVERHEAD_TRIALS = 3000
+"""Number of trials from which the overhead is measured; they take some seconds."""
 
 MIRROR_BUDGET = 5000
+"""Largest number of trials of the search over the mirror, more than fit into its time."""
 MIRROR_SECONDS = 300.0
+"""Time (s) in which the search over the mirror is to reach the paper's improvement."""
 GRADIENT_SECONDS = 20.0
+"""Time (s) in which the gradient method is to come within 1 % of its best mirror."""
 PAPER = {"start": 0.236, "best": 0.635}
 """AOAP of Svelte's mirror in the OptiSense paper, before and after its search."""
 
 
 class Nothing:
-    """A trial that takes no time: a score as rough as any, from the point alone."""
+    """Evaluator that takes no time: its score, from the point alone, has kinks as real ones do."""
 
     renders = False
 
@@ -54,7 +60,7 @@ class Nothing:
 
 
 def nothing(design: SensorDesign) -> float:
-    """Stands for `Nothing` in a plan."""
+    """Name the objective of `Nothing` in a plan; it is never called."""
     raise AssertionError
 
 
@@ -65,7 +71,10 @@ def main() -> None:
 
 
 def overhead() -> dict[str, Any]:
-    """Processor time of the search's own process for each trial: proposal, store, dispatch."""
+    """Measure the processor time of the search's own process for each trial.
+
+    It contains the proposal of the trial, its dispatch and its row in the store.
+    """
     design = optisense.load("gelsight-svelte")
 
     def seconds(make_runner: Callable[[Evaluator], Runner]) -> dict[str, float]:
@@ -96,7 +105,7 @@ def overhead() -> dict[str, Any]:
 
 
 def coatings() -> dict[str, Any]:
-    """A grid of 11 coatings of GelSight Mini by RGB2Normal."""
+    """Search a grid of 11 coatings of GelSight Mini by RGB2Normal."""
     began, spent = time.perf_counter(), time.process_time() + _children()
     plan = Plan(space=SearchSpace(COATINGS), goals=["rgb2normal"], method="grid")
     study = Study.create(None, optisense.load("gelsight-mini-ideal"), plan)
@@ -117,7 +126,7 @@ def coatings() -> dict[str, Any]:
 
 
 def gradient() -> dict[str, Any]:
-    """The mirror of GelSight Svelte by gradient, and when it had come how far."""
+    """Search the mirror of GelSight Svelte by gradient, and record the best score over time."""
     plan = Plan(space=SearchSpace(MIRROR), goals=["aoap"], method="gradient", budget=40)
     study = Study.create(None, optisense.load("gelsight-svelte"), plan)
     began, processor = time.time(), time.process_time()
@@ -144,7 +153,7 @@ def gradient() -> dict[str, Any]:
 
 
 def mirror() -> dict[str, Any]:
-    """The mirror of GelSight Svelte by CMA-ES and AOAP, for as long as the target allows."""
+    """Search the mirror of GelSight Svelte by CMA-ES and AOAP for `MIRROR_SECONDS`."""
     began = time.perf_counter()
     plan = Plan(space=SearchSpace(MIRROR), goals=["aoap"], budget=MIRROR_BUDGET)
     study = Study.create(None, optisense.load("gelsight-svelte"), plan)

@@ -23,19 +23,24 @@ from optisense.optics import TactileImage
 
 NAMES = ("digit", "gelsight-mini-ideal", "gelbelt", "gelsight360", "gelsight-svelte")
 RESOLUTION = (320, 240)
+"""Width and height (pixels) of the images, as in the OptiSense paper."""
 WANTED_NOISE = 0.03
-"""Relative noise of the light in the contact."""
+"""Relative noise of the light in the contact, that of the images of `benchmarks.case`."""
 TRIAL_PHOTONS, STEP, MOST_PHOTONS = 400_000, 50_000, 16_000_000
+"""First, step and largest number of photons in the search for the fewest that reach the wanted
+noise."""
 SEEDS = 6
-"""Number of images from which the noise is computed."""
+"""Number of images from which the noise of each pixel is computed."""
 RUNS = 3
+"""Number of timed images, whose median is reported."""
 CHILD_RUNS = 5
+"""Number of timed processes that load and check a sensor, whose median is reported."""
 RADIUS, DEPTH = 1.5, 0.8
-"""Radius and depth (mm) of the ball that is pressed in."""
+"""Radius and depth (mm) of the ball, those of `benchmarks.case`."""
 
 LOAD_AND_CHECK = "from optisense import sensors; sensors.check(sensors.build('{name}'))"
 TARGETS = {"load_and_check": 1.0, "image": 1.5, "first_image": 8.0}
-"""Wanted durations (s)."""
+"""Goals for the durations (s) on an idle machine of two cores."""
 
 
 def main() -> None:
@@ -44,7 +49,7 @@ def main() -> None:
 
 
 def measure(name: str) -> dict[str, Any]:
-    """Return all numbers of a sensor."""
+    """Return all figures of a built-in sensor."""
     design = sensors.build(name)
     inside = medians([timed(lambda: sensors.check(sensors.build(name))) for _ in range(CHILD_RUNS)])
     child = [sys.executable, "-c", LOAD_AND_CHECK.format(name=name)]
@@ -81,8 +86,13 @@ def measure(name: str) -> dict[str, Any]:
 
 
 def least_photons(model: OpticalModel, ball: Contact) -> tuple[int, float]:
-    """About the fewest photons that bring the noise in the contact to WANTED_NOISE, and the noise
-    that they give: each trial is where noise that falls as the third root of photons says."""
+    """Return the smallest number of photons that reaches `WANTED_NOISE`, within some 15 %.
+
+    The next number of photons is predicted from noise that falls as their cubic root.
+
+    Returns:
+        Number of photons, and relative noise in the contact.
+    """
     photons, too_few = TRIAL_PHOTONS, 0
     while True:
         noise = noise_in_contact(model, ball, photons)
@@ -98,8 +108,7 @@ def least_photons(model: OpticalModel, ball: Contact) -> tuple[int, float]:
 
 
 def noise_in_contact(model: OpticalModel, ball: Contact, photons: int) -> float:
-    """RMS over the contact's pixels and channels of the deviation of images of other seeds, in
-    relation to the mean there."""
+    """Return the RMS noise over the contact's pixels and channels, relative to the mean there."""
     images = [
         model.render([ball], resolution=RESOLUTION, photons=photons, seed=seed)
         for seed in range(1, SEEDS + 1)

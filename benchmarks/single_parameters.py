@@ -1,21 +1,22 @@
 """A search over each single parameter of each built-in sensor, as widely as the design file allows.
 
-A score can be won in ways that nobody would accept: by a camera that sees nothing, stands inside
-the gel, looks past its mirrors or has an angle that no lens has, by a material that there is not,
-or by parts that have left what they rest on. This script looks for such ways, by AOAP and 2to3PW,
-and draws what the camera of each winner sees, so that a person can judge all of them at a glance::
+A search can reach a high score with a design that nobody would build: a camera that sees nothing,
+stands inside the gel, looks past its mirrors or has a field of view that no lens has, a material
+that does not exist, or parts that have left their supports. This script looks for such designs with
+AOAP and 2to3PW, and draws the view of the best camera of each search, so that a person can judge
+all of them at a glance::
 
     python -m benchmarks.single_parameters FOLDER [--sensor NAME]
 
 The 43 searches of a GelSight Mini take up to ten minutes on two busy cores, and those of all six
-sensors about an hour. Finished searches are kept in FOLDER/searches.json; started again, it goes on
-where it was. FOLDER/SENSOR-OBJECTIVE.png are the contact sheets: on each picture the sensing
-surface has a checkerboard of 2 mm, darker where it is seen askance; what is not the sensing surface
-is blue. A red frame is a winner other than the sensor as it is.
+sensors about an hour. Finished searches are kept in FOLDER/searches.json, and a second run
+continues with the others. FOLDER/SENSOR-OBJECTIVE.png are the contact sheets: on each picture the
+sensing surface has a checkerboard of 2 mm, darker where it is seen askance; what is not the sensing
+surface is blue. A red frame marks a best design that differs from the built-in one.
 
-Parameters of one kind stand for each other: of the points of a cage one at a corner, one in the
-middle of a side and one in the middle of the face that is sensed are searched, of the lights and
-of the coating one number each, since rays see neither.
+One parameter of each kind represents the others: of the points of a cage one at a corner, one in
+the middle of a side and one in the middle of the face that is sensed are searched, of the lights
+and of the coating one number each, since rays see neither.
 """
 
 from __future__ import annotations
@@ -45,27 +46,34 @@ from optisense.writing import write_text
 OBJECTIVES = ("aoap", "2to3pw")
 
 RAYS = (160, 120)
-"""Chief rays of a trial and of a picture."""
+"""Number of chief rays across and down, of a trial and of a picture."""
 
 CHECK = 2.0
-"""Side (mm) of a field of the checkerboard."""
+"""Side (mm) of a square of the checkerboard."""
 
 COLUMNS = 6
+"""Number of pictures in a row of a contact sheet, which is then some 1,000 pixels wide."""
 
 ANGLES = (0.01, 0.1, 1, 3, 10, 20, 30, 40, 50, 60, 80, 100, 120, 125, 140, 160, 179, 179.9)
+"""Fields of view (degrees) of perspective lenses, up to the limits of the design file."""
+
 FISHEYE_ANGLES = (*ANGLES[:-1], 200, 240, 280, 320, 360)
 """Fields of view (degrees) of fisheye lenses; `check` refuses such values for perspective lenses
 before anything is traced."""
 
 STEPS = (0.1, 0.3, 1, 3, 10, 30, 100, 300, LARGEST)
-"""Distances (mm) by which a position is changed to either side."""
+"""Distances (mm) by which a position is changed to either side, up to the largest coordinate of a
+design file."""
 
 TURNS = (0.3, 1, 3, 10, 30, 60, 90, 120, 150, 180)
 """Angles (degrees) by which a rotation is changed to either side."""
 
 INDICES = (1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.7, 2.0, 2.5, 3.0, 4.0)
+"""Refractive indices of transparent materials, from vacuum to germanium."""
+
 CAGE_POINTS = (0, 14, 17, 26)
-"""A corner, the middles of the upper face and of one of its sides, and the opposite corner."""
+"""Indices of the searched points of a cage of 3 x 3 x 3: a corner, the middles of the upper face
+and of one of its sides, and the opposite corner."""
 
 
 def values_of(design: SensorDesign) -> dict[str, list[Any]]:
@@ -99,7 +107,7 @@ def values_of(design: SensorDesign) -> dict[str, list[Any]]:
 
 
 def moves_of(design: SensorDesign) -> dict[str, list[float]]:
-    """Moves of the camera and of whole parts that no cage moves, by path."""
+    """Return moves (mm) and turns (degrees) of the camera and of uncaged parts, by path."""
     caged = {part for cage in design.cages.values() for part in cage.parts}
     found: dict[str, list[float]] = {}
     for axis in "xyz":
@@ -150,9 +158,10 @@ def search_each(name: str, kept: dict[str, Any], folder: Path, console: Console)
 
 
 def _search(design: SensorDesign, path: str, values: list[Any]) -> dict[str, Any]:
-    """The best value of one parameter by each objective, beside the score of the start.
+    """Return the best value of one parameter by each objective, and the score of the start.
 
-    Scored as the trials of a search, at values whose steps grow with the distance from the start.
+    Values are scored like the trials of a search; their steps grow with the distance from the
+    start.
     """
     numbers = all(isinstance(value, int | float) for value in values)
     range_ = (min(values), max(values)) if numbers else values
@@ -186,7 +195,7 @@ def _search(design: SensorDesign, path: str, values: list[Any]) -> dict[str, Any
 
 
 def draw_sheets(name: str, kept: dict[str, Any], folder: Path) -> None:
-    """One contact sheet for each objective: what the camera of each winner sees."""
+    """Draw a contact sheet for each objective with the view of the best camera of each search."""
     design = load(name)
     model = OpticalModel(design)
     for objective in OBJECTIVES:
@@ -208,7 +217,7 @@ def _design_of(design: SensorDesign, path: str, place: list[float]) -> SensorDes
 
 
 def _tile(model: OpticalModel, path: str, found: dict[str, Any]) -> Image.Image:
-    """What the camera sees, with the parameter, its value and the score."""
+    """Draw the camera's view, with the parameter, its value and the score."""
     rays = model.chief_rays(RAYS)
     u, v = model.surface.u_axis, model.surface.v_axis
     points = rays.points.astype(np.float64)

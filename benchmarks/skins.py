@@ -1,8 +1,8 @@
-"""How much longer a picture of the elastic skin takes than one of the conforming skin.
+"""Time of a picture with the elastic skin, compared with the conforming skin.
 
-``python -m benchmarks.skins [DESIGN]`` prints a table. Pictures of either skin are taken in turn,
-of contacts whose depth changes from picture to picture, so that nothing of a press is kept.
-Kernels are compiled before. Processor time is that of all threads.
+``python -m benchmarks.skins [DESIGN]`` prints a table. Pictures of the two skins alternate, and the
+depth of the contacts changes from picture to picture, so that no deformation is reused. Kernels are
+compiled before. Processor time is that of all threads.
 """
 
 from __future__ import annotations
@@ -18,14 +18,16 @@ from optisense.geometry.contact_text import parse_contact
 from optisense.mechanics import CONFORMING, ELASTIC, SKINS
 
 RUNS = 5
+"""Number of timed pictures of each skin, whose median is reported."""
 SHALLOWER = 0.01
-"""Share of the depth by which contacts of the next picture are shallower."""
+"""Share of the depth by which the contacts of the next picture are shallower, so that no
+deformation is reused."""
 MORE = ("sphere:0.5@1,1:0.3", "object:screw-thread@0,0:0.5", "object:coin@0,0:0.4")
 """Contacts beside the balls of radius 1.5 mm at the nine places."""
 
 
 def cases(model: ots.OpticalModel) -> dict[str, list[Contact]]:
-    """Return contacts by what they are called."""
+    """Return lists of contacts, by their names in the table."""
     nine = model.nine_contacts()
     return {
         "ball in the middle": [nine[4]],
@@ -39,9 +41,9 @@ def times(model: ots.OpticalModel, contacts: list[Contact], kept: bool) -> dict[
     """Return the median time of a picture of each skin.
 
     Args:
-        model: the sensor.
-        contacts: its contacts.
-        kept: whether all pictures share their photons, which are traced before.
+        model: sensor.
+        contacts: contacts of the first picture.
+        kept: whether all pictures share the photons of the first one.
     """
     found: dict[str, list[Time]] = {skin: [] for skin in SKINS}
     seed = 0

@@ -9,9 +9,13 @@ from benchmarks.case import FloatArray
 
 @dataclass(frozen=True)
 class Snapshot:
-    """image (h, w, 3) linear radiance after ``seconds`` of wall time.
+    """Image of a progressive renderer at one time.
 
-    cpu: seconds of all threads. samples: per pixel, where the renderer tells.
+    Attributes:
+        seconds: wall time since the start, s.
+        cpu: processor time of all threads, s.
+        image: linear radiance (h, w, 3).
+        samples: samples per pixel, as the renderer reports them.
     """
 
     seconds: float
@@ -21,5 +25,5 @@ class Snapshot:
 
 
 def due_times(budget: float, count: int = 4) -> list[float]:
-    """Seconds at which to take snapshots: each twice the one before, the last at the end."""
+    """Return the times (s) of snapshots: each is twice the previous one, the last is the budget."""
     return [budget / 2 ** (count - 1 - k) for k in range(count)]

@@ -1,4 +1,4 @@
-"""Time of the case, its accuracy, and the shares of its parts."""
+"""Times of images of the case, their accuracy, and the shares of their parts."""
 
 from __future__ import annotations
 
@@ -25,16 +25,18 @@ from optisense.mechanics import CONFORMING
 from optisense.optics import OpticalModel, TactileImage
 
 RUNS = 7
+"""Number of timed images, whose median is reported."""
 LARGE = (640, 480)
+"""Width and height (pixels) of large images, twice those of `RESOLUTION`."""
 MANY_PHOTONS = 5_000_000
-"""Default number of photons of a program that keeps its model."""
+"""Number of photons of scores and datasets by default (`optisense.quality.SCORE_PHOTONS`)."""
 OTHER_PLACES = [(2.0, 1.0), (-3.0, 2.0), (1.0, -3.0), (-4.0, -2.0), (4.0, 3.0)]
-"""Surface coordinates (mm) of other contacts."""
+"""Surface coordinates (mm) of other contacts, spread over the view."""
 COMMAND = ["-m", "optisense.cli", "render", DESIGN, "--contact", CONTACT_TEXT, "--out"]
 
 
 def measure_speed(case: Case, reference: Reference, tell: Callable[[str], None]) -> dict[str, Any]:
-    """All rows of the speed table, as a dictionary ready for JSON."""
+    """Return all rows of the speed table, as plain data for JSON."""
     tell("speed: set-up")
     model = OpticalModel(case.model.design)  # compiles what a first model compiles
     _render(model, 0)
@@ -78,12 +80,12 @@ def _render(
 
 
 def _fresh_model(case: Case) -> None:
-    """A model with its scene and its photon guide."""
+    """Build a model with its scene and its emission guide."""
     OpticalModel(case.model.design).guide()
 
 
 def warm_images(case: Case, reference: Reference, photons: int = PHOTONS) -> dict[str, Any]:
-    """Images of the case, each from photons of its own (another seed)."""
+    """Return times and errors of images of the case, each with another seed."""
     case.model.render([ball()], resolution=RESOLUTION, seed=99, photons=photons, skin=CONFORMING)
     times, errors, parts, ratios, image = [], [], [], [], None
     for seed in range(RUNS):
@@ -127,9 +129,9 @@ def _new_light(case: Case, resolution: tuple[int, int], runs: int) -> dict[str, 
 
 
 def _kept_light(case: Case) -> dict[str, Any]:
-    """Further contacts: with the radiance cache that is there, and with one of their own.
+    """Time images of other contacts, with a kept radiance cache and with new photons.
 
-    The ratio of the second to an image of the first contact is what a change of contact costs.
+    The ratio of the latter to an image of the first contact is the cost of a change of contact.
     """
     first = [
         timed(partial(_render, case.model, 200 + number)) for number in range(len(OTHER_PLACES))
@@ -151,7 +153,7 @@ def _kept_light(case: Case) -> dict[str, Any]:
 
 
 def _changes(case: Case) -> dict[str, Any]:
-    """Re-rendering after a change of flux and of specularity, on a model of its own."""
+    """Time images after changes of flux and of specularity, on a separate model."""
     model = OpticalModel(case.model.design)
 
     def render() -> None:
@@ -173,7 +175,7 @@ def _changes(case: Case) -> dict[str, Any]:
 
 
 def _cold(runs: int = 3) -> dict[str, Any]:
-    """The command, from its start to its files, kernels being cached on disk by a run before."""
+    """Time the command from its start to its files; a first run caches kernels on disk."""
     times, memory = [], []
     with tempfile.TemporaryDirectory() as folder:
         for number in range(runs + 1):

@@ -28,17 +28,19 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 SLOW = 11e6
-"""Rays a second of the ray tracer alone on the slow machine for which the targets hold."""
+"""Rays per second of the ray tracer alone on the slow machine for which the targets hold."""
 
 SIDE = 101
-"""Vertices along a side of the mesh in a cage: 10,201."""
+"""Number of vertices along a side of the mesh in a cage, which has 10,201, as a finely tessellated
+part."""
 
 RATE = SLOW
-"""Rays a second of the ray tracer alone on this machine, measured when the benchmark begins."""
+"""Rays per second of the ray tracer alone on this machine, which is measured when the benchmark
+begins."""
 
 
 def processor_seconds(pid: int) -> float:
-    """Processor time of this process and the engine; NaN if the system does not report it."""
+    """Return the processor time (s) of this process and the engine; NaN where it is unknown."""
     stat = Path(f"/proc/{pid}/stat")
     if not stat.exists():
         return float("nan")
@@ -47,7 +49,7 @@ def processor_seconds(pid: int) -> float:
 
 
 def rays_per_second() -> float:
-    """Return the rays a second of the ray tracer alone."""
+    """Return the rays per second of the ray tracer alone."""
     command = [str(ROOT / ".venv" / "bin" / "python"), "-m", "benchmarks.rays"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     return float(done.stdout.split()[-1])
@@ -125,7 +127,7 @@ def main() -> None:
     drafts._take = taken
 
     def dragged(what: str, move: Callable[[int], None], target: str) -> None:
-        """The mouse goes on moving, and Blender calls its timer, until so many drafts came."""
+        """Move the mouse and call Blender's timer until a number of drafts has arrived."""
         step = 0
 
         def another(_: int) -> None:
@@ -165,7 +167,7 @@ def main() -> None:
     scene.optisense_simulation.draft = False
 
     def first_draft(_: int) -> None:
-        """Wait for the first draft of the sensor that was opened, as in a window."""
+        """Wait for the first draft of the opened sensor, as in a window."""
         drafts._opened = True
         before = shown
         while shown == before or session.engine().waiting:
@@ -202,7 +204,7 @@ def main() -> None:
 
 
 def _caged_sheet(scene: Any) -> Any:
-    """A mirror of many vertices in a cage of 27 points."""
+    """Return a cage of 27 points around a mirror of many vertices."""
     from studio.core.mesh_file import Mesh
     from studio.scene.build import add_part
 

@@ -14,14 +14,19 @@ from statistics import median
 
 ROOT = Path(__file__).parent.parent
 BYTES_PER_MAXRSS = 1 if sys.platform == "darwin" else 1024
+"""Number of bytes in a unit of ``ru_maxrss`` of getrusage: bytes on macOS, KiB on Linux."""
 
 
 @dataclass(frozen=True)
 class Time:
-    """Wall seconds, and processor seconds of all threads.
+    """Duration of an action.
 
-    On an idle machine of n cores wall is at least cpu / n; where it is much more, something
-    else was running.
+    On an idle machine of n cores, the wall time is at least cpu / n; if it is much longer, another
+    program was running.
+
+    Attributes:
+        wall: wall time, s.
+        cpu: processor time of all threads, s.
     """
 
     wall: float
@@ -36,7 +41,7 @@ def timed(action: Callable[[], object]) -> Time:
 
 
 def medians(times: list[Time]) -> Time:
-    """Median wall and median processor time."""
+    """Return the median wall time and the median processor time."""
     return Time(median(t.wall for t in times), median(t.cpu for t in times))
 
 
@@ -47,17 +52,17 @@ code = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
 wall, used = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
 print(json.dumps([code, wall, used.ru_utime + used.ru_stime, used.ru_maxrss]))
 """
-"""Starts a command from a process of its own: what a process is started from counts as its peak
-memory, if that is the larger."""
+"""Program that starts a command from a small process, since the memory of the starting process
+counts as the peak of the started one."""
 
 
 def run_child(command: list[str]) -> tuple[Time, int]:
-    """Time and peak memory (bytes) of a command run from the repository's root.
+    """Run a command in the repository's root, and return its time and peak memory (bytes).
 
-    Its Python keeps compiled modules, as an installed package has them, whatever the caller's does.
+    Its Python keeps compiled modules, as an installed package does.
 
     Raises:
-        RuntimeError: it failed.
+        RuntimeError: the command fails.
     """
     environment = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     launch = [sys.executable, "-S", "-c", LAUNCHER, *command]

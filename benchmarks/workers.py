@@ -28,23 +28,25 @@ BLEND = {"cages.M1.blend": (0.0, 1.0)}
 fails."""
 
 SHINE = {"coating.specularity": (0.0, 0.3), "lights.*.flux": (1.0, 2.0)}
+"""Ranges of specularity (0 to 1) and flux (mW) of the rendered trials, of which none fails."""
 LIGHT = {
     "photons": 500_000,
     "resolution": (320, 240),
     "places": ((0.0, 0.0), (4.0, 0.0), (4.0, 3.0)),
 }
-"""A rendered trial of a few seconds, of which several can be counted."""
+"""Settings of a rendered trial, which then takes a few seconds: photons, pixels, and places
+(mm)."""
 
 WARM = 1
-"""Trials of each worker that are left out, while it builds its model and compiles."""
+"""Number of first trials of each worker that are not counted: it builds its model and compiles."""
 LEAST = 5
-"""Trials of each worker that are counted, ..."""
+"""Smallest number of counted trials of each worker."""
 SECONDS = 6.0
-"""... over at least so long."""
+"""Shortest time (s) over which trials are counted, many times that of a trial by rays."""
 
 
 class Clocked:
-    """An evaluator that also tells the processor time of each trial."""
+    """Evaluator that also records the processor time of each trial."""
 
     def __init__(self, evaluator: Evaluator) -> None:
         self.evaluator = evaluator
@@ -58,7 +60,7 @@ class Clocked:
 
 
 def workers() -> dict[str, Any]:
-    """Both kinds of objectives."""
+    """Measure an objective of chief rays and one of rendered images."""
     mini, svelte = optisense.load("gelsight-mini-ideal"), optisense.load("gelsight-svelte")
     cases: dict[str, Any] = {
         "chief_rays": (svelte, SearchSpace(BLEND), "aoap", {}, 1.8),
@@ -87,7 +89,7 @@ def workers() -> dict[str, Any]:
 
 
 def _measured(design: SensorDesign, plan: Plan, count: int, threads: int) -> dict[str, Any]:
-    """Throughput of workers after all of them have warmed up."""
+    """Return the throughput of workers after all of them have warmed up."""
     study = Study.create(None, design, plan)
     counted: list[list[Row]] = []
 
@@ -115,7 +117,7 @@ def _measured(design: SensorDesign, plan: Plan, count: int, threads: int) -> dic
 
 
 def _warm(rows: list[Row], count: int) -> list[list[Row]]:
-    """The finished trials of each worker since all of them are warm; none before."""
+    """Return the finished trials of each worker since all are warm; none before."""
     by_worker: dict[str, list[Row]] = defaultdict(list)
     for row in sorted(rows, key=lambda row: row.finished or 0.0):
         if row.outcome is not None:

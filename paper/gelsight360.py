@@ -36,6 +36,7 @@ FINER = 6
 """Number of rows by which each grid of chief rays is finer than the one before."""
 
 GROUPS = [f"lg{number}" for number in range(1, 9)]
+"""Names of the eight light groups of GelSight360, lg1 to lg8."""
 
 
 BLIND: dict[str, dict[str, Any]] = {

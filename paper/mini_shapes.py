@@ -31,7 +31,8 @@ SPHERE_MOST = 0.4
 """Specularity (0 to 1) up to which the paper finds the sphere best."""
 
 SIMILAR = {"rgb2normal": 0.05, "normdiff": 0.1}
-"""What counts as a performance similar to the flat sensor's: so much of its score below it."""
+"""Largest relative loss of a score, compared with the flat sensor, at which a performance counts as
+similar; the paper shows it in a figure without numbers."""
 
 
 def score_units(

@@ -32,7 +32,8 @@ SPACES: dict[str, dict[str, dict[str, Any]]] = {
         "cages.M1.points.z": {"around": 2.0},
     },
 }
-"""What the search may change; the second is that of the case study in docs/case-studies.md."""
+"""Search spaces: blends of the two built-in mirrors, and points of the cage (mm) as in the case
+study of docs/case-studies.md."""
 
 SKINS = ("whole", "middle third")
 """Which part of the skin is the sensing surface; the paper does not say how it is simplified."""

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PAPER = {"gelsight-mini-ideal": 6.0, "gelbelt": 8.9, "gelsight360": 8.7, "gelsight-svelte": None}
-"""Seconds an image."""
+"""Time (s) of an image in the OptiSense paper; it states none for GelSight Svelte."""
 
 KINDS = {"new_light": "new light", "light_kept": "light kept"}
 BUSY = 1.3

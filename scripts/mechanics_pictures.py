@@ -13,8 +13,11 @@ from optisense.mechanics import SKINS
 
 OUT = Path(__file__).parent.parent / "docs" / "images"
 PHOTONS = 1_000_000
+"""Number of photons of each picture, whose noise is then hardly visible."""
 RESOLUTION = 400, 300
+"""Width and height (pixels) of the pictures of contacts."""
 ENLARGED = 8
+"""Factor by which the arrows of markers are longer than their motion."""
 
 
 def skins() -> None:

@@ -22,7 +22,8 @@ SEARCH = (
 )
 PHOTONS = "3000000"
 WIDTH, HEIGHT, SCALE = 1280, 2036, 0.64
-"""Of the browser's window in pixels, and what a pixel of it is in the picture."""
+"""Width and height (pixels) of the browser's window, which shows the upper part of the page, and
+pixels of the picture for each of its own."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 

@@ -16,6 +16,7 @@ LINES = ((5, 90.0), (2, 0.0))
 """Place and direction (degrees) of a good line and of a poor one."""
 CURVED = "gelsight-svelte"
 DOTS_PER_INCH = 80
+"""Resolution of the pictures, dots per inch, with which they are some 1,000 pixels wide."""
 
 
 def straight_and_bent(evaluation: Evaluation) -> None:

@@ -22,10 +22,11 @@ from optisense.design.section_drawing import section_svg
 OUT = Path(__file__).parent.parent / "docs" / "images"
 DRAWN = ("digit", "gelsight-mini", "gelbelt", "gelsight360", "gelsight-svelte")
 PHOTONS = 2_000_000
+"""Number of photons of each picture, whose noise is then hardly visible."""
 TALL = (240, 320)
-"""Pixels of DIGIT's picture."""
+"""Width and height (pixels) of DIGIT's picture, whose camera is upright."""
 SPECULARITY = 0.6
-"""At which the readings of a coating's specularity are shown."""
+"""Specularity (0 to 1) at which the meanings of a coating's specularity are compared."""
 
 
 def sections() -> None:

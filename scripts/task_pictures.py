@@ -26,6 +26,7 @@ from optisense.tasks.figures import draw_perception, draw_reconstruction
 
 OUT = Path(__file__).parent.parent / "docs" / "images"
 PHOTONS = 1_000_000
+"""Number of photons of each picture, whose noise is then hardly visible."""
 
 
 def hex_nut(path: Path) -> None:

@@ -21,7 +21,9 @@ from optisense.mechanics._height_map import heights
 
 OUT = Path(__file__).parent.parent / "docs" / "images"
 PITCH = 0.03
+"""Distance (mm) of the height samples of an object, which then has some 350 across."""
 PHOTONS = 2_000_000
+"""Number of photons of each picture, whose noise is then hardly visible."""
 
 
 def objects() -> None:

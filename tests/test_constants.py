@@ -29,13 +29,19 @@ HEADLESS = (
 """First words of docstrings that do not name the number."""
 
 
+FOLDERS = ("optisense", "paper", "studio", "benchmarks", "scripts", "examples")
+"""Folders of the repository whose constants are checked."""
+
+CODES = {"Enum", "IntEnum", "IntFlag", "Flag"}
+"""Base classes whose members are codes: their numbers have no unit and no reason."""
+
+
 def test_numeric_constants_are_documented() -> None:
-    found = list(undocumented(ROOT, "optisense", "paper", "studio"))
-    assert found == []
+    assert list(undocumented(ROOT, *FOLDERS)) == []
 
 
 def test_docstrings_of_numeric_constants_begin_with_the_number() -> None:
-    assert list(headless(ROOT, "optisense", "paper", "studio")) == []
+    assert list(headless(ROOT, *FOLDERS)) == []
 
 
 def test_docstrings_without_a_subject_are_found(tmp_path: Path) -> None:
@@ -53,18 +59,24 @@ def test_the_check_finds_what_it_looks_for(tmp_path: Path) -> None:
     folder.mkdir()
     (folder / "module.py").write_text(
         'BARE = 3\n"""mm."""\nPAIR, OTHER = 1.0, -2.0\nNAME = "text"\n'
-        'ONE = 1\nTWO = 2\n"""Smallest and largest number of things."""\n'
+        'TABLE = {"part": {"length": 2.0}}\nCOMPUTED = max(BARE, 4)\n'
+        "class Thing:\n    SIZE = 2 * BARE\n    kind = 1\n"
+        "class Kind(IntEnum):\n    FIRST = 1\n"
+        "ITEM = NAME.split()[1]\nFOUND = lambda: 3\n"
+        'ONE = 1\nTWO = 2\n"""Largest number of things, pieces."""\n'
     )
     assert list(undocumented(tmp_path, "package")) == [
         "package/module.py:1: BARE",
         "package/module.py:3: PAIR, OTHER",
+        "package/module.py:5: TABLE",
+        "package/module.py:6: COMPUTED",
+        "package/module.py:14: ONE",
+        "package/module.py:8: SIZE",
     ]
 
 
 def undocumented(root: Path, *folders: str) -> Iterator[str]:
-    """Place and name of each constant without a docstring; constants one below another may share
-    the one that follows them.
-    """
+    """Place and name of each constant without a docstring of its own."""
     for place, text in constants(root, *folders):
         if len(text.split()) < LEAST_WORDS:
             yield place
@@ -79,16 +91,26 @@ def headless(root: Path, *folders: str) -> Iterator[str]:
 
 @cache
 def constants(root: Path, *folders: str) -> list[tuple[str, str]]:
-    """Place and name, and docstring, of each numeric constant."""
+    """Place and name, and docstring, of each numeric constant of modules and classes."""
     found = []
     for path in sorted(path for folder in folders for path in (root / folder).rglob("*.py")):
-        body = ast.parse(path.read_text(encoding="utf-8")).body
-        for number, node in enumerate(body):
-            name = numeric_constant(node)
-            if name is not None:
-                place = f"{path.relative_to(root)}:{node.lineno}: {name}"
-                found.append((place, docstring_after(body, number)))
+        module = ast.parse(path.read_text(encoding="utf-8"))
+        for body in bodies(module):
+            for number, node in enumerate(body):
+                name = numeric_constant(node)
+                if name is not None:
+                    place = f"{path.relative_to(root)}:{node.lineno}: {name}"
+                    found.append((place, docstring_after(body, number)))
     return found
+
+
+def bodies(module: ast.Module) -> Iterator[list[ast.stmt]]:
+    """The statements of a module, and of each class that does not define codes."""
+    yield module.body
+    for node in ast.walk(module):
+        match node:
+            case ast.ClassDef(bases=bases) if not CODES & {ast.unparse(base) for base in bases}:
+                yield node.body
 
 
 def numeric_constant(node: ast.stmt) -> str | None:
@@ -100,30 +122,24 @@ def numeric_constant(node: ast.stmt) -> str | None:
     else:
         return None
     name = ast.unparse(target).strip("()")
-    return name if name.isupper() and is_numeric(value) else None
+    return name if name.isupper() and has_number(value) else None
 
 
-def is_numeric(value: ast.expr) -> bool:
+def has_number(value: ast.AST) -> bool:
+    """Whether an expression contains a number, other than in an index, a text or a function."""
     match value:
-        case ast.Constant(value=bool()):
+        case ast.Constant(value=number):
+            return isinstance(number, int | float) and not isinstance(number, bool)
+        case ast.Subscript(value=inner):
+            return has_number(inner)
+        case ast.Lambda() | ast.JoinedStr():
             return False
-        case ast.Constant(value=int() | float()):
-            return True
-        case ast.Tuple(elts=parts) | ast.List(elts=parts):
-            return bool(parts) and all(map(is_numeric, parts))
-        case ast.BinOp(left=left, right=right):
-            return is_numeric(left) and is_numeric(right)
-        case ast.UnaryOp(operand=operand):
-            return is_numeric(operand)
-    return False
+    return any(map(has_number, ast.iter_child_nodes(value)))
 
 
 def docstring_after(body: Sequence[ast.stmt], number: int) -> str:
-    """The docstring that follows a constant, or the constants directly below it."""
-    for node in body[number + 1 :]:
-        match node:
-            case ast.Expr(value=ast.Constant(value=str(text))):
-                return text
-        if numeric_constant(node) is None:
-            return ""
+    """The docstring that follows a constant."""
+    match body[number + 1 : number + 2]:
+        case [ast.Expr(value=ast.Constant(value=str(text)))]:
+            return text
     return ""

@@ -20,6 +20,7 @@ from optisense.near import suggestion
 
 _STEP = re.compile(r"(?:^|\.)(?P<name>[A-Za-z0-9_][A-Za-z0-9_-]*)|\[(?P<index>\d{1,9})\]")
 _LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
+"""Index of a coordinate or colour channel, by the letter that may stand for it in a path."""
 
 Steps = tuple[str | int, ...]
 

@@ -29,6 +29,8 @@ IN_PLANE = 0.001
 """Largest distance (mm) of the vertices of a flat patch from its plane."""
 
 _PARALLEL = float(np.cos(np.radians(0.1)))
+"""Cosine of the largest angle between parallel faces, 0.1 degrees: a margin for the rounding of
+mesh files."""
 
 
 @dataclass(frozen=True)

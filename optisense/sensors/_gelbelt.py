@@ -66,7 +66,11 @@ GEL, TAPE, FILM, WINDOW, BLACK = (
 LED = "smd-3528"
 
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+"""Shares of red, green and blue in the light of each colour."""
+
 ALONG_X, ALONG_Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+"""Unit vectors of the axes along which rows of lights extend."""
+
 TAPE_INDEX = 1.49
 """Refractive index of the clear tape; its provenance is in `_gelbelt_sources`."""
 

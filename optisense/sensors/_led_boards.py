@@ -13,6 +13,7 @@ from optisense.geometry import TriangleMesh
 from optisense.sensors._led_flux import package
 
 COLOURS = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
+"""Shares of red, green and blue in the light of each colour."""
 BOARDS = 4
 """Number of LED boards around the sensor's axis."""
 

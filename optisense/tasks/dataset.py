@@ -31,12 +31,15 @@ MAKE_AGAIN = "Copy the file again, or make it again: optisense dataset with --me
 ArrayKinds = Mapping[str, tuple[str, int | None]]
 
 SAMPLE_ARRAYS: ArrayKinds = {"depth": ("f", None), "normals": ("f", 3), "mask": ("b", None)}
+"""Kind of the numbers (as of `numpy.dtype.kind`) and number of channels, None for (h, w), of each
+array that all samples have."""
 LATER_ARRAYS: ArrayKinds = {
     "points": ("f", 3),
     "pressure": ("f", None),
     "penetration": ("f", None),
     "displacement": ("f", 3),
 }
+"""Kind and number of channels, as in `SAMPLE_ARRAYS`, of arrays that older datasets lack."""
 BACKGROUND_ARRAYS: ArrayKinds = {"image": ("u", 3), "points": ("f", 3), "normals": ("f", 3)}
 """Arrays of each file by name, with their allowed types (NumPy's `dtype.kind`) and the number of
 values per pixel. The later arrays may be missing: release 0.1 wrote none of them, and only an

@@ -17,6 +17,7 @@ from optisense.workshop._placement import light_entry, typical_colour, what_to_o
 from optisense.workshop.shapes import Shape, shapes
 
 MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0
+"""Square millimetres in a square centimetre, and cubic ones in a cubic centimetre."""
 
 OVERDRIVEN = 1.05
 """Ratio of a light's flux to its nominal flux from which on the bill has a remark."""

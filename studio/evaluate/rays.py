@@ -20,7 +20,10 @@ COLOURS = {
     "total_reflection": ("orange", (0.9, 0.5, 0.0, 1.0)),
     "depth_limit": ("purple", (0.5, 0.1, 0.7, 1.0)),
 }
+"""Name and RGBA colour (0 to 1) of the lines of each outcome of a chief ray; each has a hue
+of its own."""
 OTHER = ("grey", (0.5, 0.5, 0.5, 1.0))
+"""Name and RGBA colour (0 to 1) of outcomes that this version of the studio does not know."""
 
 
 def show(scene: bpy.types.Scene, result: dict[str, Any]) -> str:

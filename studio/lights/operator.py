@@ -64,6 +64,7 @@ WAYS = {
     "PLUS_Z": (0.0, 0.0, 1.0),
     "MINUS_Z": (0.0, 0.0, -1.0),
 }
+"""Unit vectors of the axes, by the names of the choices."""
 
 AIMS = [
     ("SURFACE", "Sensing surface", "At the middle of the sensing surface"),

@@ -33,6 +33,8 @@ COMPARISONS = [
     ("DIFFERENCE", "Difference", "What is brighter and darker than in the pinned picture",
      "IMAGE_ALPHA", 2),
 ]  # fmt: skip
+"""Choices of the comparison with the pinned picture; the last entry of each is the number that
+Blender stores in its files."""
 
 TEXT, LINE = 12.0, 18
 """Size of the text over a picture in points, and distance of its lines in pixels."""

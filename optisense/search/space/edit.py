@@ -15,6 +15,7 @@ from pydantic import BaseModel
 from optisense.design import SensorDesign, get_value, parse_path
 
 _LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
+"""Index of a coordinate or colour channel, by the letter that may stand for it in a path."""
 
 Node = dict[str | int, "Node | int"]
 """Step down the design; a leaf is the index of a value in the given sequence."""
