@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 
 from optisense.errors import OptiSenseError
 from optisense.untrusted_files import COPY_AGAIN, MOST_PICTURE, read_bytes
@@ -38,6 +38,12 @@ def decode_picture(data: bytes, path: Path, error: type[OptiSenseError]) -> NDAr
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             with Image.open(io.BytesIO(data), formats=("PNG", "JPEG")) as picture:
                 return np.asarray(picture.convert("RGB"), dtype=np.uint8)
+    except UnidentifiedImageError:
+        raise error(
+            "can't read the picture: its content is neither a PNG nor a JPEG file",
+            where=str(path),
+            hint=COPY_AGAIN,
+        ) from None
     except Exception as found:  # Pillow raises many kinds on malformed files
         raise error(
             f"can't read the picture: the file is cut off or damaged ({found})",

@@ -35,6 +35,11 @@ DARK_LEVEL = 16.0
 pixels stay below is underexposed, as eight bits hold few levels of it.
 """
 
+GREY_LEVEL = 1.0
+"""Largest mean difference between the channels of a photograph without colour, in levels of 255;
+JPEG files of grey pictures differ by less, and those of coloured light by tens.
+"""
+
 BRIGHTEST = 95.0
 """Percentile of the brightest channel that is compared with `DARK_LEVEL`."""
 
@@ -106,6 +111,16 @@ class Photographs:
                     where=press.name,
                     hint="Take all photographs with the same settings of the camera",
                 )
+            if press.centre is not None:
+                column, row = press.centre
+                if not (0.0 <= column <= width and 0.0 <= row <= height):
+                    raise CalibrationError(
+                        f"the contact is labelled at column {column:g}, row {row:g}, outside the "
+                        f"picture of {width} x {height} pixels",
+                        where=press.name,
+                        hint="Give the label in pixels of this photograph, or leave it empty to "
+                        "have the contact found",
+                    )
 
     @property
     def size(self) -> tuple[int, int]:
@@ -140,10 +155,18 @@ class Photographs:
         )
 
     def warnings(self) -> list[str]:
-        """Return warnings about the exposure of the pictures, one sentence each."""
-        found = []
+        """Return warnings about pictures that occur twice, and about their colour and exposure.
+
+        Each one is a sentence.
+        """
         pictures = [("the background", self.background)]
         pictures += [(press.name, press.picture) for press in self.presses]
+        found = _repeated(pictures)
+        if all(_is_grey(picture) for _, picture in pictures):
+            found.append(
+                "the photographs have no colour; the sensor's colours, and what they tell of the "
+                "skin's tilt, can't be fitted to them"
+            )
         for name, picture in pictures:
             full = float((picture.max(axis=2) >= FULL_LEVEL).mean())
             if full > FULL_SHARE:
@@ -158,6 +181,26 @@ class Photographs:
                     f"{bright:.0f} of 255"
                 )
         return found
+
+
+def _repeated(pictures: Sequence[tuple[str, ByteArray]]) -> list[str]:
+    """Return a sentence for each picture that is the same as an earlier one."""
+    found = []
+    first: dict[bytes, str] = {}
+    for name, picture in pictures:
+        content = picture.tobytes()
+        earlier = first.get(content)
+        if earlier is None:
+            first[content] = name
+        else:
+            same = "is listed twice" if earlier == name else f"is the same picture as {earlier}"
+            found.append(f"{name}: it {same}; leave one of them out")
+    return found
+
+
+def _is_grey(picture: ByteArray) -> bool:
+    spread = picture.max(axis=2).astype(np.float64) - picture.min(axis=2)
+    return float(spread.mean()) < GREY_LEVEL
 
 
 def _resized(picture: ByteArray, size: tuple[int, int]) -> ByteArray:

@@ -10,6 +10,11 @@ from optisense.calibration.fitted_numbers import FittedNumber
 from optisense.calibration.realism import Realism
 from optisense.design import SensorDesign
 
+AS_WELL = 0.1
+"""Relative change of the unexplained energy below which a fit counts as neither better nor worse;
+a second seed of the light, and another choice of the presses held out, change it by about as much.
+"""
+
 
 @dataclass(frozen=True)
 class Calibration:
@@ -41,9 +46,31 @@ class Calibration:
         readings = [r for r in found.readings if (r.name in self.held_out) == held_out]
         return replace(found, presses=tuple(presses), readings=tuple(readings))
 
+    def verdict(self) -> str:
+        """Return a sentence on whether the fitted design predicts presses that it has not seen."""
+        if not self.held_out:
+            return (
+                "No press is held out, so that nothing shows whether the fitted design predicts "
+                "other presses."
+            )
+        before, after = (
+            self.of_presses(side.realism, held_out=True).median("unexplained")
+            for side in (self.before, self.after)
+        )
+        shares = f"{after:.3f} of their energy is unexplained, {before:.3f} before"
+        if abs(after - before) <= AS_WELL * before:
+            return f"The fitted design predicts the presses held out as well as before: {shares}."
+        if after < before:
+            return f"The fitted design predicts the presses held out better: {shares}."
+        return (
+            f"The fitted design predicts the presses held out worse: {shares}. Keep the design "
+            "that you had, fit fewer numbers (--keep), or take more photographs at other places."
+        )
+
     def as_data(self) -> dict[str, Any]:
         """Return all numbers and figures, ready for JSON."""
         return {
+            "verdict": self.verdict(),
             "exposure": self.exposure,
             "numbers": [asdict(each) for each in self.numbers],
             "not_told_apart": [list(pair) for pair in self.alike],

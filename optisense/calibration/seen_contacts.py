@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from optisense.calibration.contact_finding import find_another, find_contact
+from optisense.calibration.contact_finding import FoundContact, find_another, find_contact
 from optisense.calibration.photographs import PhotographedPress, Photographs
 from optisense.errors import CalibrationError, ContactError
 from optisense.geometry import Contact, Sphere
@@ -55,7 +56,8 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
     Args:
         photographs: photographs with labels or without.
         refine: whether labelled contacts are also searched, near their labels; hand labels are off
-            by pixels.
+            by pixels. A label beside which the picture does not look like a ball, while it does
+            elsewhere, is ignored.
 
     Returns:
         Contacts, with None for a photograph that shows no contact.
@@ -67,6 +69,10 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
             found.append(SeenContact(centre, radius))
             continue
         seen = find_contact(press.picture, photographs.background, centre, radius)
+        if centre is not None and seen is not None and seen.asymmetry > DOUBTFUL:
+            free = find_contact(press.picture, photographs.background)
+            if free is not None and free.asymmetry < DOUBTFUL:
+                seen = free
         found.append(None if seen is None else SeenContact(seen.centre, seen.radius))
     return found
 
@@ -75,6 +81,7 @@ def doubts(photographs: Photographs) -> list[str]:
     """Return warnings about presses: no visible contact, or labels that contradict it."""
     found = []
     twice = 0
+    denied: list[FoundContact] = []
     for press in photographs.presses:
         seen = find_contact(press.picture, photographs.background)
         if seen is not None:
@@ -89,6 +96,7 @@ def doubts(photographs: Photographs) -> list[str]:
         if press.centre is not None:
             off = math.dist(press.centre, seen.centre)
             if off > LABEL_OFF * max(seen.radius, press.radius or 0.0):
+                denied.append(seen)
                 found.append(
                     f"{press.name}: its label is {off:.0f} pixels away from the contact that the "
                     "picture shows; check whether it is that of another photograph"
@@ -99,13 +107,37 @@ def doubts(photographs: Photographs) -> list[str]:
                 f"{press.name}: its label says a radius of {labelled:.0f} pixels, and the "
                 f"picture shows {seen.radius:.0f}"
             )
+    common = _common_place(denied)
     if 2 * twice > len(photographs.presses):
+        found.insert(0, _background_contact("most photographs show two"))
+    elif common is not None:
+        column, row = common
         found.insert(
             0,
-            "the background: it seems to show a contact, as most photographs show two; take one "
-            "with nothing pressed in",
+            _background_contact(
+                f"several photographs show one at column {column:.0f}, row {row:.0f}, where they "
+                "have no label"
+            ),
         )
     return found
+
+
+def _background_contact(reason: str) -> str:
+    return (
+        f"the background: it seems to show a contact, as {reason}; take one with nothing pressed in"
+    )
+
+
+def _common_place(contacts: Sequence[FoundContact]) -> tuple[float, float] | None:
+    """Return the place that more than half of the contacts share, or None if there are not two."""
+    if len(contacts) < 2:
+        return None
+    column, row = np.median([each.centre for each in contacts], axis=0).tolist()
+    near = [
+        each for each in contacts
+        if math.dist(each.centre, (column, row)) < LABEL_OFF * each.radius
+    ]  # fmt: skip
+    return (column, row) if len(near) >= 2 and 2 * len(near) > len(contacts) else None
 
 
 def check_shape(photographs: Photographs, model: OpticalModel) -> None:

@@ -136,6 +136,7 @@ def print_calibration(found: Calibration) -> None:
         "",
     )
     output.print(table)
+    output.print(found.verdict(), markup=False)
     for line in reading_lines(found.of_presses(found.after.realism, held_out=held)):
         output.print(line)
     output.print(f"exposure of the photographs: {found.exposure:.4g}")

@@ -97,6 +97,7 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
             found.of_presses(side.realism, held_out=held).median("unexplained")
             for side in (found.before, found.after)
         ],
+        "verdict": found.verdict(),
         "notes": [*found.before.notes, *found.notes],
     }
 

@@ -50,6 +50,7 @@ def render_calibration(found: Calibration) -> str:
             ("exposure", f"{found.exposure:.4g}"),
         ],
         notes=list(found.notes),
+        verdict=found.verdict(),
         numbers=[
             (
                 each.words,

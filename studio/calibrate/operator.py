@@ -158,12 +158,13 @@ def _take(result: dict[str, Any]) -> None:
 
 
 def words(result: dict[str, Any]) -> list[str]:
-    """Return the result of a calibration as lines of text: what is left unexplained, and each
-    fitted number before and after with its uncertainty.
+    """Return the result of a calibration as lines of text: the verdict, the share of the presses'
+    energy that is not explained, and each fitted number before and after with its uncertainty.
     """
     before, after = (100.0 * each for each in result["unexplained"])
     held = "presses held out" if result["held_out"] else "fitted presses"
-    lines = [f"Not explained of {held}: {before:.0f} % before, {after:.0f} % after"]
+    lines = [result["verdict"]]
+    lines.append(f"Not explained of {held}: {before:.0f} % before, {after:.0f} % after")
     for row in result["numbers"]:
         doubt = "" if row["determined"] else ", not determined"
         lines.append(

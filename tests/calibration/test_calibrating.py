@@ -224,7 +224,9 @@ def test_a_design_is_fitted_and_marked(photographs: Photographs, tmp_path: Path)
     assert data["photographs"]["press-02.png"][:12] in marked.source
     assert data["held_out"] == ["press-03.png"]
     assert data["after"]["background"]["ratio"] > data["before"]["background"]["ratio"] + 3.0
+    assert "The fitted design predicts the presses held out" in run.output.replace("\n", " ")
     page = (tmp_path / "fitted" / "calibration.html").read_text("utf-8")
+    assert data["verdict"] in page
     assert "press-03.png" in page
     assert "<script" not in page
     assert CalibrationSettings().rounds >= 1

@@ -155,6 +155,10 @@ def test_wrong_labels_and_missing_contacts_are_told(photographs: Photographs) ->
     assert "away from the contact" in words[0]
     assert "no contact is to be seen" in words[1]
     assert len(words) == 2
+    (used, missing, _), (true, *_) = seen_contacts(odd), seen_contacts(photographs)
+    assert missing is None
+    assert used is not None and true is not None
+    assert math.dist(used.centre, true.centre) < 0.1 * true.radius
 
 
 def test_a_background_with_a_contact_is_told(photographs: Photographs) -> None:
@@ -162,6 +166,15 @@ def test_a_background_with_a_contact_is_told(photographs: Photographs) -> None:
     first, *others = photographs.presses
     words = doubts(replace(photographs, background=first.picture, presses=tuple(others)))
     assert any("seems to show a contact" in note for note in words)
+
+
+def test_a_contact_of_the_background_is_told_where_labels_deny_it(
+    photographs: Photographs,
+) -> None:
+    presses = [replace(press, centre=(16.0 + 8.0 * number, 16.0), radius=12.0)
+               for number, press in enumerate((photographs.presses[0],) * 3)]  # fmt: skip
+    words = doubts(replace(photographs, presses=tuple(presses)))
+    assert "several photographs show one at column" in words[0]
 
 
 def test_impossible_contacts_are_refused(mini: OpticalModel, photographs: Photographs) -> None:

@@ -121,6 +121,39 @@ def test_a_folder_needs_a_background_of_the_same_size(tmp_path: Path) -> None:
         read_photographs(tmp_path)
 
 
+def test_a_label_outside_the_picture_is_refused(tmp_path: Path) -> None:
+    table = "file,diameter,column,row,radius\na.png,6,640,20,9\n"
+    with pytest.raises(CalibrationError, match="outside the picture of 64 x 48 pixels") as raised:
+        read_photographs(own_folder(tmp_path / "f", table))
+    assert raised.value.where == "a.png"
+
+
+def test_a_file_that_is_no_picture_is_told_without_its_inner_names(tmp_path: Path) -> None:
+    folder = own_folder(tmp_path / "f")
+    (folder / "background.png").write_text("no picture")
+    with pytest.raises(CalibrationError, match="neither a PNG nor a JPEG file") as raised:
+        read_photographs(folder)
+    assert "BytesIO" not in str(raised.value)
+
+
+def test_pictures_that_occur_twice_are_told() -> None:
+    one, two = (PhotographedPress(name, picture(1), 6.0) for name in ("one", "two"))
+    words = Photographs(picture(0), (one, two, one)).warnings()
+    assert words == [
+        "two: it is the same picture as one; leave one of them out",
+        "one: it is listed twice; leave one of them out",
+    ]
+
+
+def test_photographs_without_colour_are_told() -> None:
+    def grey(seed: int) -> np.ndarray:
+        return np.repeat(picture(seed)[..., :1], 3, axis=2)
+
+    presses = (PhotographedPress("one", grey(1), 6.0),)
+    assert "no colour" in Photographs(grey(0), presses).warnings()[0]
+    assert Photographs(picture(0), presses).warnings() == []
+
+
 def test_exposure_is_judged() -> None:
     dark = PhotographedPress("dark", picture(1) // 20, 6.0)
     bright = PhotographedPress("bright", np.full((HEIGHT, WIDTH, 3), 255, np.uint8), 6.0)

@@ -46,6 +46,7 @@ def test_the_power_of_a_light_is_found_from_photographs(engine: Any, tmp_path: P
     (green,) = [each for each in found["numbers"] if "green" in each["path"]]
     assert red["before"] == pytest.approx(2.1)
     assert red["after"] / green["after"] == pytest.approx(FLUX / 2.1, rel=0.1)
+    assert "better" in found["verdict"]
     assert found["unexplained"][1] < found["unexplained"][0]
     assert (to / "design.yaml").is_file() and Path(found["page"]).is_file()
     refused = engine.refused("calibrate", to=str(tmp_path / "n"), keep=["weather"], **given)
