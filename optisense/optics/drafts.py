@@ -20,6 +20,7 @@ from optisense.design import SensorDesign
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.mechanics import ELASTIC
+from optisense.optics._carried_contacts import PressedContacts
 from optisense.optics.draft_light import DraftCacheStore, KeptView
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.model import OpticalModel, Sight
@@ -52,6 +53,7 @@ class _Shown:
     of an earlier draft.
     """
 
+    contacts: tuple[Contact, ...]
     asked: tuple[Any, ...]
     design: SensorDesign
     image: TactileImage
@@ -96,8 +98,8 @@ class DraftModel(OpticalModel):
         self._faint: dict[str, NDArray[np.float32]] = {}
         """The faint light (`KnownView.faint`) of each group that drafts reuse."""
         self._last_sight: Sight | None = None
-        self._pressed_on: TriangleMesh | None = None
-        """The undeformed skin when contacts were pressed in last."""
+        self._pressed: PressedContacts | None = None
+        """The contacts that were pressed in last."""
         self._shown: _Shown | None = None
         super().__init__(self._straightened(design), variant, before)
 
@@ -121,8 +123,11 @@ class DraftModel(OpticalModel):
         completely, with its media resolved; ``settings["kept_layers"]``,
         ``settings["kept_view"]`` and ``settings["kept_media"]`` record what was reused.
         """
-        asked = tuple(contacts), args, {k: v for k, v in kwargs.items() if k != "progress"}
-        before = self._shown if self._shown is not None and self._shown.asked == asked else None
+        contacts = tuple(contacts)
+        asked = args, {k: v for k, v in kwargs.items() if k != "progress"}
+        before = self._shown
+        if before is not None and not (before.asked == asked and self._are_same(contacts)):
+            before = None
         moved = None if before is None else _moved(before.design, self.design)
         still = moved is not None and not moved
         if before is not None and still:
@@ -154,7 +159,7 @@ class DraftModel(OpticalModel):
         view = before is not None and bool(self._faint) and not still
         image.settings |= {"kept_layers": kept, "kept_view": view, "kept_media": bent}
         if not image.interrupted:
-            self._shown = _Shown(asked, self.design, image, bent or view)
+            self._shown = _Shown(contacts, asked, self.design, image, bent or view)
         return image
 
     @property
@@ -169,7 +174,7 @@ class DraftModel(OpticalModel):
             sight = self._carried_sight(contacts, resolution, skin)
             self._kept = KeptView(sight or super()._sight(contacts, resolution, skin))
             if sight is None:
-                self._pressed_on = self.sensing
+                self._pressed = PressedContacts(tuple(contacts), self.sensing)
         known = self._kept.sight.known
         known.faint = None
         if self._faint:
@@ -182,9 +187,9 @@ class DraftModel(OpticalModel):
         """Return the sight with the skin as the contacts deformed it in an earlier draft, moved
         along with a cage by little; None if there is none.
         """
-        old, now = self._pressed_on, self.sensing
-        if not self._faint or self._last_sight is None or old is None or skin != ELASTIC:
+        if not self._faint or self._last_sight is None or self._pressed is None or skin != ELASTIC:
             return None
+        old, now = self._pressed.skin, self.sensing
         last, pressed = self._last_sight, self._last_sight.pressed
         mesh = last.skin
         if pressed is None or mesh is None or mesh.origin is None or not same_faces(old, now):
@@ -198,6 +203,18 @@ class DraftModel(OpticalModel):
         if not rays.hit.any():
             raise sees_nothing(rays)
         return Sight(camera, last.placed, pressed, scenes, rays, mesh)
+
+    def _are_same(self, contacts: tuple[Contact, ...]) -> bool:
+        """Return whether contacts are those of the last draft, perhaps carried by a skin that was
+        bent since.
+        """
+        assert self._shown is not None
+        if contacts == self._shown.contacts:
+            return True
+        bent = self._shown.design.meshes != self.design.meshes
+        return (
+            bent and self._pressed is not None and self._pressed.carried_to(contacts, self.sensing)
+        )
 
     @property
     def _draft_store(self) -> DraftCacheStore | None:

@@ -201,6 +201,32 @@ def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
     np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
 
 
+def test_a_contact_that_the_skin_carries_is_not_pressed_anew(
+    draft: DraftModel, mini: SensorDesign
+) -> None:
+    rest = draft.sensing.vertices.copy()
+    middle = int(np.argmin(np.linalg.norm(rest - (0.0, 0.0, rest[:, 2].max()), axis=1)))
+
+    def press(height: float, aside: float = 0.0) -> ots.TactileImage:
+        draft.set_design(ots.set_value(mini, "cages.skin.points[14].z", height))
+        x, y, z = draft.sensing.vertices[middle].tolist()
+        contact = ots.Contact(ots.Sphere(radius=1.5), point=(x + aside, y, z), depth=0.6)
+        return draft.render([contact], SIZE, photons=PHOTONS)
+
+    press(0.0)
+    press(0.2)
+    pressed = draft._pressed
+    carried = press(0.4)
+    assert draft._pressed is pressed and carried.settings["kept_view"]
+    anew = press(0.4)
+    assert draft._pressed is not pressed and not anew.settings["kept_view"]
+    a, b = blocks(carried.radiance), blocks(anew.radiance)
+    np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+    pressed = draft._pressed
+    press(0.6, aside=1.0)
+    assert draft._pressed is not pressed, "the contact left its place on the skin"
+
+
 def test_frosted_faces_move_along_with_a_cage_as_if_cut_anew() -> None:
     mini = ots.load("gelsight-mini")
     drafts = DraftModel(mini)
