@@ -119,7 +119,7 @@ def ablations() -> list[Ablation]:
         both = mi.sample_tea_32(first ^ 0x85EBCA6B, second)
         return tuple(sequences.unit_float(bits) for bits in (first, second, *both))
 
-    def random_in_series(series: Any, number: Any, dimension: int) -> Any:
+    def random_richtmyer(series: Any, number: Any, dimension: int) -> Any:
         return sequences.unit_float(mi.sample_tea_32(series ^ mi.UInt32(dimension), number)[0])
 
     def own_cell(
@@ -170,8 +170,8 @@ def ablations() -> list[Ablation]:
         shading_only("several cells a sample", Change(shading, "CELLS_PER_SAMPLE", 1)),
         shading_only("interpolation of cells", Change(shading, "interpolating_cell", own_cell)),
         shading_only("even spread of a pixel's samples",
-                     Change(bin_sums, "in_series", random_in_series),
-                     Change(shading_points, "in_series", random_in_series)),
+                     Change(bin_sums, "richtmyer", random_richtmyer),
+                     Change(shading_points, "richtmyer", random_richtmyer)),
         shading_only("interreflection in contacts",
                      Change(shading, "interreflected", no_interreflection),
                      Change(shading, "glossy_interreflection", no_interreflection)),

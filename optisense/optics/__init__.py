@@ -1,6 +1,10 @@
 """Optics: rendering tactile images of designs; the only package that imports the renderer.
 
 Names load on first use, so that libLLVM is checked before Mitsuba is imported.
+
+Shapes in docstrings follow NumPy. An array of the renderer (`mi.Float`, `mi.UInt32`, `mi.Bool`) has
+one entry per ray, photon, point or pixel, and shape (n,); `mi.Point3f`, `mi.Vector3f` and
+`mi.Color3f` hold three such arrays, x, y, z or R, G, B. Arrays of one entry apply to all n.
 """
 
 from __future__ import annotations

@@ -19,9 +19,9 @@ from optisense.optics.scene.surface_cells import SurfaceCells, cells_near
 from optisense.optics.scene.surfaces import SurfaceKind
 
 DRAFT_CELL_SCALE = 2.4
-"""Ratio of a draft's cell size to that of a full image. With the few photons of a draft, wider
-cells give a smaller error against the full image: 9 % instead of 14 % with cells half as wide. They
-also take much less time to smooth."""
+"""Ratio of the side of a draft's cells to `CELL_SIZE`, that of a full image. With the few photons
+of a draft, wider cells give a smaller error against the full image: 9 % instead of 14 % with cells
+half as wide. They also take much less time to smooth."""
 
 DRAFT_PILOT_PHOTONS = 60_000
 """Number of photons of a draft's pilot pass, a fifth of that of a full image, as no more than a

@@ -34,8 +34,8 @@ from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays
 from optisense.quality import photons_of
 
 DRAG_PHOTONS = 0.5
-"""Share of a draft's photons that are traced while something moves; a draft of all photons follows
-at rest."""
+"""Share of a draft's photons that are traced while something moves, which saves half of the tracing
+time; a draft of all photons follows at rest."""
 
 CARRY_TOLERANCE = 2.0
 """Largest displacement of the undeformed skin (mm) up to which a draft moves a pressed skin along
@@ -67,13 +67,15 @@ class DraftView(SkinView):
     coarse = True
 
     def __init__(self, design: SensorDesign, scenes: SensorScenes) -> None:
-        """See `SkinView`."""
+        """Prepare the view; the arguments are those of `SkinView`."""
         super().__init__(design, scenes)
         self._placed: Callable[[Contact], TriangleMesh]
         self._placed = lru_cache(maxsize=PLACED_CONTACTS)(super().place)
 
     def place(self, contact: Contact) -> TriangleMesh:
-        """Place a contact, from the cache if it is known; see `SkinView.place`."""
+        """Return the mesh of a contact's indenter, from the cache if it is known; see
+        `SkinView.place`.
+        """
         return self._placed(contact)
 
 
@@ -89,7 +91,7 @@ class DraftModel(OpticalModel):
     def __init__(
         self, design: SensorDesign, variant: str = "auto", before: RayModel | None = None
     ) -> None:
-        """See `OpticalModel`."""
+        """Resolve media and build the scene; the arguments are those of `OpticalModel`."""
         self._rest: dict[str, TriangleMesh] = {}
         self._bent: dict[str, TriangleMesh] = {}
         self._before: DraftCacheStore | None = None

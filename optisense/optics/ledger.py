@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
 
 VIEW_CELL = 0.5
-"""Side (mm) of the cells of the sensing surface that record the part in the camera's view."""
+"""Side (mm) of the cells of the sensing surface that record the part in the camera's view: that of
+the radiance cache's cells, and half of `IN_VIEW`."""
 
 IN_VIEW = 1.0
 """Largest distance (mm) from the middle of a cell in view to the nearest end point of the rays of a
@@ -113,7 +114,7 @@ class LightLedger:
     exits: list[LedgerExit]
 
     def places(self) -> list[str]:
-        """The places where light ends, in order of decreasing power."""
+        """Return the places where light ends, in order of decreasing power."""
         total: dict[str, float] = {}
         for entry in self.entries:
             total[entry.where] = total.get(entry.where, 0.0) + entry.power

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
 
 WIDTH = 96
-"""Width (pixels) of the picture that is summed up. Radiance varies over more than one such
-pixel."""
+"""Width (pixels) of the picture that is summed up. The sum does not depend on the size of pixels;
+few are enough as radiance varies over more than one of them."""
 
 
 @dataclass(frozen=True)

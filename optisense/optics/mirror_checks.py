@@ -8,8 +8,8 @@ from optisense.design.problems import Diagnostic
 from optisense.optics.scene.assembly import is_mirror
 
 CHECK_RAYS = (96, 72)
-"""Numbers of chief rays of a check along the width and height of the picture; a column is then
-about 0.01 of all rays."""
+"""Numbers of chief rays of a check along the width and height of the picture. A column of 72 rays
+is then 0.01 of all, a tenth of `LEAST_BY_MIRROR`."""
 
 LEAST_BY_MIRROR = 0.1
 """Smallest share of the chief rays on the sensing surface that a mirror must reflect to count as
@@ -42,7 +42,7 @@ def mirror_problems(design: SensorDesign, views: dict[frozenset[str], float]) ->
     if mirrors and not views:
         return [
             Diagnostic(
-                "the camera sees nothing of the sensing surface, by mirrors or straight",
+                "the camera sees nothing of the sensing surface, neither by mirrors nor directly",
                 design.where("camera"),
                 "Check the camera's position and direction, and what is in its way",
                 "warning",
@@ -56,17 +56,20 @@ def mirror_problems(design: SensorDesign, views: dict[frozenset[str], float]) ->
                 f"the mirror '{name}' shows the camera {100 * share:.0f} % of what it sees of the "
                 "sensing surface"
             )
-            hint = "Check where both are; it is right where the mirror only turns light"
+            hint = (
+                "Check the positions of mirror and camera; ignore this if the mirror only turns "
+                "the light of lamps"
+            )
             problems.append(Diagnostic(message, design.where("parts", name), hint, "warning"))
     return problems
 
 
 def views_in_words(views: dict[frozenset[str], float]) -> str:
-    """Describe the sets of mirrors by which the camera sees the sensing surface, the most used
-    first.
+    """Return a sentence part that names the sets of mirrors by which the camera sees the sensing
+    surface, the most used first.
     """
     phrases = []
     for way, share in sorted(views.items(), key=lambda each: -each[1]):
         names = " and ".join(f"'{name}'" for name in sorted(way))
-        phrases.append(f"{100 * share:.0f} % {'by ' + names if names else 'straight'}")
+        phrases.append(f"{100 * share:.0f} % {'by ' + names if names else 'directly'}")
     return ", ".join(phrases)

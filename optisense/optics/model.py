@@ -20,7 +20,12 @@ from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
-from optisense.optics.imaging.cached import Effort, ImageLayers, PixelImportance, render_cached
+from optisense.optics.imaging.cached import (
+    ImageLayers,
+    PixelImportance,
+    SamplingPlan,
+    render_cached,
+)
 from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
@@ -36,10 +41,12 @@ from optisense.optics.transport.photons import Emission
 from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
 
 MAX_PHOTONS = 512_000_000
-"""Number of photons at which tracing ends even if the wanted noise is not reached."""
+"""Number of photons at which tracing ends even if the wanted noise is not reached. The noise of the
+light is then about 0.1 %, a thirtieth of that of a normal image."""
 
 SPPM_PASS_PHOTONS = 1_000_000
-"""Number of photons of one pass of the `sppm` estimator."""
+"""Number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on GelSight
+Mini gets some 300 landings, and a photon map of 60 MB."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +142,7 @@ class OpticalModel(RayModel):
             dr.flush_malloc_cache()
 
     def guide(self) -> EmissionGuide:
-        """The emission guide, learned from a pilot pass on first use."""
+        """Return the emission guide, which is learned from a pilot pass on first use."""
         return self._store.guide
 
     @reraise_interrupts
@@ -192,10 +199,14 @@ class OpticalModel(RayModel):
                 f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
             )
         if skin not in SKINS:
-            raise RenderError(f"there is no skin '{skin}'", hint="Use " + " or ".join(SKINS))
+            raise RenderError(
+                f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS)
+            )
         for name, value in (("noise", noise), ("seconds", seconds)):
             if value is not None and not value > 0:
-                raise RenderError(f"{name} is {value}", hint="give a number above 0")
+                raise RenderError(
+                    f"the limit '{name}' is {value}", hint="Give a number above 0, or none"
+                )
         number = None if photons is None else _photons_of(photons)
         began = time.perf_counter()
         bound_memory()
@@ -224,7 +235,7 @@ class OpticalModel(RayModel):
             if number is None and noise is None and seconds is None:
                 wanted = PICTURE_PHOTONS
             store = self._store
-            light = store.field(
+            light = store.radiance_cache(
                 seed, wanted, target, seconds, MAX_PHOTONS, began, on_stage, partial
             )
             lit = time.perf_counter()
@@ -236,7 +247,7 @@ class OpticalModel(RayModel):
                 rays,
                 store.emitters,
                 seed,
-                Effort(only_contacts, pixel_importance, self.is_draft),
+                SamplingPlan(only_contacts, pixel_importance, self.is_draft),
                 sight.known if self.is_draft else None,
             )
             layers.light_seconds = lit - built

@@ -147,7 +147,7 @@ def light_at(
     if photons < 100 * lights:
         raise RenderError(
             f"{photons} photons are too few for {lights} lights",
-            hint=f"give at least {100 * lights}",
+            hint=f"Give at least {100 * lights}",
         )
     place = model.surface.point_at(*at) if len(at) == 2 else model.surface.nearest(at)
     right = model.surface.u_axis - place.inward * (model.surface.u_axis @ place.inward)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from optisense.optics.model import OpticalModel
 
 ESCAPE_LENGTH = 5.0
-"""Length (mm) of the last segment of a ray that escapes."""
+"""Length (mm) of the last segment of a ray that escapes, in a drawing: enough to show its direction
+beside a sensor of some 20 mm."""
 
 
 @dataclass(frozen=True)

@@ -100,7 +100,7 @@ class ReferenceScene:
             min(lobes, default=None),
         )
         store = CacheStore(lit, rays.points[rays.hit])
-        light = store.field(
+        light = store.radiance_cache(
             seed, photons, None, None, 2 * photons, 0.0, lambda stage, part, traced, noise: None
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)

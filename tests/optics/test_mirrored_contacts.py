@@ -34,11 +34,11 @@ def film_of(values: np.ndarray) -> Film:
 def test_spreading_keeps_even_light_and_the_sum_of_a_bright_sample() -> None:
     where = np.ones((40, 40), dtype=bool)
     where[:, :5] = False
-    even = film_of(np.full((40, 40), 3.0)).spread_layers(40, 40, [(where, 5)])
+    even = film_of(np.full((40, 40), 3.0)).averaged_layers(40, 40, [(where, 5)])
     assert even == pytest.approx(3.0, rel=1e-5)
     spark = np.zeros((40, 40))
     spark[20, 20], spark[10, 2] = 1.0, 1.0
-    spread = film_of(spark).spread_layers(40, 40, [(where, 5)])[0, ..., 0]
+    spread = film_of(spark).averaged_layers(40, 40, [(where, 5)])[0, ..., 0]
     assert spread[where].sum() == pytest.approx(1.0, rel=1e-5)
     assert spread[20, 20] < 0.1 and (spread[where] > 0).sum() > 30
     assert spread[10, 2] == 1.0 and not spread[~where].sum() > 1.0

@@ -11,8 +11,8 @@ import numpy as np
 from optisense.optics.backend.sequences import (
     RICHTMYER_STEPS,
     folded_lattice,
-    in_series,
     lattice_multipliers,
+    richtmyer,
     sequence_2d,
 )
 
@@ -23,7 +23,7 @@ SERIES = 500
 def test_elements_of_a_series_are_spread_evenly_and_series_are_independent() -> None:
     lane = dr.arange(mi.UInt32, SERIES * SAMPLES)
     for dimension in range(len(RICHTMYER_STEPS)):
-        values = np.asarray(in_series(lane // SAMPLES, lane % SAMPLES, dimension))
+        values = np.asarray(richtmyer(lane // SAMPLES, lane % SAMPLES, dimension))
         sets = values.reshape(SERIES, SAMPLES).astype(np.float64)
         assert sets.min() >= 0.0 and sets.max() < 1.0
         ordered = np.sort(sets, axis=1)
@@ -39,7 +39,7 @@ def test_elements_of_a_series_are_spread_evenly_and_series_are_independent() -> 
 def test_dimensions_of_a_series_do_not_follow_each_other() -> None:
     lane = dr.arange(mi.UInt32, 20_000)
     columns = np.stack(
-        [np.asarray(in_series(lane, lane * 0, k)) for k in range(len(RICHTMYER_STEPS))]
+        [np.asarray(richtmyer(lane, lane * 0, k)) for k in range(len(RICHTMYER_STEPS))]
     )
     off = np.abs(np.corrcoef(columns)) - np.eye(len(RICHTMYER_STEPS))
     assert off.max() < 5 / np.sqrt(20_000)

@@ -62,7 +62,7 @@ def test_a_kernel_that_can_not_run_is_told_not_raised(
 
 
 def old_library() -> Path | None:
-    found = [library for library in llvm.installed_llvms() if not library.is_fit]
+    found = [library for library in llvm.installed_llvms() if not library.is_suitable]
     return found[0].path if found else None
 
 

@@ -83,8 +83,8 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
     scenes = ContactScenes(full, fixed, pressed, around, convex=True)
     rays = trace_chief_rays(full, CAMERA)
     light = store(fixed, LAMP, rays.points[rays.hit])
-    field = light.field(0, PHOTONS, None, None, PHOTONS, 0.0, lambda *told: None)
-    image = render_cached(field, scenes, CAMERA, rays, [LAMP], 0).radiance[0, ..., 0]
+    cache = light.radiance_cache(0, PHOTONS, None, None, PHOTONS, 0.0, lambda *told: None)
+    image = render_cached(cache, scenes, CAMERA, rays, [LAMP], 0).radiance[0, ..., 0]
 
     normals, points = rays.normals.astype(float), rays.points.astype(float)
     flank = (rays.region == Region.INDENTER) & (normals[..., 0] > 0.3)
@@ -97,5 +97,5 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
 @pytest.mark.parametrize(("lamp", "grazes"), [(LAMP, True), (OVERHEAD, False)])
 def test_only_light_that_grazes_is_followed_above_the_surface(lamp: Emitter, grazes: bool) -> None:
     light = store(RayScene([skin()]), lamp, np.zeros((1, 3)))
-    field, _ = light.field(0, 50_000, None, None, 50_000, 0.0, lambda *told: None)
-    assert (field.binned.above is not None) == grazes
+    cache, _ = light.radiance_cache(0, 50_000, None, None, 50_000, 0.0, lambda *told: None)
+    assert (cache.binned.above is not None) == grazes

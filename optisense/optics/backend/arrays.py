@@ -44,7 +44,7 @@ def joined(first: Value, second: Value) -> Value:
 
 
 def floats(values: NDArray[np.floating]) -> mi.Float:
-    """Return all values of an array as device floats, flattened in row-major order.
+    """Return all n values of an array of any shape as device floats (n,), in row-major order.
 
     They are copied bit by bit, as some of them may hold integers.
     """
@@ -55,7 +55,7 @@ def floats(values: NDArray[np.floating]) -> mi.Float:
 
 
 def indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
-    """Return all values of an array as device integers, flattened in row-major order."""
+    """Return all n values of an array of any shape as device integers (n,), in row-major order."""
     held = _copied(np.asarray(values, dtype=np.uint32).ravel())
     dr.eval(held)
     return held

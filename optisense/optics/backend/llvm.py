@@ -73,7 +73,7 @@ class LlvmLibrary:
     version: tuple[int, int]
 
     @property
-    def is_fit(self) -> bool:
+    def is_suitable(self) -> bool:
         """Whether the renderer can use the library without aborting the process."""
         return self.version[0] >= MINIMUM_LLVM
 
@@ -105,7 +105,7 @@ def installed_llvms() -> list[LlvmLibrary]:
                 libraries[real] = LlvmLibrary(path, version)
     return sorted(
         libraries.values(),
-        key=lambda library: (not library.is_fit, abs(library.version[0] - TESTED_LLVM)),
+        key=lambda library: (not library.is_suitable, abs(library.version[0] - TESTED_LLVM)),
     )
 
 
@@ -123,7 +123,7 @@ def find_llvm() -> LlvmLibrary:
         return _check_chosen(chosen)
     too_old, broken = [], []
     for library in installed_llvms():
-        if not library.is_fit:
+        if not library.is_suitable:
             too_old.append(library)
         elif _loads(library.path):
             os.environ[PATH_VARIABLE] = str(library.path)
@@ -149,9 +149,9 @@ def _check_chosen(chosen: str) -> LlvmLibrary:
     path = Path(chosen)
     version = _version_of(path.resolve()) if path.exists() else _ask_version(chosen)
     if version is None:
-        raise SetupError("this is no libLLVM that can be loaded", where=where, hint=hint)
+        raise SetupError("this file is not a libLLVM that can be loaded", where=where, hint=hint)
     library = LlvmLibrary(path, version)
-    if not library.is_fit:
+    if not library.is_suitable:
         raise SetupError(
             f"libLLVM {version[0]} is too old, the renderer needs {MINIMUM_LLVM} or newer",
             where=where,

@@ -15,15 +15,16 @@ MOST_RESIDENT = 2 * 2**30
 Tracing the light of a built-in sensor takes up to 1.5 GB, of which less than 0.4 GB are in use
 afterwards."""
 LEAST_FREED = 2**30
-"""Bytes by which the resident memory must grow after freed memory was returned until it is returned
-again. Processes in which more than `MOST_RESIDENT` are in use do not return it before every
-image."""
+"""Growth of the resident memory (bytes) after freed memory was returned, from which on it is
+returned again. A GB is less than one trace of a sensor takes, so that processes in which more than
+`MOST_RESIDENT` are in use do not return memory before every image."""
 
 
 class _Bound:
-    """The resident memory (bytes) above which freed memory is returned next."""
+    """The limit that the resident memory must exceed before freed memory is returned."""
 
     resident: float = MOST_RESIDENT
+    """Resident memory (bytes) above which freed memory is returned next."""
 
 
 def bound_memory() -> None:

@@ -22,39 +22,49 @@ def _steps(dimensions: int) -> list[int]:
 
 
 STEPS = _steps(4)
-"""Steps of the four-dimensional sequence, in units of 2^-32."""
+"""Steps of the four-dimensional sequence, in units of 2^-32: the powers of the generalised golden
+ratio, see the module's docstring."""
 STEPS_2D = _steps(2)
-"""Steps of the two-dimensional sequence, in units of 2^-32."""
+"""Steps of the two-dimensional sequence (R2 of Roberts 2018), in units of 2^-32."""
 RICHTMYER_STEPS = [round((prime**0.5 % 1) * 2**32) for prime in (2, 3, 5, 7)]
 """Fractional parts of the square roots of primes (Richtmyer's sequence), in units of 2^-32. They
 are not close to simple fractions, so that a few elements are spread evenly in each single dimension
 as well; the first of `STEPS` is nearly 6/7."""
 GOLDEN_BITS = 0x9E3779B9
-"""Multiplier (2^32 over the golden ratio) that gives the members of a list bits of their own: its
-multiples are far apart."""
+"""Multiplier (2^32 over the golden ratio) that gives the members of a list different bits. Its
+multiples modulo 2^32 are far apart (Knuth's multiplicative hashing)."""
 HASH_ROUNDS = 8
 """Number of rounds of the hash that shifts a Richtmyer sequence. With the usual four, similar bits
 give similar shifts."""
 
 
 def unit_float(bits: mi.UInt32) -> mi.Float:
-    """A number in [0, 1) from random bits."""
+    """Return a number (n,) in [0, 1) from the upper 24 of 32 random bits (n,)."""
     return mi.Float(bits >> 8) * 2**-24
 
 
-def folded(value: mi.Float) -> mi.Float:
-    """The fold of [0, 1) about its middle, by which functions on it become periodic."""
+def baker_transform(value: mi.Float) -> mi.Float:
+    """Return the baker's transformation 1 - abs(2 x - 1) (n,) of numbers x (n,) in [0, 1).
+
+    It folds the interval about its middle, by which functions on it become periodic.
+    """
     return 1 - dr.abs(2 * value - 1)
 
 
 def next_random(state: mi.UInt32) -> mi.UInt32:
-    """The next state of a linear congruential generator (the step of PCG)."""
+    """Return the next state (n,) of a linear congruential generator, with the constants of PCG
+    (O'Neill 2014).
+    """
     return state * 747796405 + 2891336453
 
 
 def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple[mi.Float, ...]:
-    """Four coordinates in [0, 1) of element ``index`` of the sequence numbered by ``stream``
-    and ``seed``.
+    """Return four coordinates (n,) in [0, 1) of an element of a four-dimensional sequence.
+
+    Args:
+        index: number (n,) of the element.
+        stream: number (n,) of the sequence.
+        seed: seed of the sequences' shifts.
     """
     out = []
     for k, step in enumerate(STEPS):
@@ -64,8 +74,12 @@ def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple[m
 
 
 def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Point2f:
-    """A point of the unit square, element ``index`` of a sequence numbered by ``stream`` and
-    ``seed``.
+    """Return an element of a two-dimensional sequence, a point of the unit square.
+
+    Args:
+        index: number (n,) of the element.
+        stream: number (n,) of the sequence.
+        seed: seed of the sequences' shifts.
     """
     out = []
     for k, step in enumerate(STEPS_2D):
@@ -76,10 +90,10 @@ def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Poin
 
 @lru_cache(maxsize=4)
 def lattice_multipliers(most: int) -> NDArray[np.uint32]:
-    """Return the multiplier of the rank-1 lattice of n points, for n from 0 to ``most``.
+    """Return the multipliers (most + 1,) of the rank-1 lattices of 0 to ``most`` points.
 
-    Point i of the lattice is (i / n, i a / n), modulo 1. Of all multipliers a without a common
-    divisor with n, the one whose points are farthest apart is chosen.
+    Point i of the lattice of n points with multiplier a is (i / n, i a / n), modulo 1. Of all
+    multipliers without a common divisor with n, the one whose points are farthest apart is chosen.
     """
     out = np.ones(most + 1, dtype=np.uint32)
     for n in range(3, most + 1):
@@ -114,17 +128,17 @@ def folded_lattice(
     for k, place in enumerate((index, index * multiplier)):
         shift = unit_float(mi.sample_tea_32(stream * 4 + k, seed)[0])
         value = mi.Float(place) * share + shift
-        out.append(folded(value - dr.floor(value)))
+        out.append(baker_transform(value - dr.floor(value)))
     return mi.Point2f(*out)
 
 
-def in_series(series: mi.UInt32, number: mi.UInt32, dimension: int) -> mi.Float:
-    """One coordinate (of `RICHTMYER_STEPS`) in [0, 1) of element ``number`` of a shifted sequence.
+def richtmyer(series: mi.UInt32, number: mi.UInt32, dimension: int) -> mi.Float:
+    """Return one coordinate (n,) in [0, 1) of an element of a shifted Richtmyer sequence.
 
     Args:
-        series: random bits that shift the sequence.
-        number: number of the element.
-        dimension: index of the coordinate.
+        series: random bits (n,) that shift the sequence.
+        number: number (n,) of the element.
+        dimension: index of the coordinate in `RICHTMYER_STEPS`.
     """
     shift = mi.sample_tea_32(series, mi.UInt32(dimension), HASH_ROUNDS)[0]
     return unit_float(number * mi.UInt32(RICHTMYER_STEPS[dimension]) + shift)

@@ -29,8 +29,8 @@ _BEFORE = {
     Stage.SHADING: 0.85,
     Stage.DONE: 1.0,
 }
-"""Approximate fraction of the time of a render of five million photons that has passed when each
-stage begins."""
+"""Fraction (0 to 1) of the time of a render that has passed when each stage begins, as measured
+with five million photons."""
 
 
 def fraction_done(stage: Stage, part: float) -> float:

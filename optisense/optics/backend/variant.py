@@ -161,7 +161,7 @@ def run_test_kernel(variant: str = "auto", timeout: float = 120.0) -> KernelTest
         return KernelTest(**json.loads(child.stdout.strip().splitlines()[-1]))
     except (IndexError, ValueError, TypeError):
         last_words = child.stderr.strip().splitlines()[-1:] or ["no message"]
-        died = f"the kernel took its process down (exit {child.returncode}): {last_words[0]}"
+        died = f"the test kernel ended its process (exit code {child.returncode}): {last_words[0]}"
         return KernelTest(variant, False, 0.0, died)
 
 

@@ -25,7 +25,7 @@ class Pose(NamedTuple):
     lens: tuple[mi.Float, ...] = ()
 
     def numbers(self) -> tuple[mi.Point3f | mi.Vector3f | mi.Float, ...]:
-        """Return all variables, one after the other."""
+        """Return all variables, one after the other; each has shape (n,) or (3, n)."""
         return (*self[:-1], *self.lens)
 
 
@@ -86,10 +86,11 @@ class RayCamera:
     def rays(
         self, x: mi.Float, y: mi.Float, pose: Pose | None = None
     ) -> tuple[mi.Point3f, mi.Vector3f]:
-        """Return the origins (mm) and unit directions of the rays through film positions.
+        """Return the origins (3, n), mm, and unit directions (3, n) of the rays through film
+        positions.
 
         Args:
-            x, y: film positions in pixels from the top left corner.
+            x, y: film positions (n,) in pixels from the top left corner.
             pose: the pose to use, for derivatives with respect to it; the camera's own if None.
         """
         position, right, up, forward, fov, lens = self.pose() if pose is None else pose

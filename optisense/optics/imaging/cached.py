@@ -42,54 +42,64 @@ if TYPE_CHECKING:
     from optisense.optics.imaging.sppm import SppmResult
 
 CONTACT_SAMPLES = 12
-"""Camera samples per pixel inside contacts, where tilt and shadow vary within a pixel, in an image
-`REFERENCE_WIDTH` wide. Twelve keep the noise of the samples below 1 % in the contact of a 1.5 mm
-ball on GelSight Mini. Finer images have smaller pixels and take fewer."""
+"""Number of camera samples per pixel inside contacts, where tilt and shadow vary within a pixel, in
+an image `REFERENCE_WIDTH` wide. Twelve keep the noise of the samples below 1 % in the contact of a
+1.5 mm ball on GelSight Mini. Finer images have smaller pixels and take fewer."""
 MIN_CONTACT_SAMPLES = 16_000
-"""Lower bound on the number of camera samples in all contacts together. If contacts fill few
-pixels, tilt and shadow vary more within each pixel, and each gets more samples."""
+"""Lower bound on the number of camera samples in all contacts together: that of 1,300 pixels of
+twelve samples. If contacts fill fewer pixels, tilt and shadow vary more within each pixel, and each
+gets more samples; without it, the error in a contact of GelSight Svelte is up to 26 % larger
+(benchmarks/ablation.md)."""
 RIM_SAMPLES = 6
-"""Camera samples per pixel around contacts, in an image `REFERENCE_WIDTH` wide."""
+"""Number of camera samples per pixel around contacts, in an image `REFERENCE_WIDTH` wide: half of
+those inside, as the skin is not tilted there."""
 DRAFT_SAMPLES = 3, 1
-"""Camera samples per pixel of a draft, in contacts and around them."""
+"""Numbers of camera samples per pixel of a draft, in contacts and around them: a quarter or less of
+those of a full image, as the light of a draft is some 9 % off (see `DRAFT_CELL_SCALE`)."""
 MIN_PIXEL_SAMPLES = 2
-"""Camera samples of a contact pixel of importance 0, which is only averaged with others."""
+"""Number of camera samples of a contact pixel of importance 0, which is only averaged with others:
+a sixth of the usual number or less."""
 RIM_WIDTH = 8.0 / 320.0
-"""Width of the rim around a contact that gets `RIM_SAMPLES`, as a fraction of the image width."""
+"""Width of the rim around a contact that gets `RIM_SAMPLES`, as a fraction of the image width: 0.5
+mm on GelSight Mini, about the depth of a contact."""
 
 SPARSE_SHADING_BEAMS = 1.5e7
 """Number of beams to sum for an image above which only every second pixel is shaded where the image
 is smooth. Summing so many beams takes about 0.2 s on two cores."""
 SPARSE_METALLIC_BEAMS = 4e6
-"""Value of `SPARSE_SHADING_BEAMS` for metallic coatings, which sum all beams instead of those near
-indenters."""
+"""Value of `SPARSE_SHADING_BEAMS` for metallic coatings. They take longer for each beam, as they
+evaluate a metallic lobe, and sum all beams, while diffuse ones sum those near indenters."""
 GRAIN_SAMPLES = 4
-"""Largest number of further camera samples per pixel in grainy places outside contacts; they are
-limited to half of the image's samples. A sample reads one cell of the cache, so that neighbouring
-cells that differ much show as grain."""
+"""Largest number of further camera samples per pixel in grainy places outside contacts, which
+halves the grain; they are limited to half of the image's samples. A sample reads one cell of the
+cache, so that neighbouring cells that differ much show as grain. Without them, the error outside
+the contact of GelSight Svelte is 26 % larger (benchmarks/ablation.md)."""
 GRAIN_THRESHOLD = 0.03
 """Threshold of the relative RMS deviation of pixels from the mean of their neighbours above which a
 place is grainy: three times a camera's own noise, which is about 0.01."""
 NEIGHBOUR_MEAN = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]], dtype=np.float32) / 4
 """Convolution kernel that gives the mean of the four neighbours of a pixel."""
 DARK_FRACTION = 0.02
-"""Fraction of the mean brightness below which grain is ignored, as it is not visible."""
+"""Fraction of the mean brightness below which grain is ignored, as it is hardly visible in places
+so dark."""
 GRAIN_WINDOW = 9
-"""Side (pixels) of the square over which grain is measured and resampled."""
+"""Side (pixels) of the square over which grain is measured and resampled. The deviations of its 81
+pixels give the root mean square to a tenth."""
 
 MIRRORED_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which metallic coatings are
 shaded with the light that the contact reflects through the interfaces: 2 mm on GelSight Mini."""
 LEAST_LEFT = 0.5
 """Lower bound on the share of a pixel's light that remains after the light of the skin hidden by
-contacts is subtracted; a larger loss is the noise of a few bright rays."""
+contacts is subtracted. Mirror images of hidden skin are a small part of a pixel's light; a loss of
+more than half is the noise of a few bright rays."""
 
 BESIDE_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which the skin is shaded with
 light that the contact reflects to it: 2 mm on GelSight Mini. This is half a per cent of a diffuse
 coating's light there; with narrow lobes, single rays would be bright blotches."""
 
-BETWEEN_REACH = 1.0 / 107.0
+INTERREFLECTION_WIDTH = 1.0 / 107.0
 """Width over which interreflected light is averaged in contacts of coatings with broad metallic
 lobes, as a fraction of the image width: 3 pixels of 320. In a contact of GelSight Mini of
 specularity 0.6, where interreflection is a tenth of the light, this reduces the noise of the
@@ -102,8 +112,21 @@ PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]
 
 @dataclass
 class ImageLayers:
-    """The layers (groups, h, w, 3) of an image for lights of 1 mW in each channel, and its ground
-    truth.
+    """The layers of an image for lights of 1 mW in each channel, and its ground truth.
+
+    Attributes:
+        radiance: (groups, h, w, 3) radiance by light group, mW/(mm^2 sr).
+        normals: (h, w, 3) unit normals; NaN where the camera sees no coating.
+        points: (h, w, 3) points of the coating, mm; NaN where the camera sees none.
+        contact_mask: (h, w) mask of the pixels that see an indenter.
+        photons: number of emitted photons.
+        noise: relative RMS noise of the light; infinite if it is not known.
+        worst_noise: relative RMS noise that the noisiest 5 % of the area have at least; None if it
+            is not known.
+        samples: numbers of camera samples per pixel far from, around and in contacts.
+        interrupted: whether Ctrl-C ended the photon tracing early.
+        light_seconds: time (s) of the photon tracing.
+        image_seconds: time (s) of the shading.
     """
 
     radiance: NDArray[np.float32]
@@ -164,7 +187,7 @@ def masked(values: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.
 
 
 @dataclass(frozen=True)
-class Effort:
+class SamplingPlan:
     """The pixels that are shaded, and their camera samples.
 
     Attributes:
@@ -179,7 +202,7 @@ class Effort:
     draft: bool = False
 
 
-EVERYWHERE = Effort()
+FULL_SAMPLING = SamplingPlan()
 """Full number of samples in all pixels."""
 
 
@@ -190,7 +213,7 @@ def render_cached(
     rays: ChiefRays,
     emitters: list[Emitter],
     seed: int,
-    effort: Effort = EVERYWHERE,
+    plan: SamplingPlan = FULL_SAMPLING,
     known: KnownView | None = None,
 ) -> ImageLayers:
     """Shade an image from a radiance cache: one sample per pixel, more in and around contacts.
@@ -202,22 +225,22 @@ def render_cached(
         rays: chief rays through the same scene and camera.
         emitters: the lights, whose windows may be in view.
         seed: seed of the camera samples.
-        effort: the pixels that are shaded, and their samples.
+        plan: the pixels that are shaded, and their samples.
         known: parts of an earlier draft that are reused, to which those that are missing are added.
     """
     began = time.perf_counter()
-    field, interrupted = light
-    draft, only_contacts = effort.draft, effort.only_contacts
+    cache, interrupted = light
+    draft, only_contacts = plan.draft, plan.only_contacts
     width, height = camera.width, camera.height
     # Interfaces reflect little light towards the camera, so their reflections are sampled once in a
     # pixel or in its neighbours. Lamps are so bright that the rare path (one in a thousand) that
     # meets one would be a speck.
-    film, between, mirrored, glints = (Film(width * height, field.binned.groups) for _ in range(4))
+    film, between, mirrored, glints = (Film(width * height, cache.binned.groups) for _ in range(4))
 
-    culled_beams = field.beams
+    culled_beams = cache.beams
     if scenes.indenters is not None:
         culled_beams = cull_beams(
-            field.beams, field.binned.cells, field.binned.groups, scenes.balls
+            cache.beams, cache.binned.cells, cache.binned.groups, scenes.balls
         )
 
     def sample(
@@ -250,15 +273,15 @@ def render_cached(
             if faint_known:
                 reflected = None
             if thorough:
-                direct, exchanged = shade_in_contacts(field, scenes, main, not faint_known)
+                direct, exchanged = shade_in_contacts(cache, scenes, main, not faint_known)
                 film.add(main, direct)
                 if exchanged is not None:
                     between.add(main, exchanged)
             else:
-                film.add(main, shade(field, scenes, culled_beams, main, False))
+                film.add(main, shade(cache, scenes, culled_beams, main, False))
             film.add_light(main, emitters)
             if reflected is not None:
-                mirrored.add(reflected, shade(field, scenes, culled_beams, reflected, True))
+                mirrored.add(reflected, shade(cache, scenes, culled_beams, reflected, True))
                 glints.add_light(reflected, emitters)
 
     sparse = False
@@ -278,7 +301,7 @@ def render_cached(
         if draft:
             inner, outer = DRAFT_SAMPLES
         if only_contacts:
-            part = np.ones_like(mask) if effort.importance is None else effort.importance(rays)
+            part = np.ones_like(mask) if plan.importance is None else plan.importance(rays)
             counts = np.maximum(
                 np.round(inner * np.clip(part, 0, 1)), min(inner, MIN_PIXEL_SAMPLES)
             )
@@ -294,22 +317,22 @@ def render_cached(
         dr.eval(pixel, number, count)
         sample(pixel, number, True, count=count)
         samples = [1, outer, inner]
-        if not (draft or only_contacts or field.binned.narrow_lobes):
+        if not (draft or only_contacts or cache.binned.narrow_lobes):
             skin = region_image == Region.SENSING
             ring = skin & ~near & (distance <= BESIDE_RANGE * width)
-            beside = beside_layers(field, scenes, camera, ring, seed)
-        if field.roughness is not None and field.roughness < MIRRORED_ROUGHNESS and not draft:
+            beside = beside_layers(cache, scenes, camera, ring, seed)
+        if cache.roughness is not None and cache.roughness < MIRRORED_ROUGHNESS and not draft:
             lit = mask if only_contacts else rays.hit & (distance <= MIRRORED_RANGE * width)
             mirrored_contacts = mirrored_contact_layers(
-                field, scenes, camera, lit, lit & ~mask, seed
+                cache, scenes, camera, lit, lit & ~mask, seed
             )
     far = ~near
     layers = reflections = None
     if far.any() and not only_contacts:
         # The number of beams to sum. If it is large, only every second pixel is shaded where its
         # neighbours are similar.
-        beams = dr.width(field.beams.ways) / 4 / field.binned.cells.cells
-        most = SPARSE_METALLIC_BEAMS if field.metallic else SPARSE_SHADING_BEAMS
+        beams = dr.width(cache.beams.ways) / 4 / cache.binned.cells.cells
+        most = SPARSE_METALLIC_BEAMS if cache.metallic else SPARSE_SHADING_BEAMS
         sparse = int(far.sum()) * beams > most
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
         first = far & ~filled
@@ -354,9 +377,9 @@ def render_cached(
     main_light = None if known is None else layers - reflections
     if near.any() and not faint_known:
         reach = 1
-        if field.metallic and not field.binned.narrow_lobes:
-            reach = round(BETWEEN_REACH * width) | 1
-        layers = layers + between.spread_layers(width, height, [(mask, reach)])
+        if cache.metallic and not cache.binned.narrow_lobes:
+            reach = round(INTERREFLECTION_WIDTH * width) | 1
+        layers = layers + between.averaged_layers(width, height, [(mask, reach)])
     if known is not None and main_light is not None:
         if known.faint is None:
             known.keep_faint(main_light, layers - main_light)
@@ -372,9 +395,9 @@ def render_cached(
         normals=masked(rays.normals, rays.hit),
         points=masked(rays.points, rays.hit),
         contact_mask=mask,
-        photons=field.photons,
-        noise=field.noise,
-        worst_noise=field.worst_noise,
+        photons=cache.photons,
+        noise=cache.noise,
+        worst_noise=cache.worst_noise,
         samples=samples,
         interrupted=interrupted,
         light_seconds=0.0,

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     """Points and their radiance, one colour for each light group."""
 
 MIRRORED_RAYS = 8
-"""Rays per pixel that sample the light that contacts reflect through the interfaces, in an image
-`REFERENCE_WIDTH` wide; smaller images take more. Few of the rays end where a contact mirrors a
-lamp."""
+"""Number of rays per pixel that sample the light that contacts reflect through the interfaces, in
+an image `REFERENCE_WIDTH` wide; smaller images take more. Few of the rays end where a contact
+mirrors a lamp; eight give the noise that `NARROW_MIRRORED_WIDTH` states."""
 MIRRORED_ROUGHNESS = 0.35
 """GGX alpha of metallic lobes from which on light that contacts reflect through the interfaces is
 left out. At 0.4 it is at most 0.2 % of the light around contacts of GelSight Mini, Svelte and
@@ -38,60 +38,80 @@ GelBelt, and a tenth of the time of an image."""
 BROAD_MIRRORED_RAYS = 1
 """Value of `MIRRORED_RAYS` for lobes that are not narrower than most lamps; one suffices, as they
 receive little such light, and evenly from all directions."""
-MIRRORED_REACH = 1.0 / 40.0
+MIRRORED_WIDTH = 1.0 / 40.0
 """Width over which light from contacts is averaged on the skin, as a fraction of the image width:
 half a millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
-NARROW_MIRRORED_REACH = 1.0 / 107.0
-"""Value of `MIRRORED_REACH` in contacts, whose tilt varies, for narrow lobes: 3 pixels of 320. In a
+NARROW_MIRRORED_WIDTH = 1.0 / 107.0
+"""Value of `MIRRORED_WIDTH` in contacts, whose tilt varies, for narrow lobes: 3 pixels of 320. In a
 contact of GelSight Mini of specularity 1 this reduces the noise from 10 to 3 % of the mean and adds
 a blur of 2 %."""
 BESIDE_DIRECTIONS = 2
-"""Rays per pixel that sample the light that contacts reflect to the skin beside them, in an image
-`REFERENCE_WIDTH` wide; smaller images take more. The light is averaged over `MIRRORED_REACH`, which
-leaves noise of some tenths of a per cent."""
+"""Number of rays per pixel that sample the light that contacts reflect to the skin beside them, in
+an image `REFERENCE_WIDTH` wide; smaller images take more. They are averaged over `MIRRORED_WIDTH`,
+which leaves noise of some tenths of a per cent."""
 
 
 def mirrored_contact_layers(
-    field: RadianceCache,
+    cache: RadianceCache,
     scenes: ContactScenes,
     camera: RayCamera,
     where: NDArray[np.bool_],
     skin: NDArray[np.bool_],
     seed: int,
 ) -> NDArray[np.float32] | None:
-    """Return the radiance (groups, h, w, 3) due to light that contacts reflect through the
-    interfaces to the pixels ``where``, averaged over ``skin`` and over the contacts; None if there
-    is none.
+    """Return the radiance due to light that contacts reflect through the interfaces to pixels.
+
+    Args:
+        cache: the radiance cache.
+        scenes: scenes of the sensor with its contacts.
+        camera: camera of the image.
+        where: (h, w) mask of the pixels.
+        skin: (h, w) mask of those outside contacts; the light is averaged over them, and over the
+            others.
+        seed: seed of the rays.
+
+    Returns:
+        The radiance (groups, h, w, 3), mW/(mm^2 sr); None if there is none.
     """
-    least = MIRRORED_RAYS if field.binned.narrow_lobes else BROAD_MIRRORED_RAYS
+    least = MIRRORED_RAYS if cache.binned.narrow_lobes else BROAD_MIRRORED_RAYS
     rays = max(least, round(least * (REFERENCE_WIDTH / camera.width) ** 2))
 
     def light(points: VisiblePoints) -> PointLight | None:
-        return mirrored_contacts(field, scenes, points, rays)
+        return mirrored_contacts(cache, scenes, points, rays)
 
-    inside = NARROW_MIRRORED_REACH if field.binned.narrow_lobes else MIRRORED_REACH
-    over = [(skin, MIRRORED_REACH), (where & ~skin, inside)]
-    return _averaged_layers(field.binned.groups, scenes, camera, where, over, (seed, 9), light)
+    inside = NARROW_MIRRORED_WIDTH if cache.binned.narrow_lobes else MIRRORED_WIDTH
+    over = [(skin, MIRRORED_WIDTH), (where & ~skin, inside)]
+    return _averaged_layers(cache.binned.groups, scenes, camera, where, over, (seed, 9), light)
 
 
 def beside_layers(
-    field: RadianceCache,
+    cache: RadianceCache,
     scenes: ContactScenes,
     camera: RayCamera,
     where: NDArray[np.bool_],
     seed: int,
 ) -> NDArray[np.float32] | None:
-    """Return the radiance (groups, h, w, 3) due to light that contacts reflect to the skin
-    ``where`` beside them, averaged over it; None if there is none.
+    """Return the radiance due to light that contacts reflect to the skin beside them, averaged over
+    that skin.
+
+    Args:
+        cache: the radiance cache.
+        scenes: scenes of the sensor with its contacts.
+        camera: camera of the image.
+        where: (h, w) mask of the pixels that see this skin.
+        seed: seed of the rays.
+
+    Returns:
+        The radiance (groups, h, w, 3), mW/(mm^2 sr); None if there is none.
     """
     more = (REFERENCE_WIDTH / camera.width) ** 2
     directions = max(BESIDE_DIRECTIONS, round(BESIDE_DIRECTIONS * more))
 
     def light(points: VisiblePoints) -> PointLight:
-        return points, beside_contacts(field, scenes, points, directions)
+        return points, beside_contacts(cache, scenes, points, directions)
 
-    over = [(where, MIRRORED_REACH)]
-    return _averaged_layers(field.binned.groups, scenes, camera, where, over, (seed, 10), light)
+    over = [(where, MIRRORED_WIDTH)]
+    return _averaged_layers(cache.binned.groups, scenes, camera, where, over, (seed, 10), light)
 
 
 def _averaged_layers(
@@ -132,4 +152,4 @@ def _averaged_layers(
         if found is not None:
             film.add(*found)
     regions = [(region, round(reach * width) | 1) for region, reach in over]
-    return film.spread_layers(width, height, regions)
+    return film.averaged_layers(width, height, regions)

@@ -20,14 +20,21 @@ from optisense.optics.transport.camera_paths import VisiblePoints
 from optisense.optics.transport.photon_map import GROUP_MASK, PhotonMap
 
 MIN_COSINE = 0.03
-"""Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
-grazing photon does not become a bright spot."""
+"""Lower bound on the cosine of incidence (88 degrees) that a photon's power is divided by, so that
+an isolated grazing photon does not become a bright spot. It darkens light below 2 degrees, which is
+a small part of all light."""
 
 
 @dataclass
 class PhotonGrid:
-    """Photons in the order of the cells of a uniform grid; ``starts`` has one entry per cell and
-    one more.
+    """Photons in the order of the cells of a uniform grid.
+
+    Attributes:
+        lower: lower corner of the grid, mm.
+        inverse_size: inverse of the side of a cell, 1/mm.
+        counts: numbers of cells along x, y and z.
+        starts: (cells + 1,) index of the first photon of each cell, and the number of photons.
+        place, travel, power, coloured: as in `PhotonMap`.
     """
 
     lower: mi.Point3f
@@ -52,7 +59,13 @@ def _cell(
 def build_grid(
     photons: PhotonMap, lower: NDArray[np.floating], upper: NDArray[np.floating], radius: float
 ) -> PhotonGrid:
-    """Sort photons into cells of side ``radius`` (mm) by counting sort."""
+    """Sort photons into the cells of a grid by counting sort.
+
+    Args:
+        photons: the photons.
+        lower, upper: corners (3,) of the box that the grid fills, mm.
+        radius: side (mm) of the cells; larger where there would be more than 30 million cells.
+    """
     size = [max(float(upper[i] - lower[i]), radius) for i in range(3)]
     cell_size = max(radius, max(size) / 1000)
     while True:
@@ -97,8 +110,15 @@ def estimate_radiance(
     radius: mi.Float,
     groups: int,
 ) -> list[mi.Color3f]:
-    """Return the radiance of each visible point towards the camera for each light group, with
+    """Return the radiance (3, n) of visible points towards the camera for each light group, with
     lights of 1 mW.
+
+    Args:
+        grid: the photons.
+        surfaces: the table of surfaces (`surface_table`).
+        points: the n visible points.
+        radius: radius (mm) of the disc over which photons are counted.
+        groups: number of light groups.
     """
     coating = coating_of(surfaces, points.surface, points.valid)
     centre = _cell(points.point, grid.lower, grid.inverse_size, grid.counts)

@@ -13,7 +13,8 @@ from optisense.optics.scene.emitters import Emitter
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 REFERENCE_WIDTH = 320
-"""Image width (pixels) for which the numbers of samples per pixel are stated."""
+"""Image width (pixels) for which the numbers of samples per pixel are stated: the usual width of a
+tactile picture."""
 
 LONE_WINDOW, LONE_RANK = 5, 4
 """Side (pixels) of the square around a bright pixel, and the number of its pixels, itself included,
@@ -21,16 +22,17 @@ that must be bright for the pixel to count as real: the visible reflection of a 
 
 LONE_RATIO = 2.0
 """Ratio of a pixel's light to that of the `LONE_RANK`-th brightest pixel in its square above which
-the excess light is spread over the pixels around it."""
+the excess light is spread over the pixels around it. A factor of two is more than the noise between
+neighbouring pixels of a real reflection."""
 
-SPECK_REACH = 1.0 / 8.0
+SPECK_WIDTH = 1.0 / 8.0
 """Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the
 light around it then adds 3 % to its middle."""
 
 
 def repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]:
-    """Return the index of each pixel of a non-empty mask ``times`` times, and the sample's number,
-    from 1.
+    """Return the index of each pixel of a non-empty mask (h, w) ``times`` times, and the number of
+    each sample in its pixel, from 1; (n,) each.
     """
     # The arrays are made on the device, as NumPy arrays differ in alignment, which is part of
     # kernels.
@@ -48,11 +50,11 @@ class Film:
         self.counts = dr.zeros(mi.Float, pixels)
 
     def count(self, pixel: mi.UInt32) -> None:
-        """Count one sample of each of these pixels."""
+        """Count one sample of each of these pixels (n,)."""
         dr.scatter_add(self.counts, mi.Float(1), pixel)
 
     def add(self, points: VisiblePoints, radiance: list[mi.Color3f]) -> None:
-        """Add the radiance of visible points towards the camera, one colour per group."""
+        """Add the radiance (3, n) of visible points towards the camera, one array per group."""
         for total, value in zip(self.sums, radiance, strict=True):
             weighted = points.weight * value
             for k in range(3):
@@ -102,11 +104,11 @@ class Film:
         layers = self.layers(width, height)
         sampled = (np.asarray(self.counts) > 0).reshape(height, width)
         regions = [where for where in (sampled & near, sampled & ~near) if where.any()]
-        reach = round(SPECK_REACH * width) | 1  # odd: a symmetric square loses no light
+        side = round(SPECK_WIDTH * width) | 1  # an odd side: a symmetric square loses no light
 
         def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
             for _ in range(2):
-                image = ndimage.uniform_filter(image, reach, mode="constant")
+                image = ndimage.uniform_filter(image, side, mode="constant")
             return image
 
         for layer in layers:
@@ -125,7 +127,7 @@ class Film:
                     layer[..., k] += np.maximum(spread, 0.0)  # rounding gives -1e-17
         return layers
 
-    def spread_layers(
+    def averaged_layers(
         self, width: int, height: int, regions: list[tuple[NDArray[np.bool_], int]]
     ) -> NDArray[np.float32]:
         """Return the layers with the pixels of each region averaged over the samples of other
@@ -151,7 +153,7 @@ def _average(
     where: NDArray[np.bool_],
     reach: int,
 ) -> None:
-    """Average the pixels ``where`` of layers (groups, h, w, 3) as in `Film.spread_layers`.
+    """Average the pixels ``where`` of layers (groups, h, w, 3) as in `Film.averaged_layers`.
 
     ``samples`` is the number of samples of each pixel.
     """

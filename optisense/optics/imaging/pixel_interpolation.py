@@ -20,21 +20,26 @@ BoolArray = NDArray[np.bool_]
 
 MAX_OFFSET = 0.2
 """Largest distance of a pixel's surface point from the centre of its neighbours' points, relative
-to the distance of those points from the centre. A larger distance indicates an edge."""
+to the distance of those points from the centre. On a smooth skin it is nearly 0; a distance of a
+fifth or more indicates an edge."""
 MIN_COSINE = 0.995
-"""Smallest cosine between a pixel's normal and ray and those of the pixels beside it."""
+"""Smallest cosine (6 degrees) between a pixel's normal and ray and those of the pixels beside it:
+neighbours on a smooth skin differ by less."""
 AGREEMENT = 0.1
 """Largest difference in the total light of the neighbours of a pixel at which it is interpolated,
-relative to their mean or to `DIM` times the image's mean."""
+relative to their mean or to `DIM` times the image's mean. The interpolated value is then off by a
+few per cent at most; measured errors do not change (benchmarks/ablation.md)."""
 GROUP_AGREEMENT = 0.3
-"""Largest difference, as in `AGREEMENT`, in the light of a single group, which is noisier."""
+"""Largest difference, as in `AGREEMENT`, in the light of a single group, which is noisier, as only
+a part of the photons is its own."""
 DIM = 0.3
-"""Fraction of the image's mean below which differences are measured against that mean."""
+"""Fraction of the image's mean below which differences are measured against that mean, as those of
+dark pixels are hardly visible."""
 
 
 def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
-    """Return the mask (h, w) of the pixels of ``where`` that see the undeformed surface between the
-    places of their even neighbours, which must be in ``where`` as well.
+    """Return the mask (h, w) of the pixels of a mask ``where`` (h, w) that see the undeformed
+    surface between the places of their even neighbours, which must be in ``where`` as well.
     """
     plain = where & rays.hit & (rays.region == Region.SENSING)
     out = np.zeros_like(plain)
@@ -53,8 +58,8 @@ def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
 
 
 def agreed(layers: FloatArray, where: BoolArray) -> BoolArray:
-    """Return the mask (h, w) of the pixels of ``where`` whose even neighbours agree in their light
-    (groups, h, w, 3).
+    """Return the mask (h, w) of the pixels of a mask ``where`` (h, w) whose even neighbours agree
+    in their light ``layers`` (groups, h, w, 3).
     """
     groups = layers.sum(axis=-1)
     out = where.copy()
@@ -82,8 +87,8 @@ Place = tuple[slice, slice]
 
 
 def _places(image: NDArray[np.generic]) -> Iterator[tuple[Place, list[Place]]]:
-    """Slices of the pixels of an image (h, w) with odd column, odd row, or both, and of the even
-    pixels beside each.
+    """Yield slices of the pixels of an image (h, w) with odd column, odd row, or both, and of the
+    even pixels beside each.
     """
     height, width = ((size + 1) // 2 for size in image.shape)
     for down, right in ((0, 1), (1, 0), (1, 1)):

@@ -25,7 +25,7 @@ from optisense.optics.transport.photons import Emission, trace_photons
 
 FIRST_RADIUS = 0.3
 """Gather radius (mm) of the first pass. As the radius shrinks with each pass, it affects how fast
-noise falls and not the limit of the image."""
+noise falls and not the limit of the image. 0.3 mm is five pixels of GelSight Mini at 320 pixels."""
 
 
 @dataclass
@@ -34,7 +34,7 @@ class SppmResult:
 
     Attributes:
         layers: (groups, h, w, 3) radiance for lights of 1 mW.
-        halves: the layers of the even and of the odd passes.
+        halves: (2, groups, h, w, 3) the layers of the even and of the odd passes.
         passes: number of passes.
         photons: number of emitted photons.
     """
@@ -78,8 +78,8 @@ def render_sppm(
     for number in range(passes):
         sent = replace(emission, first=number * emission.per_light)
         photons = trace_photons(scene, sent, coloured=coloured)
-        reach = radius * (number + 1) ** (-1 / 6)
-        grid = build_grid(photons, *scene.bounds, reach)
+        gather_radius = radius * (number + 1) ** (-1 / 6)
+        grid = build_grid(photons, *scene.bounds, gather_radius)
         image = Film(width * height, table.groups)
         for each in range(samples):
             sample = dr.opaque(mi.UInt32, number * samples + each + 1)
@@ -91,7 +91,7 @@ def render_sppm(
             ]
             for points in (end for pair in ways for end in pair if end is not None):
                 light = estimate_radiance(
-                    grid, scene.table, points, dr.opaque(mi.Float, reach), table.groups
+                    grid, scene.table, points, dr.opaque(mi.Float, gather_radius), table.groups
                 )
                 image.add(points, light)
                 image.add_light(points, table.emitters)

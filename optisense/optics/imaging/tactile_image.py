@@ -127,7 +127,8 @@ class TactileImage:
         return self.chain.auto_exposure(self.radiance)
 
     def skin_maps(self) -> SkinMaps | None:
-        """Pressure (MPa), penetration (mm) and displacement (mm) of the skin behind each pixel.
+        """Return the pressure (h, w), MPa, penetration (h, w), mm, and displacement (h, w, 3), mm,
+        of the skin behind each pixel.
 
         They are NaN where the camera sees no skin. The result is None without contacts and for a
         conforming skin, whose forces are not known.
@@ -135,7 +136,7 @@ class TactileImage:
         return None if self.pressed is None else self.pressed.maps(self.points, self.normals)
 
     def _repr_png_(self) -> bytes:
-        """The exposed picture as a PNG file, for notebooks."""
+        """Return the content of the exposed picture's PNG file, which notebooks show."""
         return _encoded(self.picture(), ".png")
 
     def save_radiance(self, path: Path) -> None:

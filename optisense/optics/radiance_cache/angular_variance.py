@@ -11,11 +11,12 @@ from optisense.optics.backend.sequences import unit_float
 from optisense.optics.scene.bsdf import CoatingBsdf
 
 MAX_SPREAD = 0.1
-"""Upper bound on 1 - mean cosine of a beam; the flat disc that stands for its directions is a good
-approximation only up to it."""
+"""Upper bound on 1 - mean cosine of a beam. It is that of a disc of directions of a radius of 36
+degrees; the small angles that are assumed for beams hold only up to it."""
 MIN_SQUARED_SINE = 0.1
-"""Squared sine of the angle between a beam and the axis of the bins below which the second moment
-along that axis does not determine the beam's variance."""
+"""Squared sine of the angle between a beam and the axis of the bins (18 degrees) below which the
+second moment along that axis does not determine the beam's variance: the component along the axis
+then varies with the cosine, which is flat there."""
 
 
 @dataclass
@@ -39,10 +40,12 @@ class AngularVariance:
 
 
 def mean_direction(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
-    """Return the mean direction of a cache entry, and the mean cosine between its light and that
-    direction.
+    """Return the mean direction (3, n), a unit vector, of a cache entry, and the mean cosine (n,)
+    between its light and that direction.
 
-    An entry and its negative give the same result.
+    Args:
+        value: the entry's moments, four floats (see `Tables.moments`). An entry and its negative
+            give the same result.
     """
     mean = mi.Vector3f(value.x, value.y, value.z)
     length = dr.norm(mean)
@@ -52,7 +55,7 @@ def mean_direction(value: mi.Vector4f) -> tuple[mi.Vector3f, mi.Float]:
 def angular_variance(
     axis: mi.Vector3f, towards: mi.Vector3f, cosine: mi.Float, height: mi.Float
 ) -> AngularVariance:
-    """Return the beam of a mean cosine and a second moment.
+    """Return the beam of a mean cosine (n,) and a second moment (n,).
 
     For small angles, the sum of both variances is twice the difference of the mean cosine from 1.
 
@@ -78,7 +81,8 @@ def two_discs(light: AngularVariance) -> tuple[mi.Vector3f, mi.Vector3f, mi.Floa
     """Return two discs side by side that together have the variances of an elongated beam.
 
     Returns:
-        The mean directions of the two discs, and the mean cosine within each disc.
+        The mean directions of the two discs, unit vectors (3, n), and the mean cosine (n,) within
+        each disc.
     """
     wide = dr.maximum(light.variance_along, light.variance_up)
     slim = dr.maximum(dr.minimum(light.variance_along, light.variance_up), 0)
@@ -88,12 +92,16 @@ def two_discs(light: AngularVariance) -> tuple[mi.Vector3f, mi.Vector3f, mi.Floa
 
 
 def squared_radius(cosine: mi.Float) -> mi.Float:
-    """Return the squared angular radius R^2 of the uniform disc of a mean cosine 1 - R^2 / 4."""
+    """Return the squared angular radius R^2 (n,), radians squared, of the uniform disc of a mean
+    cosine 1 - R^2 / 4 (n,).
+    """
     return 4 * dr.minimum(1 - cosine, MAX_SPREAD)
 
 
 def sample_direction(light: AngularVariance, state: mi.UInt32) -> mi.Vector3f:
-    """Draw a direction of a beam uniformly from the ellipse of its variances."""
+    """Return a unit direction (3, n) drawn uniformly from the ellipse of a beam's variances; the
+    random bits ``state`` (n,) choose it.
+    """
     radius = 2 * dr.sqrt(unit_float((state ^ 0x9E3779B9) * 69069))
     sin_a, cos_a = dr.sincos(unit_float(state * 277803737) * dr.two_pi)
     aside = light.along * (cos_a * dr.sqrt(light.variance_along))
@@ -104,10 +112,16 @@ def sample_direction(light: AngularVariance, state: mi.UInt32) -> mi.Vector3f:
 def cosine_half_width(
     light: AngularVariance, normal: mi.Vector3f, upright: mi.Vector3f
 ) -> mi.Float:
-    """Return the half-width of the distribution of the cosine between a beam and a normal.
+    """Return the half-width (n,) of the distribution of the cosine between a beam and a normal.
 
-    The distribution is taken to be uniform, with the beam's variance. All light comes from above
-    the undeformed surface (normal ``upright``), which limits the width.
+    The distribution is taken to be uniform, with the beam's variance, so that its half-width is
+    sqrt(3) standard deviations. All light comes from above the undeformed surface, which limits the
+    width.
+
+    Args:
+        light: the beam.
+        normal: unit normals.
+        upright: unit normals of the undeformed surface.
     """
     variance = light.variance_along * dr.square(dr.dot(light.along, normal))
     variance += light.variance_up * dr.square(dr.dot(light.up, normal))
@@ -115,12 +129,14 @@ def cosine_half_width(
 
 
 def mirrored_above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
-    """Mirror directions that point below the plane of a normal to above it."""
+    """Return directions (3, n), of which those that point below the plane of a normal are mirrored
+    to above it.
+    """
     return direction - normal * (2 * dr.minimum(dr.dot(direction, normal), 0))
 
 
 def passes_near(ball: mi.Vector4f, start: mi.Point3f, light: AngularVariance) -> mi.Bool:
-    """Return whether a beam from ``start`` may touch a ball.
+    """Return whether a beam from ``start`` may touch a ball, (n,).
 
     Args:
         ball: centre and radius, mm.
@@ -149,7 +165,8 @@ def occluder_horizon(
     upright: mi.Vector3f,
     own: mi.Bool,
 ) -> mi.Float:
-    """Return the occluder horizon: the sine of the elevation below which a ball occludes the light.
+    """Return the occluder horizon (n,): the sine of the elevation below which a ball may occlude
+    the light.
 
     Args:
         balls: centre and radius of each ball, four floats, mm.
@@ -182,7 +199,8 @@ def occluder_horizon(
 
 
 def broadened_coating(coating: CoatingBsdf, cosine: mi.Float) -> CoatingBsdf:
-    """Return the coating that reflects light from one direction as ``coating`` reflects a beam.
+    """Return the coating that reflects light from one direction as ``coating`` reflects a beam of a
+    mean cosine (n,).
 
     The diffuse lobe is linear in direction, so that scaling it with the mean cosine is exact. The
     metallic lobe is averaged over a disc of light.

@@ -12,14 +12,14 @@ from optisense.optics.radiance_cache.angular_variance import (
     sample_direction,
 )
 from optisense.optics.radiance_cache.beams import Beams
-from optisense.optics.radiance_cache.irradiance import vector
+from optisense.optics.radiance_cache.irradiance import vector_sum
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.transport.photon_map import GROUP_MASK
 
 MIN_STEP = 1e-20
-"""Lower bound on the step of the systematic sampling; it avoids a division by zero without
-light."""
+"""Lower bound on the step of the systematic sampling (mW/mm^2/sr): far below any light, it only
+avoids a division by zero where there is none."""
 
 
 @dr.syntax
@@ -28,8 +28,8 @@ def sum_beams(
     groups: int,
     at: ShadingPoints,
 ) -> list[mi.Color3f]:
-    """Return the radiance towards the camera due to all beams, for points on the undeformed
-    surface.
+    """Return the radiance (3, n) towards the camera due to all beams, for points on the undeformed
+    surface, for each light group.
     """
     totals = [mi.Color3f(0) for _ in range(groups)]
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
@@ -51,14 +51,15 @@ def sum_diffuse(
     groups: int,
     at: ShadingPoints,
 ) -> list[mi.Color3f]:
-    """Return the radiance towards the camera for points with diffuse, grey coatings.
+    """Return the radiance (3, n) towards the camera for points with diffuse, grey coatings, for
+    each light group.
 
     The result is that of `sum_beams`; the vector sum of the light in the `irradiance_table`
     replaces the loop over beams.
     """
     reflectance = dr.select(at.active, albedo_of(at.coating) * dr.inv_pi, 0)
     return [
-        reflectance * dr.maximum(dr.dot(vector(table, at.cell * groups + g), at.seen.normal), 0)
+        reflectance * dr.maximum(dr.dot(vector_sum(table, at.cell * groups + g), at.seen.normal), 0)
         for g in range(groups)
     ]
 
@@ -72,7 +73,7 @@ def sum_hidden(
     axis: mi.Vector3f,
     shadow_rays: mi.Float,
 ) -> list[mi.Color3f]:
-    """Return the part of ``totals`` that indenters occlude.
+    """Return the part of ``totals`` (3, n), for each light group, that indenters occlude.
 
     Shadow rays are drawn in proportion to the light, evenly spaced in its running sum (systematic
     sampling). They are spaced so that all the light of a group would take ``shadow_rays`` of them;
@@ -125,8 +126,8 @@ def sum_hidden(
 
 
 def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:
-    """Return the direction towards the light, mean cosine and flux density (mW/mm^2) of beams, and
-    the bits of their light group and number.
+    """Return the unit direction towards the light (3, n), mean cosine (n,) and flux density (3, n),
+    mW/mm^2, of beams, and their tags (n,), as in `Beams`.
     """
     way = dr.gather(mi.Vector4f, beams.ways, number)
     flux = dr.gather(mi.Vector4f, beams.fluxes, number)

@@ -21,18 +21,23 @@ from optisense.optics.radiance_cache.direction_bins import FINE_BINS, Tables
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
 
 STRONG_SHARE = 0.03
-"""Share of a group's light in a cell above which four neighbouring bins stay separate beams."""
+"""Share of a group's light in a cell above which four neighbouring bins stay separate beams.
+Merging all weaker ones changes no error, and without it images from a finished cache take a quarter
+longer (benchmarks/ablation.md)."""
 SPARSE_SHARE = 0.003
 """Share of a group's light in a cell below which a beam may come from a single photon, which gives
-no estimate of its spread. Where bins are fine, such beams are at least as wide as 16 bins;
+no estimate of its variance. Where bins are fine, such beams are at least as wide as 16 bins;
 otherwise a photon near the mirror direction of a narrow lobe would be a bright blotch."""
 NUMBER_SHIFT = 8
 """Number of low bits of a beam's tag that hold its light group, of which there are at most 256; the
 bits above hold the beam's number."""
 NO_SLOT = 0xFFFFFFFF
-"""Marker of a direction bin that the cache does not hold."""
+"""Marker of a direction bin that the cache does not hold: a number of all one bits, which no index
+reaches."""
 READ_DISTANCE = 1.5
-"""Largest distance, in cell sides, between a cell's centre and a point that reads its beams."""
+"""Largest distance, in cell sides, between a cell's centre and a point that reads its beams. A
+point reads a cell up to half a side away along each axis from its own, so that the centre is up to
+sqrt(3) / 2 + 1 / 2 = 1.4 sides away."""
 
 
 @dataclass
@@ -88,7 +93,7 @@ def collect_beams(
 
     Args:
         tables, coloured: as in `BinnedLight`.
-        used: ascending numbers of the direction bins that the cache holds.
+        used: (k,) ascending numbers of the direction bins that the cache holds.
         across: number of bands, and of sectors in each band; even.
         cells: number of cells.
         groups: number of light groups.
@@ -206,7 +211,7 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
         beams: all beams.
         cells: the cells that they belong to.
         groups: number of light groups.
-        balls: centre and radius of each ball, four floats, mm.
+        balls: (4 k,) centre and radius of each ball, four floats, mm.
     """
     entries = cells.cells * groups
     centres = np.zeros((cells.cells, 4), dtype=np.float32)
@@ -234,7 +239,7 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
 
 @dataclass
 class Neighbourhood:
-    """Cells, and the balls that hide light from them.
+    """Cells, and the balls that occlude light from them.
 
     Attributes:
         middles: centre of each cell, four floats, mm.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.sequences import GOLDEN_BITS, in_series, next_random
+from optisense.optics.backend.sequences import GOLDEN_BITS, next_random, richtmyer
 from optisense.optics.radiance_cache.angular_variance import (
     AngularVariance,
     angular_variance,
@@ -33,16 +33,18 @@ from optisense.optics.transport.volume_flux import LAYER_HEIGHT
 
 MIN_IRRADIANCE_SHARE = 0.2
 """Share of the mean irradiance that is added to the expected light when shadow rays are spaced, so
-that weakly lit points do not take many rays."""
+that points that face away from most of the light take fewer rays than others."""
 MAX_EXTRAPOLATION = 1.5
 """Largest height, in units of half the flux layer's height, up to which the light above the surface
-is extrapolated; it is constant above."""
+is extrapolated from the surface and the middle of the layer; it is constant above. With 1.5, that
+is 0.75 mm, about the depth of usual contacts."""
 MIN_SINE = 0.1
-"""Lower bound on the sine of elevation used for the length of the path from a point on an indenter
-to the undeformed surface: light that is lower meets another indenter or a wall first."""
+"""Lower bound on the sine of elevation (6 degrees) used for the length of the path from a point on
+an indenter to the undeformed surface: light that is lower meets another indenter or a wall first.
+"""
 MIN_STEP = 1e-20
-"""Lower bound on the step of the systematic sampling; it avoids a division by zero without
-light."""
+"""Lower bound on the step of the systematic sampling (mW/mm^2/sr): far below any light, it only
+avoids a division by zero where there is none."""
 
 
 @dr.syntax
@@ -53,16 +55,23 @@ def sum_bins(
     shadow_rays: mi.Float,
     sky: mi.Float,
 ) -> list[mi.Color3f]:
-    """Return the radiance towards the camera due to all direction bins, one colour per light group.
+    """Return the radiance (3, n) towards the camera due to the direction bins, for each group.
 
     Each bin is looked up where the line along its middle direction meets the undeformed surface.
-    Shadow rays test the bins that are not wholly above the occluder horizon (``sky``, a sine). They
-    are drawn in proportion to the light, evenly spaced in its running sum (systematic sampling);
-    without occlusion, the sum is exact to half a step.
+    Shadow rays test the bins that are not wholly above the occluder horizon. They are drawn in
+    proportion to the light, evenly spaced in its running sum (systematic sampling); without
+    occlusion, the sum is exact to half a step.
 
     If the cache also holds the light in the raised plane, points on indenters look up either plane,
     at random. If it holds the light half-way up the flux layer, they interpolate between that light
     and the light on the surface below them.
+
+    Args:
+        light: the light of the cache.
+        scenes: the scenes of the image, with indenters.
+        at: the points.
+        shadow_rays: number of shadow rays of each point and light group.
+        sky: the occluder horizon (n,) of each point (see `occluder_horizon`).
     """
     moments, heights, colours = light.tables
     upper, groups, bins, points = light.above, light.groups, light.bins, at.seen
@@ -79,7 +88,7 @@ def sum_bins(
         expected *= dr.inv_pi
         steps.append(dr.maximum(expected / shadow_rays, MIN_STEP))
         # Each sample of a pixel begins at another fraction of a step.
-        running.append(in_series(points.series + (g + 1), points.number, 0))
+        running.append(richtmyer(points.series + (g + 1), points.number, 0))
     upright, offset = plane_of(light.cells, at.cell, active)
     up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (LAYER_HEIGHT / 2), 0)
     up = dr.clip(up, 0, MAX_EXTRAPOLATION)

@@ -88,11 +88,13 @@ faster. In a contact of the diffuse spherical GelSight Mini the RMS error over p
 16 x 16 bins, 2.0 % where their blur is undone bin by bin, and 1.3 % with these. Tracing the light
 takes a quarter longer; images from a finished cache take as long as with `COARSE_BINS`."""
 FINE_BINS = DirectionBins(24, 0.6, True)
-"""The bins for lobes that resolve the lamps."""
+"""The bins for lobes that resolve the lamps: 576 bins, 8.5 degrees across in the mean."""
 FINEST_BINS = DirectionBins(32, 0.6, True)
-"""The bins for lobes that are narrower than most lamps."""
+"""The bins for lobes that are narrower than most lamps: 1,024 bins, 6.3 degrees across in the
+mean."""
 BROAD_LOBE = 0.5
-"""GGX alpha from which on a lobe is so broad that coarse bins suffice."""
+"""GGX alpha from which on a lobe is so broad that coarse bins suffice where no light is tallied in
+the raised plane."""
 BROAD_LOBE_OF_RAISED_PLANE = 0.38
 """The same where the light in the raised plane is tallied. At 0.4, coarse bins leave an error of
 1.5 % in a contact in the middle of GelSight Mini and 1.0 % beside it; `FINE_BINS`, which take twice
@@ -109,7 +111,7 @@ def direction_bin(
     bands_off: mi.Float,
     sectors_off: mi.Float,
 ) -> mi.UInt32:
-    """Return the number of the bin of a direction, offset by a number of bands and sectors.
+    """Return the number (n,) of the bin of a direction, offset by a number of bands and sectors.
 
     Args:
         cells: the surface cells, whose frame is that of the bins.
@@ -131,8 +133,12 @@ def direction_bin(
 
 
 def landing_bits(place: mi.Vector4f, direction: mi.Vector3f) -> tuple[mi.UInt32, mi.UInt32]:
-    """Return random bits that depend on a landing alone, as landings are recorded in no fixed
-    order.
+    """Return two sets of random bits (n,) that depend on a landing alone, as landings are recorded
+    in no fixed order.
+
+    Args:
+        place: four floats of each landing, as in `PhotonMap.place`.
+        direction: the unit direction in which each photon travels.
     """
     first, second, third = (
         dr.reinterpret_array(mi.UInt32, value) for value in (place.x, place.y, direction.x)
@@ -142,20 +148,24 @@ def landing_bits(place: mi.Vector4f, direction: mi.Vector3f) -> tuple[mi.UInt32,
 
 
 def dither(random: tuple[mi.UInt32, mi.UInt32], bins: DirectionBins) -> tuple[mi.Float, mi.Float]:
-    """Return random offsets in bands and sectors, with a triangular density over the overlap of
-    bins.
+    """Return random offsets (n,) in bands and (n,) in sectors, with a triangular density over the
+    overlap of bins.
 
     Args:
         random: the random bits of each photon (see `landing_bits`).
         bins: the direction bins.
     """
-    reach = dr.opaque(mi.Float, bins.overlap)
-    one, other = (reach * (unit_float(each) + unit_float(each * 277803737) - 1) for each in random)
+    overlap = dr.opaque(mi.Float, bins.overlap)
+    one, other = (
+        overlap * (unit_float(each) + unit_float(each * 277803737) - 1) for each in random
+    )
     return one, other
 
 
 def bin_centres(cells: SurfaceCells, bins: DirectionBins, chosen: NDArray[np.integer]) -> mi.Float:
-    """Return four floats for each chosen bin: its middle direction, and its number as bits."""
+    """Return four floats for each of the chosen bins (k,): its middle direction, and its number as
+    bits; (4 k,) in all.
+    """
     z = (chosen // bins.across + 0.5) * (2 / bins.across) - 1
     turn = (chosen % bins.across + 0.5) * (2 * np.pi / bins.across)
     flat = np.sqrt(1 - z * z)

@@ -41,8 +41,8 @@ costs as much as that of many. In the contact of a ball on GelSight Mini, two re
 followed at a specularity of 0.6, and one at 1; further ones would add 0.01 % to its light at most,
 and 0.07 % at its rim."""
 PLACE_SHADOW_RAYS = 4.0
-"""Number of shadow rays per light group of a place that a ray meets; fewer than for visible points,
-as its light is a small part of a pixel's."""
+"""Number of shadow rays per light group of a place that a ray meets: a quarter of those of visible
+points, as its light is a small part of a pixel's."""
 MIN_LANES = 2
 """Lower bound on the number of places that are shaded at once, as Dr.Jit compiles other kernels for
 arrays of one entry."""
@@ -65,19 +65,20 @@ class SecondaryHits:
 
 
 def glossy_interreflection(
-    field: RadianceCache, scenes: ContactScenes, at: ShadingPoints
+    cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints
 ) -> list[mi.Color3f]:
-    """Return the radiance towards the camera due to interreflected light, one colour per group.
+    """Return the radiance (3, n) towards the camera due to interreflected light, for each light
+    group.
 
     Args:
-        field: the radiance cache.
+        cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
         at: the points.
     """
     lanes = dr.width(at.seen.pixel)
-    totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(field.binned.groups)]
+    totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(cache.binned.groups)]
     dr.eval(at)
-    directions = DIRECTIONS if field.binned.narrow_lobes else BROAD_DIRECTIONS
+    directions = DIRECTIONS if cache.binned.narrow_lobes else BROAD_DIRECTIONS
     lane = dr.arange(mi.UInt32, lanes * directions)
     owner = lane // directions
     table = scenes.full.table
@@ -99,8 +100,8 @@ def glossy_interreflection(
         seen = _secondary_hits(scenes, looking)
         if seen is None or dr.width(seen.near) < least:
             break
-        looking = shading_points(field, scenes, seen)
-        light = light_of(field, scenes, looking)
+        looking = shading_points(cache, scenes, seen)
+        light = light_of(cache, scenes, looking)
         for total, value in zip(totals, light, strict=True):
             for k in range(3):
                 weighted = value[k] * looking.seen.weight[k]
@@ -167,17 +168,17 @@ def _secondary_hits(scenes: ContactScenes, at: ShadingPoints) -> SecondaryHits |
 
 
 def shading_points(
-    field: RadianceCache, scenes: ContactScenes, seen: SecondaryHits
+    cache: RadianceCache, scenes: ContactScenes, seen: SecondaryHits
 ) -> ShadingPoints:
     """Return the shading points of places; each reads the cache below it, along the skin's
     normal.
     """
     points = seen.points
-    upright, offset = plane_of(field.binned.cells, seen.near, points.valid)
+    upright, offset = plane_of(cache.binned.cells, seen.near, points.valid)
     foot = points.point - upright * (dr.dot(upright, points.point) - offset)
     base = dr.select(seen.raised, foot, points.point)
     cell, shift, found = interpolating_cell(
-        field.binned.cells, base, points.valid, points.series, points.number
+        cache.binned.cells, base, points.valid, points.series, points.number
     )
     return ShadingPoints(
         seen=points,
@@ -190,14 +191,16 @@ def shading_points(
     )
 
 
-def light_of(field: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
-    """Return the light of the cache that places reflect towards the points that see them."""
+def light_of(cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
+    """Return the light (3, n) of the cache that places reflect towards the points that see them,
+    for each light group.
+    """
     sky = occluder_horizon(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
         at.seen.point,
-        plane_of(field.binned.cells, at.cell, at.active)[0],
+        plane_of(cache.binned.cells, at.cell, at.active)[0],
         at.raised & dr.opaque(mi.Bool, scenes.convex),
     )
     rays = dr.opaque(mi.Float, PLACE_SHADOW_RAYS)
-    return sum_bins(field.binned, scenes, at, rays, sky)
+    return sum_bins(cache.binned, scenes, at, rays, sky)

@@ -15,7 +15,9 @@ pi, 2 pi / 3 and pi / 4 (Ramamoorthi and Hanrahan 2001, equation 8)."""
 
 
 def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
-    """Return the nine real spherical harmonics of bands 0 to 2 for unit directions."""
+    """Return the nine real spherical harmonics of bands 0 to 2, (n,) each, for unit directions
+    (Ramamoorthi and Hanrahan 2001, equation 3).
+    """
     x, y, z = n.x, n.y, n.z
     return (
         mi.Float(0.282095) + 0 * x,
@@ -34,9 +36,16 @@ def harmonics(n: mi.Vector3f) -> tuple[mi.Float, ...]:
 def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int) -> mi.Float:
     """Return the irradiance coefficients and the vector sum of the light of each cell and group.
 
-    Each cell and group has twelve floats: nine coefficients of the irradiance (mW/mm^2) as a
-    function of the normal, and the sum of the light's directions, each weighted with its flux
-    density.
+    Args:
+        moments: the moments of a cache (see `Tables`).
+        cells: number of cells.
+        bins: number of direction bins of each cell.
+        groups: number of light groups.
+
+    Returns:
+        Twelve floats of each cell and group, (12 cells groups,): nine coefficients of the
+        irradiance (mW/mm^2) as a function of the normal, and the sum of the light's directions,
+        each weighted with its flux density.
     """
     lane = dr.arange(mi.UInt32, cells * groups)
     cell, group = lane // groups, lane % groups
@@ -65,11 +74,16 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
 def irradiance(
     table: mi.Float, entry: mi.UInt32, normal: mi.Vector3f
 ) -> tuple[mi.Float, mi.Float, mi.Vector3f]:
-    """Return the irradiance (mW/mm^2) at normals, its mean over all normals, and the vector sum of
-    the light.
+    """Return the irradiance (n,), mW/mm^2, at normals, its mean over all normals (n,), and the
+    vector sum of the light (3, n), mW/mm^2.
 
     Where all light is above the horizon of a normal, the irradiance equals the component of the
     vector sum along that normal.
+
+    Args:
+        table: the result of `irradiance_table`.
+        entry: number (n,) of the cell times the number of light groups, plus that of the group.
+        normal: unit normals.
     """
     a = dr.gather(mi.Vector4f, table, entry * 3)
     b = dr.gather(mi.Vector4f, table, entry * 3 + 1)
@@ -82,7 +96,7 @@ def irradiance(
     return dr.maximum(total, 0), a.x * basis[0], mi.Vector3f(c.y, c.z, c.w)
 
 
-def vector(table: mi.Float, entry: mi.UInt32) -> mi.Vector3f:
-    """Return the vector sum of the light alone, as in `irradiance`."""
+def vector_sum(table: mi.Float, entry: mi.UInt32) -> mi.Vector3f:
+    """Return the vector sum of the light (3, n), mW/mm^2, alone, as in `irradiance`."""
     third = dr.gather(mi.Vector4f, table, entry * 3 + 2)
     return mi.Vector3f(third.y, third.z, third.w)

@@ -38,12 +38,12 @@ arrays of one entry."""
 
 
 def mirrored_contacts(
-    field: RadianceCache, scenes: ContactScenes, points: VisiblePoints, rays: int
+    cache: RadianceCache, scenes: ContactScenes, points: VisiblePoints, rays: int
 ) -> tuple[VisiblePoints, list[mi.Color3f]] | None:
     """Return the light that indenters reflect to visible points through the interfaces.
 
     Args:
-        field: the radiance cache.
+        cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
         points: the visible points.
         rays: number of rays from each point.
@@ -76,7 +76,7 @@ def mirrored_contacts(
         end.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
     seen = replace(dr.gather(VisiblePoints, points, owner), **vars(end))
     dr.eval(seen)
-    return seen, _radiance_differences(field, scenes, seen)
+    return seen, _radiance_differences(cache, scenes, seen)
 
 
 def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEnd, mi.UInt32]]:
@@ -121,14 +121,14 @@ def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEn
 
 
 def _radiance_differences(
-    field: RadianceCache, scenes: ContactScenes, seen: VisiblePoints
+    cache: RadianceCache, scenes: ContactScenes, seen: VisiblePoints
 ) -> list[mi.Color3f]:
     """Return the radiance of places on indenters minus that of the undeformed skin behind them."""
     away = -seen.towards_eye
     behind = scenes.fixed.intersect(Ray(seen.point, away, seen.valid))
     base = dr.select(behind.valid, behind.point, seen.point)
     cell, shift, found = interpolating_cell(
-        field.binned.cells, base, seen.valid, seen.series, seen.number
+        cache.binned.cells, base, seen.valid, seen.series, seen.number
     )
     side = -dr.sign(dr.dot(away, behind.normal))
     skin = replace(
@@ -140,7 +140,7 @@ def _radiance_differences(
     )
     coating = coating_of(scenes.full.table, behind.surface, behind.valid)
     flat = ShadingPoints(skin, coating, base, cell, shift, found & behind.valid, mi.Bool(False))
-    without = sum_beams(field.beams, field.binned.groups, flat)
+    without = sum_beams(cache.beams, cache.binned.groups, flat)
     places = SecondaryHits(seen, mi.Bool(seen.valid), cell)
-    lit = light_of(field, scenes, shading_points(field, scenes, places))
+    lit = light_of(cache, scenes, shading_points(cache, scenes, places))
     return [one - other for one, other in zip(lit, without, strict=True)]

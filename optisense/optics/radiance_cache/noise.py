@@ -9,10 +9,12 @@ from scipy.sparse import csr_matrix
 FloatArray = NDArray[np.floating]
 
 NOISIEST_SHARE = 0.05
-"""Share of the area in view that counts as the worst places when their noise is reported."""
+"""Share of the area in view that counts as the worst places when their noise is reported: small
+enough to find a dark corner, and large enough not to depend on a few cells."""
 PATCH_AVERAGES = 4
-"""Number of times that the squared noise is averaged with the smoothing kernel. Without averaging
-it is the square of a single difference, and chance would decide which places are the worst."""
+"""Number of times that the squared noise is averaged with the smoothing kernel, which widens the
+kernel twofold. Without averaging it is the square of a single difference, and chance would decide
+which places are the worst."""
 DARKEST_JUDGED = 0.1
 """Lower bound on the light to which a place's noise is relative, as a share of the mean light, so
 that very dark places do not decide the result."""

@@ -16,11 +16,12 @@ from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, Photon
 FloatArray = NDArray[np.floating]
 
 GRAZING_COSINE = 0.25
-"""Cosine of incidence below which light is grazing. Light that passes above a place at such angles
-lands so far behind it that the landings at the place do not represent it."""
+"""Cosine of incidence (76 degrees) below which light is grazing. Light that passes 1 mm above a
+place at such angles lands 4 mm or more behind it, so that the landings at the place do not
+represent it."""
 MIN_COSINE = 0.02
-"""Lower bound on the cosine of incidence when powers are divided by it, so that single photons do
-not dominate the share of grazing light."""
+"""Lower bound on the cosine of incidence (89 degrees) when powers are divided by it, so that single
+photons do not dominate the share of grazing light."""
 
 
 @dataclass(frozen=True)

@@ -54,11 +54,13 @@ class PowerRounding:
         return cls(dr.opaque(mi.Float, quantum), dr.opaque(mi.Float, 1 / quantum), chances)
 
     def kept(self, power: mi.Float) -> mi.Float:
-        """Return the factors of powers (mW) by which weak photons become stronger or vanish."""
+        """Return the factors (n,) of powers (n,), mW, by which weak photons become stronger or
+        vanish.
+        """
         least = LEAST_QUANTA * self.quantum
         survives = self.chances[1] * least < power
         return dr.select(power < least, dr.select(survives, least / power, 0), 1)
 
     def __call__(self, power: mi.Float) -> mi.Float:
-        """Return powers (mW) as whole quanta."""
+        """Return powers (n,), mW, rounded to whole quanta."""
         return dr.floor(power * self.per_quantum + self.chances[0]) * self.quantum

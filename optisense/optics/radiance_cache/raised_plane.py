@@ -33,16 +33,16 @@ STEPS = 2
 """Number of planes of cells that a line is intersected with in turn, where the surface is curved.
 With 8, the light in a contact of the spherical GelSight Mini is the same within 0.2 %."""
 LEAST_AREA = 0.25
-"""Smallest area of the raised plane over that of the surface, as in hollows whose radius is little
-larger than the height of the plane."""
+"""Smallest area of the raised plane over that of the surface: that in the hollow of a sphere whose
+radius is twice the height of the plane. In deeper hollows the offset surface folds."""
 MIN_COSINE = 0.02
-"""Cosine of incidence below which a photon is not tallied in the raised plane, as the place where
-it crosses it is too uncertain."""
+"""Cosine of incidence (89 degrees) below which a photon is not tallied in the raised plane: it
+crosses the plane 40 mm or more before it lands, farther away than most sensors are long."""
 
 
 def areas(cells: SurfaceCells) -> mi.Float:
-    """Return the area of the raised plane above each cell over the area of the cell."""
-    growth = cells.spread @ (RAISED_HEIGHT, RAISED_HEIGHT**2)
+    """Return the area of the raised plane above each cell over the area of the cell, (cells,)."""
+    growth = cells.offset_growth @ (RAISED_HEIGHT, RAISED_HEIGHT**2)
     return floats(np.maximum(1 + growth, LEAST_AREA))
 
 
@@ -67,8 +67,9 @@ def crossings(
         areas: the areas of the raised plane (see `areas`), if surfaces are curved.
 
     Returns:
-        The cell below the place where each photon crosses the plane; its flux density there,
-        relative to that in the cell where it lands; and whether it crosses the plane.
+        The number (n,) of the cell below the place where each photon crosses the plane; its flux
+        density there, relative to that in the cell where it lands (n,); and whether it crosses the
+        plane (n,).
     """
     there, crosses = below_crossing(
         cells,
@@ -98,7 +99,8 @@ def below_crossing(
     curved: bool,
     shift: mi.Vector3f | None = None,
 ) -> tuple[mi.UInt32, mi.Bool]:
-    """Return the cell below the place where a line crosses a plane, and whether there is one.
+    """Return the number (n,) of the cell below the place where a line crosses a plane, and whether
+    there is one (n,).
 
     Args:
         cells: the cells of the surface.
@@ -124,7 +126,7 @@ def below_crossing(
 
 
 def sampled_plane(points: VisiblePoints, rise: mi.Float, raised: mi.Bool) -> mi.Bool:
-    """Return whether each camera sample looks up the raised plane instead of the surface.
+    """Return whether each camera sample looks up the raised plane instead of the surface, (n,).
 
     Args:
         points: the visible points.

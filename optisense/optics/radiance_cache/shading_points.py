@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.sequences import in_series
+from optisense.optics.backend.sequences import richtmyer
 from optisense.optics.scene.bsdf import CoatingBsdf
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.transport.camera_paths import VisiblePoints
@@ -43,15 +43,15 @@ def interpolating_cell(
     series: mi.UInt32,
     number: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.Vector3f, mi.Bool]:
-    """Return a random cell next to each point, the shift (mm) that led there, and whether there is
-    one.
+    """Return a random cell (n,) next to each point, the shift (3, n), mm, that led there, and
+    whether there is one (n,).
 
     All bins are read in the same cell, as light that straddles two bins must not be counted twice.
     Averaged over the samples of a pixel, which are spread evenly, this interpolates between cells.
     """
     home, found = cell_at(cells, base, active)
     upright, _ = plane_of(cells, home, found)
-    shift = mi.Vector3f(*(in_series(series, number, 1 + k) for k in range(3)))
+    shift = mi.Vector3f(*(richtmyer(series, number, 1 + k) for k in range(3)))
     shift = (shift - 0.5) * dr.rcp(cells.inverse_size)
     shift -= upright * dr.dot(upright, shift)
     beside, exists = cell_at(cells, base + shift, found)

@@ -49,13 +49,15 @@ MIN_RADIUS_CELLS_LIMIT = 1.25
 """Smallest radius, in cell sides, for any number of photons: the kernel then holds the cell and its
 direct neighbours."""
 MIN_NORMAL_COSINE = 0.5
-"""Smallest cosine between the normals of two cells that a kernel averages."""
+"""Smallest cosine between the normals of two cells that a kernel averages: cells that face
+directions more than 60 degrees apart, as on both sides of an edge, get different light."""
 CELL_BLUR = 1.5
 """Squared radius, in squared cell sides, by which the blur of the cells widens a kernel. Landing in
 a cell and reading from up to half a cell away is three box filters of a cell's side, each of
 variance 1/12; the variance of Epanechnikov's kernel is 1/6 of its squared radius."""
 MAX_SHARPENING = 0.25
-"""Largest relative change of a cell's light by the sharpening."""
+"""Largest relative change of a cell's light by the sharpening. Kernels of `MAX_RADIUS_RATIO` need
+5 % (see `varies_over`); more is due to noise or to the edge of a shadow."""
 
 
 @dataclass
@@ -267,17 +269,20 @@ def smooth(
     groups: int,
     factors: mi.Float,
 ) -> list[list[Any]]:
-    """Return kernel-weighted sums over neighbouring cells of the chosen bins, for each plane.
+    """Return kernel-weighted sums over neighbouring cells of the chosen bins.
 
     Args:
         kernel: the weights.
         size: number of planes, and of cells in each (see `RadianceCache.planes`).
         tables: the tables that are smoothed; the first holds the moments of a radiance cache.
         kinds: the type of an entry of each table: `mi.Float` or a vector.
-        bins: the numbers of the chosen bins.
+        bins: (k,) the numbers of the chosen bins.
         stride: number of bins per cell in the tables.
         groups: number of light groups.
-        factors: (planes times cells times groups) factors by which the sums are multiplied.
+        factors: (planes cells groups,) factors by which the sums are multiplied.
+
+    Returns:
+        For each plane and each table, the sums (cells k groups,) of the table's kind.
     """
     planes, cells = size
     lane = dr.arange(mi.UInt32, cells * dr.width(bins) * groups)

@@ -36,29 +36,36 @@ PASS_PHOTONS = 500_000
 """Number of photons of one pass. A pass of this size keeps the photon map near 30 MB; progress is
 reported and Ctrl-C obeyed between passes."""
 MAX_SINGLE_PASS = 2.5 * PASS_PHOTONS
-"""Number of photons below which all are traced in one pass, as each pass has a fixed cost."""
+"""Number of photons below which all are traced in one pass, as each pass has a fixed cost: fewer
+than three passes save more by it than their photon map costs in memory (75 MB)."""
 PILOT_PHOTONS = 300_000
-"""Number of photons of the pilot pass, from which the emission guide is learned."""
+"""Number of photons of the pilot pass, from which the emission guide is learned: enough for the
+cells of the guide (see `GUIDE_CELLS`), and half of a pass."""
 CELL_SIZE = 0.5
-"""Side (mm) of the surface cells; larger where the tally would exceed `MAX_TALLY_BYTES`."""
+"""Side (mm) of the surface cells: a third of the usual kernel radius (`REFERENCE_RADIUS`), so that
+the cells blur little. It is larger where the tally would exceed `MAX_TALLY_BYTES`."""
 PILOT_CELL_SIZE = 1.0
-"""Side (mm) of the cells that decide whether a pilot photon lands where the camera looks."""
+"""Side (mm) of the cells that decide whether a pilot photon lands where the camera looks: half of
+`VIEW_MARGIN`."""
 MAX_TALLY_BYTES = 375e6
-"""Memory (bytes) that the tally of one seed may take. Cells are made larger to stay below it."""
+"""Memory (bytes) that the tally of one seed may take. Cells are made larger to stay below it, so
+that a process takes less than the `MOST_RESIDENT` memory of `backend.memory`."""
 MAX_FINE_TALLY_BYTES = 750e6
-"""Memory (bytes) that the tally of one seed may take with the fine direction bins of narrow
-lobes."""
+"""Memory (bytes) that the tally of one seed may take with the fine direction bins of narrow lobes,
+of which there are two to four times as many."""
 VIEW_MARGIN = 2.0
 """Margin (mm) around the camera's view to which photons are sent as well: light that lands there
-would meet the flank of an indenter."""
+would meet the flank of an indenter, which stands off the surface by 1 to 2 mm."""
 SMOOTHED_MARGIN = 5.0
 """Margin (mm) around the camera's view beyond which cells are smoothed with the narrowest kernel
-only, as few of them are read."""
+only, as few of them are read: more than three kernel radii."""
 MAX_CACHES = 2
-"""Number of radiance caches that a store keeps; the oldest is dropped when there are more."""
+"""Number of radiance caches that a store keeps; the oldest is dropped when there are more. Two let
+a user go back and forth between two sets of lights or seeds."""
 GRAZING_SHARE_LIMIT = 0.25
 """Share of grazing light above which indenters are lit by the volume flux above the surface as
-well."""
+well. Without the volume flux, the error in a contact of GelSight Svelte would be three times as
+large (benchmarks/ablation.md)."""
 
 
 class _Traced(NamedTuple):
@@ -80,6 +87,7 @@ class CacheStore:
     """Tracer of photon passes that keeps the tallies and the radiance caches computed from them."""
 
     cell_size = CELL_SIZE
+    """Side (mm) of the surface cells; see `CELL_SIZE`."""
     thorough = True
     """Whether curved surfaces get direction bins of their own, and surfaces a raised plane."""
     uses_pilot = True
@@ -87,6 +95,7 @@ class CacheStore:
     indenters are then lit by the flux layer above the surface, and where it varies, kernels are
     narrower."""
     pilot_photons = PILOT_PHOTONS
+    """Number of photons of the pilot pass; see `PILOT_PHOTONS`."""
     groups: frozenset[int] | None = None
     """The light groups whose light is traced; all groups if None."""
 
@@ -280,7 +289,7 @@ class CacheStore:
         half = np.array([max(lamp.size) / 2 for lamp in lamps])
         return np.asarray(nearest - half[which])
 
-    def field(
+    def radiance_cache(
         self,
         seed: int,
         photons: int | None,

@@ -37,10 +37,11 @@ from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
 FloatArray = NDArray[np.floating]
 
 MIN_COSINE = 0.02
-"""Lower bound on the cosine of incidence that a photon's power is divided by, so that an isolated
-grazing photon does not become a bright beam."""
+"""Lower bound on the cosine of incidence (89 degrees) that a photon's power is divided by, so that
+an isolated grazing photon does not become a bright beam."""
 EMPTY_BIN_SHARE = 1e-7
-"""Share of all the light below which a direction bin counts as empty."""
+"""Share of all the light below which a direction bin counts as empty: a thousand such bins hold
+0.01 % of the light."""
 DENSE = 8000.0
 """Density of landed photons (1/mm^2) from which on the blur of the smoothing is undone in each
 direction bin, where there is a raised plane; 8 million photons give GelSight Mini as much. With so
@@ -70,7 +71,7 @@ class CacheTally:
             coloured: whether powers are kept per colour channel.
             roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
             flux_layer: the layer in which the light above the surface is tallied; None for no
-            layer.
+                layer.
             directions: the direction bins.
             planes: 2 to tally the light in the raised plane as well (see `raised_plane`), else 1.
             curved: whether surfaces are curved.
@@ -179,7 +180,7 @@ class CacheTally:
         if self.passes < 1:
             return float("inf")
         near = self.kernels.near
-        return relative_noise(*(values[near] for values in self._light_and_spread()))
+        return relative_noise(*(values[near] for values in self._light_and_variance()))
 
     def worst_noise(self) -> float:
         """Return the relative RMS noise (1 = 100 %) that the noisiest 5 % of the area have at
@@ -193,9 +194,9 @@ class CacheTally:
             return float("inf")
         kernel = self._smoothing().kernel.matrix
         near, areas = self.kernels.near, self.cells.areas
-        return noise_of_worst_places(*self._light_and_spread(), near, areas, kernel)
+        return noise_of_worst_places(*self._light_and_variance(), near, areas, kernel)
 
-    def _light_and_spread(self) -> tuple[FloatArray, FloatArray]:
+    def _light_and_variance(self) -> tuple[FloatArray, FloatArray]:
         """Return the smoothed irradiance (cells, groups), mW/mm^2, and its squared standard
         deviation.
         """

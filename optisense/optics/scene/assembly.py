@@ -27,15 +27,20 @@ from optisense.optics.scene.solids import Interface, Sheet, Solid
 from optisense.optics.scene.surfaces import CLEAR, RGB, Region, Surface, SurfaceKind
 
 SMOOTH_METAL = 0.01
-"""GGX roughness below which a metal is an ideal mirror."""
+"""GGX roughness below which a metal is an ideal mirror. With 0.01, half of the micro-facets tilt by
+less than 0.6 degrees, so that reflections blur by about one degree."""
 
 FLAT = 1e-6
-"""Largest difference between corner and face normals at which a mesh has flat facets."""
+"""Largest difference between the components of corner and face normals (unit vectors) at which a
+mesh has flat facets: far above the rounding of normals in double precision (1e-15), and an angle of
+only 6e-5 degrees."""
 
 DISC_CORNERS = 12
-"""Corners of the polygon that represents a round light window."""
+"""Number of corners of the polygon that represents a round light window for rays that meet it.
+Twelve give 95 % of the disc's area; photons start from the exact disc."""
 PROBE = 0.02
-"""Distance (mm) off a coating at which the medium in front of it is looked up."""
+"""Distance (mm) off a coating or a light at which the medium in front of it is looked up: ten times
+the distance below which faces touch, and no more than the thinnest film that a design holds."""
 
 
 @dataclass(frozen=True)
@@ -282,9 +287,7 @@ def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
 
 
 def _absorption_at(places: list[Light], solids: list[Solid]) -> list[RGB]:
-    """Return the absorption coefficients (1/mm) at R, G, B of the medium that each light shines
-    into.
-    """
+    """Return the absorption coefficients (1/mm) at R, G, B of the medium in front of each light."""
     found = [(-np.inf, CLEAR)] * len(places)
     if all(solid.absorption == CLEAR for solid in solids):
         return [CLEAR] * len(places)

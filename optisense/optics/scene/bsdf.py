@@ -20,16 +20,20 @@ FLOATS_PER_SURFACE = 16
 """Number of floats of a surface in the table of optical data; four gathers of four floats read
 them."""
 SMOOTH_ALPHA = 1e-3
-"""GGX roughness below which a dielectric is treated as smooth."""
+"""GGX roughness below which a dielectric is treated as smooth. With 0.001, half of the micro-facets
+tilt by less than 0.06 degrees: reflections blur by half a pixel of a picture with 320 pixels over
+60 degrees, and refraction by less."""
 MIN_DISC_COSINE = 0.1
 """Lower bound on the cosine of the half vector with the light, by which a disc of light widens
-among half vectors; below it light and eye are nearly opposite each other."""
+among half vectors. Below it the light and the eye are more than 168 degrees apart, so that both are
+at grazing angles."""
 MIN_DISC = 1e-9
-"""Lower bound on the squared radius of a disc of half vectors; it avoids a division by zero."""
+"""Lower bound on the squared radius of a disc of half vectors (radians squared). It avoids a
+division by zero; a disc of this radius (0.002 degrees) is a single direction."""
 
 
 def surface_table(surfaces: list[Surface]) -> mi.Float:
-    """Optical data of all surfaces, ``FLOATS_PER_SURFACE`` floats each."""
+    """Return the optical data of n surfaces on the device, (16 n,): those of `surface_rows`."""
     return mi.Float(surface_rows(surfaces).ravel())
 
 
@@ -77,7 +81,11 @@ class CoatingBsdf:
 def surface_kind(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool
 ) -> tuple[mi.UInt32, mi.Float, mi.Float]:
-    """Return the kind, eta and alpha of surfaces."""
+    """Return the kind, eta and alpha, (n,) each, of surfaces (n,).
+
+    The arguments ``table``, ``surface`` and ``active`` of this and the following functions are the
+    table of `surface_table`, the numbers (n,) of surfaces in it, and a mask (n,).
+    """
     row = dr.gather(mi.Vector4f, table, surface * 4, active)
     return dr.reinterpret_array(mi.UInt32, row.x), row.y, row.z
 
@@ -85,15 +93,15 @@ def surface_kind(
 def channel_eta(
     table: mi.Float, surface: mi.UInt32, channel: mi.UInt32, active: mi.Bool
 ) -> mi.Float:
-    """Return the eta of dielectrics for light of one channel, 0 to 2."""
+    """Return the eta (n,) of dielectrics for light of one channel (n,), 0 to 2 for R, G, B."""
     return dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 4 + channel, active)
 
 
 def media_absorption(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool
 ) -> tuple[mi.Bool, mi.Color3f, mi.Color3f]:
-    """Return whether the media of dielectrics are known, and their absorption coefficients (1/mm)
-    in front of the face normal and behind it.
+    """Return whether the media of dielectrics are known (n,), and their absorption coefficients
+    (3, n), 1/mm, in front of the face normal and behind it.
     """
     inside = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
     outside = dr.gather(mi.Vector4f, table, surface * 4 + 3, active)
@@ -102,14 +110,14 @@ def media_absorption(
 
 
 def surface_region(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
-    """Return the region (sensing surface, indenter, other) of surfaces."""
+    """Return the `Region` (n,) of surfaces."""
     return dr.reinterpret_array(
         mi.UInt32, dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 7, active)
     )
 
 
 def surface_light(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UInt32:
-    """Return the number of the light whose emitting face a surface is."""
+    """Return the number (n,) of the light whose emitting face a surface is."""
     return dr.reinterpret_array(
         mi.UInt32, dr.gather(mi.Float, table, surface * FLOATS_PER_SURFACE + 11, active)
     )
@@ -118,7 +126,9 @@ def surface_light(table: mi.Float, surface: mi.UInt32, active: mi.Bool) -> mi.UI
 def coating_of(
     table: mi.Float, surface: mi.UInt32, active: mi.Bool, metallic: bool = True
 ) -> CoatingBsdf:
-    """Return the reflectance parameters of surfaces."""
+    """Return the reflectance parameters, (n,) each, of surfaces; ``metallic`` as in
+    `CoatingBsdf`.
+    """
     first = dr.gather(mi.Vector4f, table, surface * 4, active)
     base = dr.gather(mi.Vector4f, table, surface * 4 + 1, active)
     eta = dr.gather(mi.Vector4f, table, surface * 4 + 2, active)
@@ -134,8 +144,9 @@ def coating_of(
 
 
 def grey(colour: mi.Color3f) -> mi.Float:
-    """Return the mean of three channels. (``dr.mean`` would make kernels depend on the number of
-    lanes.)
+    """Return the mean (n,) of the three channels of a colour.
+
+    ``dr.mean`` would make kernels depend on the number of lanes.
     """
     return (colour.x + colour.y + colour.z) * (1 / 3)
 
@@ -149,7 +160,13 @@ def albedo_of(coating: CoatingBsdf) -> mi.Color3f:
 
 
 def fresnel_metal(cosine: mi.Float, eta: mi.Color3f, k: mi.Color3f) -> mi.Color3f:
-    """Return the unpolarised Fresnel reflectance of a metal, per channel (Born & Wolf, 13.2)."""
+    """Return the unpolarised Fresnel reflectance (3, n) of a metal (Born & Wolf, 13.2).
+
+    Args:
+        cosine: cosine (n,) of the angle of incidence.
+        eta, k: real and imaginary part (3, n) of the metal's refractive index over the index of the
+            medium in front of it.
+    """
     cos2 = cosine * cosine
     sin2 = 1 - cos2
     eta2, k2 = eta * eta, k * k
@@ -172,8 +189,8 @@ def _ggx(cos_m: mi.Float, alpha: mi.Float) -> mi.Float:
 def _ggx_of_disc(
     cos_m: mi.Float, cos_d: mi.Float, alpha: mi.Float, light_radius2: mi.Float
 ) -> mi.Float:
-    """The GGX distribution averaged over the half vectors of a disc of light; exact but for the
-    shape of the disc.
+    """Return the GGX distribution averaged over the half vectors of a disc of light; it is exact
+    but for the shape of the disc.
 
     With s the sine of the half vector with the normal, the distribution is
     a^2 / (pi (a^2 + (1 - a^2) s^2)^2): seen along the normal, the stereographic image of an even
@@ -209,22 +226,26 @@ def evaluate_coating(
     normal: mi.Vector3f,
     towards_light: mi.Vector3f,
     towards_eye: mi.Vector3f,
-    reach: mi.Float | None = None,
+    cosine_half_width: mi.Float | None = None,
 ) -> mi.Color3f:
-    """Return the BSDF times the cosine at the light, for unit directions away from the surface; 0
-    below it.
+    """Return the BSDF (1/sr) times the cosine at the light, (3, n); 0 below the surface.
 
-    With ``reach``, the diffuse lobe's cosine is the mean over a uniform distribution of cosines of
-    this half-width; cosines below 0 count as 0.
+    Args:
+        coating: reflectance parameters of the surfaces.
+        normal: unit normals.
+        towards_light, towards_eye: unit directions away from the surface.
+        cosine_half_width: half-width (n,) of the uniform distribution of cosines over which the
+            diffuse lobe's cosine is averaged; cosines below 0 count as 0. None for light of a
+            single direction.
     """
     cos_i = dr.dot(normal, towards_light)
     cos_o = dr.dot(normal, towards_eye)
     lit = (cos_i > 0) & (cos_o > 0)
     cos_d = cos_i
-    if reach is not None:
-        reach = reach + 1e-9
-        part = dr.maximum(cos_i + reach, 0)
-        cos_d = dr.select(cos_i < reach, part * part / (4 * reach), cos_i)
+    if cosine_half_width is not None:
+        half_width = cosine_half_width + 1e-9
+        part = dr.maximum(cos_i + half_width, 0)
+        cos_d = dr.select(cos_i < half_width, part * part / (4 * half_width), cos_i)
     diffuse = dr.select(
         (cos_d > 0) & (cos_o > 0), coating.reflectance * (dr.inv_pi * cos_d), mi.Color3f(0)
     )
@@ -250,7 +271,19 @@ def sample_coating(
     pick: mi.Float,
     sample: mi.Point2f,
 ) -> tuple[mi.Vector3f, mi.Color3f]:
-    """Draw a scattered direction and its weight, for light that travels along ``incoming``."""
+    """Draw a scattered direction and its weight.
+
+    Args:
+        coating: reflectance parameters of the surfaces.
+        normal: unit normals.
+        incoming: unit directions in which the light travels, towards the surface.
+        pick: random number (n,) in [0, 1) that chooses the lobe.
+        sample: random point of the unit square that chooses the direction.
+
+    Returns:
+        The unit direction (3, n), and the weight (3, n) of its light: the BSDF times the cosine
+        over the sampling density; 0 below the surface.
+    """
     frame = mi.Frame3f(normal)
     local = frame.to_local(-incoming)
     metallic = pick < coating.specularity
@@ -266,7 +299,15 @@ def sample_coating(
 
 
 def sample_ggx(local: mi.Vector3f, alpha: mi.Float, sample: mi.Point2f) -> mi.Vector3f:
-    """Draw a visible GGX normal for a viewer in direction ``local`` (Heitz 2018, listing 1)."""
+    """Return a visible GGX normal, a unit vector (3, n) (Heitz 2018, "Sampling the GGX distribution
+    of visible normals", listing 1).
+
+    Args:
+        local: unit directions towards the viewer, in the frame whose z axis is the surface's
+            normal.
+        alpha: GGX roughness (n,).
+        sample: random point of the unit square.
+    """
     stretched = dr.normalize(mi.Vector3f(alpha * local.x, alpha * local.y, local.z))
     length2 = stretched.x * stretched.x + stretched.y * stretched.y
     inverse = dr.select(length2 > 0, dr.rsqrt(dr.maximum(length2, 1e-20)), 0)
@@ -287,11 +328,17 @@ def sample_ggx(local: mi.Vector3f, alpha: mi.Float, sample: mi.Point2f) -> mi.Ve
 def refract(
     incoming: mi.Vector3f, normal: mi.Vector3f, eta: mi.Float
 ) -> tuple[mi.Float, mi.Vector3f, mi.Vector3f, mi.Float]:
-    """Return reflectance, reflected direction, transmitted direction and relative index at an ideal
-    interface.
+    """Return the Fresnel reflectance and the directions of light at an ideal interface.
 
-    ``eta`` is the index behind the normal over the index in front of it. The relative index is that
-    of the far side over the near side. At total internal reflection the reflectance is 1.
+    Args:
+        incoming: unit directions in which the light travels.
+        normal: unit normals.
+        eta: index behind the normal over the index in front of it, (n,).
+
+    Returns:
+        The reflectance (n,), which is 1 at total internal reflection; the reflected and the
+        transmitted unit direction (3, n); and the index of the far side over that of the near side
+        (n,).
     """
     cosine = -dr.dot(incoming, normal)
     reflectance, cos_t, eta_it, eta_ti = mi.fresnel(cosine, eta)
@@ -308,8 +355,19 @@ def sample_rough_interface(
     pick: mi.Float,
     sample: mi.Point2f,
 ) -> tuple[mi.Vector3f, mi.Float, mi.Bool, mi.Float]:
-    """Draw a direction at a rough (GGX) interface; return it with its weight, whether it is
-    transmitted, and the relative index.
+    """Draw a direction at a rough (GGX) interface (Walter et al. 2007).
+
+    Args:
+        incoming: unit directions in which the light travels.
+        normal: unit normals.
+        eta: index behind the normal over the index in front of it, (n,).
+        alpha: GGX roughness (n,).
+        pick: random number (n,) in [0, 1) that chooses reflection or transmission.
+        sample: random point of the unit square that chooses the micro-facet.
+
+    Returns:
+        The unit direction (3, n); its weight (n,); whether it is transmitted (n,); and the index on
+        its side over the index on the side that the light comes from (n,), 1 for reflection.
     """
     facing = normal * dr.sign(-dr.dot(incoming, normal))
     frame = mi.Frame3f(facing)

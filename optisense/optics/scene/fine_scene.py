@@ -18,8 +18,8 @@ class FineScene(NamedTuple):
     Attributes:
         pieces: its pieces.
         scene: the ray scene.
-        sensing_faces: number of the triangle of the sensing surface for each triangle of the scene,
-            or -1.
+        sensing_faces: number (m,) of the triangle of the sensing surface for each triangle of the
+            scene, or -1.
     """
 
     pieces: list[Piece]
@@ -28,7 +28,13 @@ class FineScene(NamedTuple):
 
 
 def fine_scene(pieces: list[Piece], table: mi.Float) -> FineScene:
-    """Return the scene of pieces whose surfaces ``table`` holds in the same order."""
+    """Return the scene of pieces.
+
+    Args:
+        pieces: the pieces; those of the sensing surface with all their triangles.
+        table: the table (16 n,) of the surfaces of the n pieces, in the same order
+            (`surface_table`).
+    """
     numbers, start = [], 0
     for piece in pieces:
         count = len(piece.faces)

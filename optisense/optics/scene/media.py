@@ -32,16 +32,17 @@ from optisense.geometry.mesh import TriangleMesh
 from optisense.optics.scene.solids import AROUND, Interface, Sheet, Solid
 
 COINCIDENCE_TOLERANCE = 0.002
-"""Distance (mm) below which faces touch, and thickness below which an overlap is a contact. An
-intended gap (a film of air) must be wider."""
+"""Distance (mm) below which faces touch, and thickness below which an overlap is a contact: a tenth
+of the thinnest film that a design holds (0.02 mm). An intended gap (a film of air) must be wider.
+"""
 
 CUT_CLEARANCE = 2e-5
-"""Clearance (mm) with which a solid is cut out of another: more than rounding, far less than a
-contact."""
+"""Clearance (mm) with which a solid is cut out of another: more than the rounding of coordinates in
+single precision (some 2e-6 mm at 30 mm), and a hundredth of `COINCIDENCE_TOLERANCE`."""
 
 BENT_TOLERANCE = 0.02
-"""Largest distance (mm) by which touching surfaces may separate while they bend: triangles of two
-tessellations of one shape differ by less."""
+"""Largest distance (mm) by which touching surfaces may separate while they bend. Triangles of two
+tessellations of one shape differ by less, and the thinnest film that a design holds is as thick."""
 
 
 class Bending:

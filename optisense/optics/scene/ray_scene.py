@@ -25,11 +25,12 @@ from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
 FloatArray = NDArray[np.floating]
 
 SMOOTH_FACE = 1 << 16
-"""Bit in a face's record that marks interpolated normals."""
+"""Bit in a face's record that marks interpolated normals: the first bit above those of a surface's
+number, which thus is below 65,536."""
 
 SAME_WAY = 1e-4
-"""Largest difference of the unit normals of flat facets (0.006 degrees) that form one plane for
-rays."""
+"""Largest difference between the components of the unit normals (0.006 degrees) of flat facets that
+form one plane for rays: far above the rounding of single precision (6e-8)."""
 
 
 @dataclass(frozen=True)
@@ -141,9 +142,20 @@ class SurfaceHit:
 class RayScene:
     """A merged mesh for ray tracing, with its tables on the device.
 
-    ``rows`` holds four floats per face: the normal, and as bits the surface's number (with
-    ``SMOOTH_FACE`` set where the shading normal varies). ``corners`` holds twelve floats per face:
-    three corner normals, padded to four floats.
+    Attributes:
+        pieces: the meshes that were merged.
+        bounds: lower and upper corner (3,) of the box around all vertices, mm.
+        vertices: (n, 3) float32, mm.
+        faces: (m, 3) uint32, indices of vertices.
+        scene: Mitsuba's scene of the merged mesh.
+        rows: (4 m,) four floats per face: the normal, and as bits the surface's number (with
+            ``SMOOTH_FACE`` set where the shading normal varies).
+        corners: (12 m,) twelve floats per face: three corner normals, padded to four floats.
+        table: (16 n,) the optical data of the surfaces (`surface_table`).
+        smooth: whether any face has interpolated normals.
+        rough: whether any interface scatters light.
+        absorbing: whether any medium absorbs light.
+        dispersive: whether any refractive index differs between channels.
     """
 
     def __init__(
@@ -198,7 +210,7 @@ class RayScene:
 
     @cached_property
     def patches(self) -> mi.UInt32:
-        """The number of the smooth patch that each triangle belongs to (see `Piece`)."""
+        """The number (m,) of the smooth patch that each triangle belongs to (see `Piece`)."""
         numbers, start = [], 0
         for piece in self.pieces:
             numbers.append(piece.patches + start)
@@ -206,7 +218,9 @@ class RayScene:
         return indices(np.concatenate(numbers))
 
     def with_table(self, table: mi.Float) -> RayScene:
-        """Return a scene of the same triangles with other optical data."""
+        """Return a scene of the same triangles with other optical data, a table (16 n,) of
+        `surface_table`.
+        """
         other = copy(self)
         other.table = table
         return other

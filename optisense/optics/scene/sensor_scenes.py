@@ -70,7 +70,7 @@ class _Shapes:
         return RayScene(self._pieces, table=self._table)
 
     @cached_property
-    def watched(self) -> RayScene:
+    def robust(self) -> RayScene:
         return RayScene(self._pieces, table=self._table, robust=True)
 
     @cached_property
@@ -149,13 +149,13 @@ class SensorScenes:
         return self._shapes.full.with_table(self.table)
 
     @cached_property
-    def watched(self) -> RayScene:
+    def robust(self) -> RayScene:
         """All surfaces of the sensor without contacts, in a robust scene for camera rays.
 
         A camera ray that passes between two triangles gives a black pixel. For photons the effect
         is one in millions, and a robust scene would take a third longer.
         """
-        return self._shapes.watched.with_table(self.table)
+        return self._shapes.robust.with_table(self.table)
 
     @cached_property
     def fixed(self) -> RayScene:
@@ -207,7 +207,7 @@ class SensorScenes:
             placed: meshes of the indenters in the design's frame, mm.
         """
         if not contacts:
-            return ContactScenes(self.watched, self.fixed, None, mi.Float())
+            return ContactScenes(self.robust, self.fixed, None, mi.Float())
         balls = np.stack([bounding_ball(mesh.vertices) for mesh in placed])
         indenters = self._shapes.indenters(len(self.pieces), tuple(placed))
         return ContactScenes(

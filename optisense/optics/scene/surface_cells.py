@@ -16,15 +16,17 @@ from optisense.optics.backend.arrays import floats, indices
 FloatArray = NDArray[np.floating]
 
 SAMPLES_ACROSS = 7
-"""Samples of the surface along the side of a cell; they give its area to a few per cent."""
+"""Number of samples of the surface along the side of a cell. Seven give the cell's area to a few
+per cent."""
 
 CREASE_COSINE = 0.5
 """Largest cosine between normals at one grid place whose surface is divided into two cells, as at
-an edge between a wall and a top: light from beside the wall reaches the top and not the wall.
-"""
+an edge between a wall and a top: light from beside the wall reaches the top and not the wall. With
+0.5, the normals differ by 60 degrees or more, which no smooth skin does within a cell."""
 
 SEARCH_CELLS = 3
-"""Distance from the surface, in cell sides, within which a point still finds the nearest cell."""
+"""Distance from the surface, in cell sides, within which a point still finds the nearest cell: 1.5
+mm with cells of 0.5 mm, as presses are usually less than 1 mm deep."""
 
 
 @dataclass
@@ -44,9 +46,10 @@ class SurfaceCells:
         centres: (cells, 3) centre of the surface in each cell, mm.
         normals: (cells, 3) mean unit normal of the surface in each cell.
         areas: (cells,) area of the surface in each cell, mm^2.
-        spread: (cells, 2) coefficients of the area of an offset surface: at the height h (mm) along
-            the normals, it is 1 + spread[:, 0] h + spread[:, 1] h^2 times that of the surface
-            (Steiner's formula with minus twice the mean curvature, and the Gaussian curvature).
+        offset_growth: (cells, 2) coefficients a (1/mm) and b (1/mm^2) of the area of an offset
+            surface: at the height h (mm) along the normals, it is 1 + a h + b h^2 times that of the
+            surface (Steiner's formula; a is minus twice the mean curvature, b the Gaussian
+            curvature).
         axes: (3, 3) frame of the direction bins, as rows.
     """
 
@@ -61,7 +64,7 @@ class SurfaceCells:
     centres: FloatArray
     normals: FloatArray
     areas: FloatArray
-    spread: FloatArray
+    offset_growth: FloatArray
     axes: FloatArray
 
 
@@ -132,11 +135,11 @@ def build_cells(
     owner, other = _divided(np.asarray(owner).reshape(-1), points, upright[face], areas)
     cells = len(other)
     area, centre, normal = _means(owner, cells, points, upright[face], areas)
-    spread = np.zeros((cells, 2))
+    growths = np.zeros((cells, 2))
     if normals is not None:
         growth = _growth(vertices[faces], normals[solid], upright)[face] * areas[:, None]
-        spread = np.stack([np.bincount(owner, each, cells) for each in growth.T], axis=1)
-        spread /= np.maximum(area, 1e-30)[:, None]
+        growths = np.stack([np.bincount(owner, each, cells) for each in growth.T], axis=1)
+        growths /= np.maximum(area, 1e-30)[:, None]
     index = _index(used, counts)
 
     lower3, counts3 = mi.Point3f(*lower.tolist()), mi.Vector3u(*counts.tolist())
@@ -156,13 +159,13 @@ def build_cells(
         centres=centre,
         normals=normal,
         areas=area,
-        spread=spread,
+        offset_growth=growths,
         axes=_frame(normal.sum(axis=0)),
     )
 
 
 def _growth(corners: FloatArray, normals: FloatArray, upright: FloatArray) -> FloatArray:
-    """Return the coefficients of the areas of offset faces (m, 2), as `SurfaceCells.spread`.
+    """Return the coefficients (m, 2) of `SurfaceCells.offset_growth` for each face.
 
     Args:
         corners: (m, 3, 3) corners, mm.
@@ -261,8 +264,8 @@ def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uin
     numbers[used] = np.arange(len(used)) + 1
     grid = numbers.reshape(counts[::-1])
     distance, nearest = distance_transform_edt(grid == 0, return_indices=True)
-    spread = grid[tuple(nearest)]
-    return np.asarray(np.where(distance <= SEARCH_CELLS, spread, 0).ravel(), dtype=np.uint32)
+    near = np.where(distance <= SEARCH_CELLS, grid[tuple(nearest)], 0)
+    return np.asarray(near.ravel(), dtype=np.uint32)
 
 
 def _frame(z: FloatArray) -> FloatArray:

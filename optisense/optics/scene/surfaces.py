@@ -7,7 +7,7 @@ from enum import IntEnum
 
 RAY_OFFSET = 2e-4
 """Distance (mm) off a surface at which rays start: a hundred times the rounding of 30 mm in single
-precision, a hundredth of the thinnest film that a design holds (0.02 mm)."""
+precision (2e-6 mm), a hundredth of the thinnest film that a design holds (0.02 mm)."""
 
 
 class SurfaceKind(IntEnum):

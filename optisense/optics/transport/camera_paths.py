@@ -70,6 +70,13 @@ def follow(
 ) -> tuple[PathEnd, Ray, mi.Color3f]:
     """Follow paths to their ends.
 
+    Args:
+        scene: the surfaces.
+        ray: the rays that the paths begin with.
+        weight: factor (3, n) on the radiance at the paths' beginnings.
+        rng: a random generator for each path.
+        path: the kind of the rays, `Path.CAMERA` or `Path.REFLECTION`.
+
     Returns:
         The ends; and for each path from the camera one of its reflections at interfaces, drawn in
         proportion to its weight, and the sum of their weights.
@@ -123,7 +130,8 @@ def follow(
 
 
 MAX_PIXEL_SAMPLES = 64
-"""Largest number of camera samples that are spread over a pixel together."""
+"""Largest number of camera samples that are spread over a pixel together: more than the samples of
+any pixel in practice, and few enough that the table of lattices is built at once."""
 
 
 def film_samples(
@@ -169,10 +177,21 @@ def find_visible_points(
 ) -> tuple[VisiblePoints, VisiblePoints | None]:
     """Return the main and the reflected visible points of film positions.
 
-    There are fewer reflected points than main ones, and they may be None, as with ``only_main``.
-    With a ``channel`` the paths carry light of that channel only. Random numbers depend on pixel,
-    ``number`` of the sample and seed alone, so that a path does not depend on the others that are
-    traced with it.
+    Random numbers depend on pixel, number of the sample and seed alone, so that a path does not
+    depend on the others that are traced with it.
+
+    Args:
+        scene: the surfaces.
+        camera: the camera.
+        pixel: number (n,) of the pixel of each sample.
+        number: number (n,) of each sample in its pixel.
+        film: film positions (2, n), pixels.
+        seed: seed of the random numbers.
+        only_main: whether the reflected points are left out.
+        channel: channel of the light that the paths carry, 0 to 2; None for all channels.
+
+    Returns:
+        The main points (n,); and the reflected points, fewer than n, or None if there are none.
     """
     dr.make_opaque(number)  # one kernel for all numbers
     stream = mi.sample_tea_32(number, dr.opaque(mi.UInt32, seed))[0]
@@ -206,9 +225,8 @@ def find_visible_points(
     if dr.width(kept) == 0:
         return main, None
     alone = dr.width(kept) == 1
-    if (
-        alone
-    ):  # Dr.Jit compiles other kernels for arrays of one entry: append an entry without weight
+    # Dr.Jit compiles other kernels for arrays of one entry, so an entry without weight is appended.
+    if alone:
         kept = dr.repeat(kept, 2)
     pixel = dr.gather(mi.UInt32, pixel, lanes)
     found = VisiblePoints(**vars(end), pixel=pixel, random=other, series=series, number=number)
@@ -222,7 +240,9 @@ def find_visible_points(
 
 
 def generator(bits: mi.UInt32) -> mi.PCG32:
-    """Return random generators that depend on the given bits and not on the place in an array."""
+    """Return random generators (n,) that depend on the given bits (n,) and not on the place in the
+    array.
+    """
     random = mi.PCG32()
     random.seed(mi.UInt64(bits), mi.UInt64(bits))
     return random

@@ -22,7 +22,6 @@ HASH_FACTOR = 0x9E3779B1
 """Multiplier that mixes the patches of a ray's path into one number: 2^32 over the golden ratio,
 as in Knuth's multiplicative hashing."""
 
-
 MIRROR_BITS = 32
 """Number of bits that record the mirrors a ray has met: the bits of an unsigned integer of the
 kernel. Mirrors whose surface numbers differ by a multiple of it share a bit."""

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from optisense.optics.backend.arrays import floats
 
 GUIDE_CELLS = 16
-"""Number of cells along each side of a light's table over the unit square of its emission
-angles."""
+"""Number of cells along each side of a light's table over the unit square of its emission angles.
+With 16, the 300,000 photons of a pilot pass put some 25 (GelSight360) to 400 (DIGIT) into each
+cell, whose counts are then known to 20 % or better."""
 MIN_DENSITY = 0.15
 """Lower bound on the sampling density, relative to the uniform one. No angle is left out, so the
-estimate stays unbiased, and no photon weighs more than 1 / 0.15."""
+estimate stays unbiased, and no photon weighs more than 1 / 0.15 = 6.7."""
 
 
 @dataclass
@@ -85,8 +86,16 @@ def _invert(
 def warp(
     guide: EmissionGuide, light: mi.UInt32, sample: mi.Point2f
 ) -> tuple[mi.Point2f, mi.Float, mi.UInt32]:
-    """Return the sample warped by the guide, its weight (1 / density), and the number of its
-    cell.
+    """Warp samples so that they have the density of a guide.
+
+    Args:
+        guide: the guide.
+        light: number (n,) of the light.
+        sample: points of the unit square.
+
+    Returns:
+        The warped points (2, n); their weight (n,), 1 over the density; and the number (n,) of
+        their cell in the light's table.
     """
     row, y, dy = _invert(guide.rows, light * (GUIDE_CELLS + 1), sample.x)
     column, x, dx = _invert(

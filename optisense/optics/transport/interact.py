@@ -106,7 +106,7 @@ class Interaction:
         reflection: the reflected lobe of a smooth interface through which the ray continues; of
             weight 0 elsewhere.
         absorption: the absorption coefficient (1/mm) of the medium that the ray came through; None
-            where nothing absorbs.
+            in a scene without absorption.
         transmittance: the share of the light that the medium leaves on the way to the surface, per
             channel. No weight of a lobe includes it.
         ray: the ray that continues. Where none does, it is unchanged but inactive; it is also

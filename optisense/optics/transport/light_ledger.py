@@ -27,10 +27,12 @@ from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import Emission, TargetCells, launch
 
 PASS_PHOTONS = 1_000_000
-"""Number of photons of one pass; progress is reported and Ctrl-C obeyed between passes."""
+"""Number of photons of one pass; progress is reported and Ctrl-C obeyed between passes, which take
+about a second each."""
 
 BATCHES = 16
-"""Number of independent parts of the photons; their spread gives the noise of the sums."""
+"""Number of independent parts of the photons, whose standard deviation gives the noise of the sums.
+With 16, the estimate of the noise is itself known to 18 % (1 / sqrt(2 * 15))."""
 
 
 class Fate(IntEnum):

@@ -8,12 +8,13 @@ import drjit as dr
 import mitsuba as mi
 
 GROUP_MASK = 0xFF
-"""Mask of the bits of a photon's record that hold its light group."""
+"""Mask of the bits of a photon's record that hold its light group: the lowest eight."""
 HALF_SHIFT = 8
-"""Position of the bit that is set for photons of odd number. The difference between the two halves
-gives the noise."""
+"""Position of the bit that is set for photons of odd number, next to the light group. The
+difference between the two halves gives the noise."""
 SURFACE_SHIFT = 9
-"""Position of the first bit of the number of the surface that a photon landed on."""
+"""Position of the first bit of the number of the surface that a photon landed on; the record's
+other 23 bits hold it."""
 
 
 @dataclass

@@ -27,7 +27,8 @@ from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import Emission, TargetCells, launch
 
 ESCAPE_LENGTH = 4.0
-"""Length (mm) of the last segment of a photon that escapes."""
+"""Length (mm) of the last segment of a photon that escapes, in a drawing: enough to show its
+direction beside a sensor of some 20 mm."""
 
 POINTS = MAX_DEPTH + 2
 """Largest number of points of a path: the light, the surfaces, and the photon's end."""

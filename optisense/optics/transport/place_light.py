@@ -26,10 +26,12 @@ from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, Flight, TargetCells, launch
 
 TILT_BINS, TURN_BINS = 9, 12
-"""Numbers of bins of the angle of incidence (10 degrees each) and of azimuth (30 degrees each)."""
+"""Numbers of bins of the angle of incidence (10 degrees each) and of azimuth (30 degrees each), as
+fine as a chart of directions shows them."""
 
 BATCHES = 16
-"""Number of independent parts of the photons; their spread gives the noise."""
+"""Number of independent parts of the photons, whose standard deviation gives the noise. With 16,
+the estimate of the noise is itself known to 18 % (1 / sqrt(2 * 15))."""
 
 
 class LightWay(IntEnum):

@@ -30,17 +30,17 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 HALVINGS = 11
-"""Bisections of the gap between two pixels: boundaries are found to 1/2048 of a pixel, which on a
-sensor is about the rounding of single-precision points."""
+"""Number of bisections of the gap between two pixels. With 11, boundaries are found to 1/2048 of a
+pixel, which on a sensor is about the rounding of single-precision points."""
 
 NEAR = 8.0
 """Largest distance between an edge and the nearer hit of two rays at which the edge counts as the
 cause that separates them, in units of the rays' distance there. It is more than 1 as rays may meet
-the edge at a slant."""
+the edge at a slant: at a grazing angle of 7 degrees, distances are 8 times as long."""
 
 ROUNDING = 1e-4
 """Distance (mm) by which single-precision rays may miss an edge that they pass, some 50 mm from the
-camera."""
+camera, where one step of a coordinate is 4e-6 mm."""
 
 
 class Discontinuity(IntEnum):
@@ -112,7 +112,13 @@ class PathVertex:
 
 
 def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[PathVertex]:
-    """Return all surfaces that rays meet one after the other, without derivatives."""
+    """Return all surfaces that rays meet one after the other, without derivatives.
+
+    Args:
+        scene: the surfaces.
+        origin: origins (3, n), mm.
+        direction: unit directions (3, n).
+    """
     stops = []
     active = dr.full(mi.Bool, True, dr.width(direction))
     ray = Ray(dr.detach(origin), dr.detach(direction), active)

@@ -21,7 +21,8 @@ from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 LAYER_HEIGHT = 1.0
 """Height (mm) of the layer; presses are usually less deep."""
 MAX_SEGMENT_LENGTH = 50.0
-"""Length (mm) at which a path segment that meets nothing is cut off."""
+"""Length (mm) at which a path segment that meets nothing is cut off: twice the size of a sensor,
+so that it has left the layer."""
 SAMPLES_PER_SEGMENT = 4
 """Number of pieces of a path segment; one random place of each is tested for lying in the layer."""
 GOLDEN_RATIO_FRACTION = 0.618034
@@ -31,7 +32,8 @@ TAIL_HEIGHTS = 1.5
 """Height above the surface, in units of `LAYER_HEIGHT`, at which the last part of a landing
 photon's path begins. Half of the pieces divide this part."""
 MIN_COSINE = 1e-3
-"""Lower bound on the cosine of incidence when the length of that last part is computed."""
+"""Lower bound on the cosine of incidence when the length of that last part is computed; it avoids
+a division by zero, and the part is at most half of the segment in any case."""
 
 
 @dataclass
@@ -52,8 +54,8 @@ def flux_layer_above(cells: SurfaceCells) -> FluxLayer:
 def layer_cell_at(
     flux_layer: FluxLayer, point: mi.Point3f, active: mi.Bool
 ) -> tuple[mi.UInt32, mi.Float, mi.Bool]:
-    """Return the cell that each point lies above, its height (mm), and whether it is in the
-    layer.
+    """Return the number (n,) of the cell that each point lies above, its height (n,), mm, above the
+    cell's plane, and whether it is in the layer (n,).
     """
     cells = flux_layer.cells
     near, found = cell_at(cells, point, active)
@@ -78,7 +80,7 @@ def sample_segment(
     piece: mi.UInt32,
     landing: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Float, mi.Bool]:
-    """Return a random place on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
+    """Return a random place (3, n) on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
 
     Half of the pieces belong to the segment's end, where the light of a ``landing`` segment is near
     the surface.
