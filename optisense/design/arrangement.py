@@ -14,7 +14,7 @@ from optisense.design.projection import directions, picture_places
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import common_space
-from optisense.geometry.meeting import CONTACT
+from optisense.geometry.overlaps import CONTACT
 
 EQUAL_INDEX = 1e-6
 """Largest difference of refractive indices for which solids count as one medium; it covers rounding

@@ -16,7 +16,13 @@ from optisense.geometry.cage import cage_points, cage_weights
 from optisense.geometry.coarseness import chord_error
 from optisense.geometry.containment import inside
 from optisense.geometry.folds import find_fold
-from optisense.geometry.meeting import CONTACT, find_meeting, near_surface, resting_on, touching
+from optisense.geometry.overlaps import (
+    CONTACT,
+    find_overlap,
+    near_surface,
+    touching,
+    touching_vertices,
+)
 
 AT_REST = 1e-9
 """Largest displacement of a control point that counts as rest, mm; a margin for rounding."""
@@ -105,7 +111,7 @@ def contact_problems(design: SensorDesign) -> list[Diagnostic]:
                 solids = all(
                     design.parts[each].role in TRANSPARENT_SOLIDS for each in (name, other)
                 )
-                if solids or len(resting_on(design.meshes[name], design.meshes[other])):
+                if solids or len(touching_vertices(design.meshes[name], design.meshes[other])):
                     problems += _meetings(design, cage_name, name, other, bent)
     return problems
 
@@ -142,7 +148,7 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
 def _coats(surface: TriangleMesh, solid: TriangleMesh) -> bool:
     """Return whether a surface lies on a solid with whole faces, not with its rim alone."""
     rests = np.zeros(len(surface.vertices), dtype=bool)
-    rests[resting_on(surface, solid)] = True
+    rests[touching_vertices(surface, solid)] = True
     flat = rests[surface.faces].any(axis=1)
     middles = surface.triangles[flat].mean(axis=1)
     return bool(np.isfinite(near_surface(middles, solid)).any())
@@ -219,10 +225,10 @@ def _meetings(
     if Role.INDENTER in (design.parts[name].role, design.parts[other].role):
         return []
     overlap = _overlap(design, name, other)
-    meeting = find_meeting(bent[name], bent[other])
+    meeting = find_overlap(bent[name], bent[other])
     if meeting is None:
         return _partings(design, cage_name, name, other, bent, overlap)
-    if overlap == "yes" or find_meeting(design.meshes[name], design.meshes[other]) is not None:
+    if overlap == "yes" or find_overlap(design.meshes[name], design.meshes[other]) is not None:
         return []  # equal indices, or an overlap at rest, which is intended
     distance = np.linalg.norm(bent[name].vertices - meeting.place, axis=1)
     mover = _mover(design, cage_name, name, int(np.argmin(distance)))
@@ -245,7 +251,7 @@ def _partings(
     """
     mesh, rest = design.meshes[name], design.meshes[other]
     change = np.linalg.norm(bent[name].vertices - mesh.vertices, axis=1)
-    rows = resting_on(mesh, rest)
+    rows = touching_vertices(mesh, rest)
     if bent[other] is rest:
         rows = rows[change[rows] > CONTACT]
     off = rows[np.isinf(touching(bent[name], rows, bent[other]))]

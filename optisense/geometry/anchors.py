@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 _SAME = 1e-9
-"""Distance (mm) within which a point coincides with a vertex; a margin for rounding."""
+"""Distance (mm) within which a point coincides with a vertex. It is far above the rounding of
+coordinates in double precision (1e-14 mm)."""
 _NEAREST, _LARGEST = 64, 256
 """Numbers of faces that are tested for each point: those with the nearest centres, and the largest
-of all, whose centres may be far from points on them."""
+of all, whose centres may be far from points on them. A vertex of a mesh has six faces on average,
+and parts have few large faces."""
 _SLACK = 1e-4
-"""Barycentric weight below which a corner of a face may be left out; a margin for rounding."""
+"""Barycentric weight by which a point may lie outside a face: 1e-4 of the face's size, for
+rounding."""
 
 
 @dataclass(frozen=True)

@@ -10,20 +10,24 @@ from numpy.typing import NDArray
 from optisense.geometry.mesh import FloatArray
 
 _GROUP = 4
-"""Number of boxes of one level that a box of the next level encloses."""
+"""Number of boxes of one level that a box of the next level encloses: each pair of boxes that
+overlap gives 16 pairs of the level below, which NumPy tests at once."""
 
 _FEW = 64
-"""Number of boxes up to which a level is the last one."""
+"""Number of boxes up to which a level is the last one: the 4,096 pairs of two such levels are
+compared directly."""
 
 _AT_ONCE = 100_000
-"""Number of pairs of boxes that are processed together, which bounds the memory of the arrays."""
+"""Number of pairs of boxes that are processed together, which bounds the memory of the arrays to
+some 80 MB."""
 
 _DENSE = 1_000_000
-"""Number of pairs up to which all are compared directly, which is faster than grouping them."""
+"""Number of pairs up to which all are compared directly, which takes some milliseconds and is
+faster than grouping them."""
 
 _BLOCK = 64
-"""Number of consecutive boxes that are first tested together, as they mostly lie close to one
-another."""
+"""Number of consecutive boxes that are first tested together. Consecutive faces of a mesh mostly
+lie close to one another, so that most blocks are ruled out at once."""
 
 _SPREADING = (
     (32, 0x001F00000000FFFF), (16, 0x001F0000FF0000FF), (8, 0x100F00F00F00F00F),
@@ -46,7 +50,7 @@ class _Boxes(NamedTuple):
     levels: list[tuple[FloatArray, FloatArray]]
 
 
-def meeting_boxes(
+def overlapping_boxes(
     low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
 ) -> tuple[IntArray, IntArray]:
     """Return the pairs of boxes of two sets that overlap or touch, in no particular order.
@@ -67,9 +71,14 @@ def meeting_boxes(
     return kept_1[one], kept_2[other]
 
 
-def meeting_each_other(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return the pairs of boxes of one set that overlap or touch; each pair once, the smaller
-    number first.
+def overlapping_pairs(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return the pairs of boxes of one set that overlap or touch; each pair once.
+
+    Args:
+        low, high: (n, 3) lower and upper corners.
+
+    Returns:
+        The smaller (p,) and the larger number (p,) of each pair.
     """
     if len(low) ** 2 <= _DENSE:
         one, other = np.nonzero(np.triu(_all_meeting(low, high, low, high), k=1))

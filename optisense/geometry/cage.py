@@ -26,14 +26,16 @@ FloatArray = NDArray[np.float64]
 Resolution = tuple[int, int, int]
 
 OUTSIDE_TOLERANCE = 1e-6
-"""Largest distance (mm) of a vertex outside the box, which allows for rounding in a mesh file."""
+"""Largest distance (mm) of a vertex outside the box: the rounding of coordinates in a mesh file of
+single precision (2e-6 mm at 30 mm), and a distance that no part shows."""
 
 MOST_KEPT_WEIGHTS = 4_000_000
-"""Number of weights (vertices times control points) above which they are computed again instead of
-being kept (32 MB)."""
+"""Number of weights (vertices times control points) of a mesh above which they are computed again
+instead of being kept: 32 MB, as for a mesh of 25,000 vertices in a cage of 160 points."""
 
 KEPT_WEIGHTS = 32_000_000
-"""Total number of weights that are kept (256 MB); the least recently used are dropped first."""
+"""Total number of weights that are kept (256 MB), those of eight such meshes; the least recently
+used are dropped first."""
 
 _VALUES_AT_ONCE = 4_000_000
 """Number of products of basis functions that are computed together, which bounds the memory of the
@@ -76,7 +78,7 @@ def cage_weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) ->
         DesignError: a vertex lies outside the box, where the polynomials grow without bound.
     """
     along = [
-        bernstein(t, n) for t, n in zip(shares(vertices, box).T, resolution, strict=True)
+        bernstein(t, n) for t, n in zip(box_coordinates(vertices, box).T, resolution, strict=True)
     ]  # fmt: skip
     product = np.einsum("ni,nj,nk->nijk", *along, optimize=True)
     return product.reshape(len(product), -1)
@@ -128,13 +130,23 @@ def _bent(
 ) -> TriangleMesh:
     if len(mesh.vertices) * len(controls) <= MOST_KEPT_WEIGHTS:
         return mesh.with_vertices(deform(kept_weights(mesh, box, resolution), controls))
-    share = shares(mesh.vertices, box)
+    share = box_coordinates(mesh.vertices, box)
     bases = [bernstein(share[:, k], resolution[k]) for k in range(3)]
     return mesh.with_vertices(contract(bases, controls, resolution))
 
 
 def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """Return the read-only `cage_weights` of a mesh's vertices, cached by their content."""
+    """Return the read-only `cage_weights` (n, nx * ny * nz) of a mesh's n vertices, cached by their
+    content.
+
+    Args:
+        mesh: the mesh at rest, mm.
+        box: (2, 3) lower and upper corner, mm.
+        resolution: number of points along x, y, z.
+
+    Raises:
+        DesignError: a vertex lies outside the box.
+    """
     with _lock:
         digest = _digests.get(mesh)
     if digest is None:
@@ -155,7 +167,7 @@ def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> 
     return weights
 
 
-def shares(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
+def box_coordinates(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
     """Return the relative positions (n, 3) of vertices (n, 3), mm, in the box (2, 3), mm, 0 to 1
     along each axis.
 
@@ -174,7 +186,7 @@ def shares(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
             where="box from ({:.3f}, {:.3f}, {:.3f}) to ({:.3f}, {:.3f}, {:.3f}) mm".format(
                 *lower, *upper
             ),
-            hint="let the box enclose every part that the cage deforms",
+            hint="Let the box enclose every part that the cage deforms",
         )
     return ((points - lower) / (upper - lower)).clip(0.0, 1.0)
 

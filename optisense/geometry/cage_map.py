@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from optisense.geometry.cage import FloatArray, Resolution, bernstein, contract, shares
+from optisense.geometry.cage import FloatArray, Resolution, bernstein, box_coordinates, contract
 
 MOST_COMBINATIONS = 100_000
-"""Largest number of combinations of differences that are tested; with more, the result is
-unknown."""
+"""Largest number of combinations of differences that are tested, which take some milliseconds; with
+more, the result is unknown, and slower tests decide."""
 
 
 def jacobians(
@@ -32,7 +32,7 @@ def jacobians(
     Raises:
         DesignError: a vertex lies outside the box.
     """
-    share = shares(vertices, box)
+    share = box_coordinates(vertices, box)
     lower, upper = np.asarray(box, dtype=np.float64)
     lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
     result = np.empty((len(share), 3, 3))
@@ -112,7 +112,10 @@ def refined_points(points: ArrayLike, resolution: Resolution, finer: Resolution)
     lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
     for axis in range(3):
         if finer[axis] < resolution[axis]:
-            raise ValueError(f"{finer[axis]} points along axis {axis} are fewer than there are")
+            raise ValueError(
+                f"the finer lattice has {finer[axis]} points along axis {axis}, and the given one "
+                f"{resolution[axis]}"
+            )
         lattice = np.moveaxis(lattice, axis, 0)
         while len(lattice) < finer[axis]:
             count = len(lattice)

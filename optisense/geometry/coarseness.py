@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.geometry.cage import FloatArray, Resolution, cage_weights, deform
 from optisense.geometry.mesh import TriangleMesh
 
-LOOKED_AT = 64
-"""Number of edges whose deviation is measured: the longest ones of a mesh, which deviate most."""
+LONGEST_EDGES = 64
+"""Number of edges whose deviation is measured: the longest ones of a mesh, as the deviation grows
+as the square of the length."""
 
 _longest: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int32]] = weakref.WeakKeyDictionary()
 
@@ -43,7 +44,9 @@ def chord_error(
     Args:
         mesh: the mesh at rest, mm, with faces.
         bent: the same mesh, bent.
-        box, resolution, points: box, resolution and control points of the cage.
+        box: (2, 3) lower and upper corner of the cage, mm.
+        resolution: number of its points along x, y, z.
+        points: (nx * ny * nz, 3) its control points, mm.
     """
     edges = _longest.get(mesh)
     if edges is None:
@@ -58,5 +61,5 @@ def chord_error(
 def _longest_edges(mesh: TriangleMesh) -> NDArray[np.int32]:
     ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     squares = ((mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]]) ** 2).sum(axis=1)
-    count = min(LOOKED_AT, len(ends))
+    count = min(LONGEST_EDGES, len(ends))
     return np.asarray(ends[np.argpartition(-squares, count - 1)[:count]])

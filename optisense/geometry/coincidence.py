@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from optisense.geometry.box_pairs import meeting_boxes
+from optisense.geometry.box_pairs import overlapping_boxes
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))
@@ -22,10 +22,11 @@ PARALLEL = float(np.cos(np.radians(10.0)))
 of one curved surface differ by a few degrees at most."""
 
 _GRID = 1e-7
-"""Grid in mm to which cut polygons are rounded, so that neighbouring cuts close; far below any
-dimension of a part."""
+"""Side (mm) of the grid to which cut polygons are rounded, so that neighbouring cuts close: far
+below any dimension of a part, and far above the rounding of double precision."""
 _THINNEST = 1e-4
-"""Thickness (mm) below which the remainder of a face counts as rounding."""
+"""Thickness (mm) below which the remainder of a face counts as rounding: a thousand cells of the
+grid, and a twentieth of the distance below which faces touch."""
 
 Pairs = NDArray[np.int64]
 
@@ -136,6 +137,7 @@ class _Remainder:
         self.partial: dict[int, Any] = {}  # face -> shapely polygon in the face's frame
 
     def take(self, overlay: Overlay) -> TriangleMesh:
+        """Cut the patches of an overlay out of the remainder, and return them."""
         pairs = overlay.pairs
         pairs = pairs[self.whole[pairs[:, 0]] | np.isin(pairs[:, 0], list(self.partial))]
         frames = _Frames.of(self.mesh, pairs[:, 0])
@@ -164,6 +166,7 @@ class _Remainder:
         return _assembled(self.mesh, np.array(taken_whole, dtype=np.int64), taken)
 
     def rest(self) -> TriangleMesh:
+        """Return what remains."""
         return _assembled(self.mesh, np.flatnonzero(self.whole), self.partial)
 
 
@@ -177,6 +180,7 @@ class _Frames:
 
     @staticmethod
     def of(mesh: TriangleMesh, faces: NDArray[np.int64]) -> _Frames:
+        """Return the frames of the given faces (k,) of a mesh."""
         corners = mesh.triangles[faces]
         x = corners[:, 1] - corners[:, 0]
         x = x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300)
@@ -186,10 +190,11 @@ class _Frames:
         return _Frames(frames.origin, axes, frames.flat(corners)[:, :, :2])
 
     def flat(self, points: FloatArray) -> FloatArray:
-        """Transform points (k, c, 3) to (x, y, height) in the frame of each face."""
+        """Return points (k, c, 3) as (x, y, height) in the frame of each face, mm."""
         return (points - self.origin[:, None]) @ self.axes.transpose(0, 2, 1)
 
     def take(self, which: NDArray[Any]) -> _Frames:
+        """Return the frames that a mask or indices select."""
         return _Frames(self.origin[which], self.axes[which], self.corners[which])
 
 
@@ -234,7 +239,7 @@ def _near_pairs(
         return np.zeros((0, 2), dtype=np.int64)
     low_1, high_1 = (corner[kept_1] for corner in first.face_bounds)
     low_2, high_2 = (corner[kept_2] for corner in second.face_bounds)
-    one, other = meeting_boxes(low_1, high_1, low_2 - tolerance, high_2 + tolerance)
+    one, other = overlapping_boxes(low_1, high_1, low_2 - tolerance, high_2 + tolerance)
     return np.column_stack([kept_1[one], kept_2[other]])
 
 

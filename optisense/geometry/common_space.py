@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from optisense.geometry.meeting import find_meeting
 from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.overlaps import find_overlap
 
 Places = weakref.WeakKeyDictionary[TriangleMesh, FloatArray | None]
 
@@ -36,7 +36,7 @@ def common_space(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> 
 
 
 def _found(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> FloatArray | None:
-    if find_meeting(first, second) is None:
+    if find_overlap(first, second) is None:
         return None
     return thick_place(as_manifold(first) ^ as_manifold(second), thinnest)
 
@@ -59,8 +59,8 @@ def thick_place(common: Any, thinnest: float) -> FloatArray | None:
 
 
 def as_manifold(mesh: TriangleMesh) -> Any:
-    """Convert a mesh to manifold3d; a mesh that is not a valid volume gives an empty object with a
-    status.
+    """Return a mesh as a manifold3d object; a mesh that is not a valid volume gives an empty object
+    with a status.
     """
     import manifold3d
 

@@ -16,14 +16,16 @@ from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
 
 REACH_MARGIN = 0.5
-"""Height (mm) above the reach of the contact up to which an indenter is modelled."""
+"""Height (mm) above the undeformed surface up to which an indenter is modelled beyond its contact,
+so that it also occludes light that passes above the skin beside it."""
 
 LEAST_FORCE, MOST_FORCE = 1e-6, 1e6
 """Smallest and largest force (N) that can be given. The lower is the weight of a grain of sand, the
 upper that of a hundred tons; a gel takes some ten."""
 
 ON_SURFACE = 0.5
-"""Largest distance (mm) from the sensing surface of a contact point given as x, y, z."""
+"""Largest distance (mm) from the sensing surface of a contact point given as x, y, z: points picked
+on another tessellation of a curved surface are nearer, and a mistyped number is farther."""
 
 
 @dataclass(frozen=True)
@@ -61,35 +63,41 @@ class Contact:
 
     def __post_init__(self) -> None:
         if self.at is not None and self.point is not None:
-            raise ContactError("a contact has both `at` and `point`", hint="give one of them")
+            raise ContactError("a contact has both `at` and `point`", hint="Give one of them")
         for values, count in ((self.at, 2), (self.point, 3)):
             if values is not None and (
                 len(values) != count or not all(math.isfinite(value) for value in values)
             ):
                 raise ContactError(
                     f"a contact place needs {count} finite numbers, not {values}",
-                    hint="give `at` as (u, v) or `point` as (x, y, z), in mm",
+                    hint="Give `at` as (u, v) or `point` as (x, y, z), in mm",
                 )
         if not (math.isfinite(self.depth) and self.depth > 0.0):
             raise ContactError(
-                f"the depth of a contact is {self.depth:g}", hint="give a depth above 0, in mm"
+                f"the depth of a contact is {self.depth:g}", hint="Give a depth above 0, in mm"
             )
         if self.force is not None and not LEAST_FORCE <= self.force <= MOST_FORCE:
             raise ContactError(
                 f"the force of a contact is {self.force:g}",
-                hint=f"give a force above 0, in N, from {LEAST_FORCE:g} to {MOST_FORCE:g}",
+                hint=f"Give a force above 0, in N, from {LEAST_FORCE:g} to {MOST_FORCE:g}",
             )
         if len(self.shift) != 2 or not all(map(math.isfinite, (*self.shift, self.twist))):
             raise ContactError(
                 f"the shift of a contact is {self.shift} and its twist {self.twist:g}",
-                hint="give `shift` as two numbers in mm and `twist` in degrees",
+                hint="Give `shift` as two numbers in mm and `twist` in degrees",
             )
         if not math.isfinite(self.rotation):
-            raise ContactError("the rotation of a contact is not finite", hint="give degrees")
+            raise ContactError(
+                f"the rotation of a contact is {self.rotation:g}",
+                hint="Give a finite number of degrees",
+            )
         if self.along is not None and not (
             np.isfinite(self.along).all() and np.linalg.norm(self.along) > 0.0
         ):
-            raise ContactError("the direction of a contact is none", hint="give `along` as x, y, z")
+            raise ContactError(
+                f"the direction `along` of a contact is {self.along}",
+                hint="Give it as x, y, z, not all of them 0",
+            )
 
 
 def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
@@ -106,7 +114,7 @@ def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
         x, y, z = contact.point
         raise ContactError(
             f"the point ({x:g}, {y:g}, {z:g}) is {distance:.2f} mm away from the sensing surface",
-            hint="the nearest surface point is ({:.3f}, {:.3f}, {:.3f})".format(*place.point),
+            hint="The nearest surface point is ({:.3f}, {:.3f}, {:.3f})".format(*place.point),
         )
     return place
 
@@ -143,7 +151,7 @@ def place(
                 f"a contact is {contact.depth:g} mm deep, but the gel there is only "
                 f"{available:.2f} mm thick",
                 where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*spot.point),
-                hint="press less deep",
+                hint="Press less deep",
             )
     reach = contact.depth + surface.height_above(spot) + REACH_MARGIN
     pose = np.eye(4)
@@ -158,7 +166,11 @@ def place_on_gels(
     gels: Sequence[TriangleMesh],
     facet_error: float = FACET_ERROR,
 ) -> TriangleMesh:
-    """Place a contact, as in `place`, on the one of several elastomers that lies under it.
+    """Return the mesh of `place` for the one of several elastomers that lies under the contact.
+
+    Args:
+        contact, surface, facet_error: as in `place`.
+        gels: the elastomers, closed meshes; with none, the depth is not checked.
 
     Raises:
         ContactError: the error of `place` for the first elastomer.
@@ -192,7 +204,7 @@ def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> f
         raise ContactError(
             "there is no gel under a contact",
             where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*np.asarray(point, dtype=np.float64)),
-            hint="check that the sensing surface lies on the elastomer and its normals point in",
+            hint="Check that the sensing surface lies on the elastomer and its normals point in",
         )
     return float(hits.distance[leaving][0])
 

@@ -87,7 +87,7 @@ def _motion(words: list[str]) -> tuple[tuple[float, float], float]:
             twist = _numbers(value, "the twist", (1,))[0]
         else:
             raise ContactError(
-                f"'{word}' is no motion of a contact",
+                f"'{word}' is no motion of a contact that can be read",
                 hint="Write ;shift=U,V in mm or ;twist=DEGREES",
             )
     return shift, twist

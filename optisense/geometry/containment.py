@@ -7,13 +7,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
-WAY = np.array([0.3578, 0.2113, 0.9096])
-"""Direction of the test rays: not parallel to an axis, so that they meet few edges of symmetric
-meshes."""
+RAY_DIRECTION = np.array([0.3578, 0.2113, 0.9096])
+"""Direction of the test rays, nearly a unit vector: not parallel to an axis or a diagonal, so that
+they meet few edges of symmetric meshes."""
 
 NEAR_EDGE = 1e-9
 """Distance of a ray from an edge, as a share of the face's size, below which its result is not
-used."""
+used: far above the rounding of double precision (1e-16)."""
 
 
 def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
@@ -48,7 +48,7 @@ def _frame() -> FloatArray:
     """Return the axes (3, 3) as rows: two axes perpendicular to the rays, and the rays'
     direction.
     """
-    way = WAY / np.linalg.norm(WAY)
+    way = RAY_DIRECTION / np.linalg.norm(RAY_DIRECTION)
     across = np.cross(way, (1.0, 0.0, 0.0))
     across /= np.linalg.norm(across)
     return np.array([across, np.cross(way, across), way])

@@ -6,16 +6,18 @@ import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.geometry.linked import linked_groups
+from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import TriangleMesh
 
 SAME_DIRECTION = 1e-10
-"""Largest difference from 1 of the cosine between the normals of coplanar faces; a margin for
-rounding."""
+"""Largest difference from 1 of the cosine between the normals of coplanar faces. It corresponds to
+8e-4 degrees, the rounding of a small face's corners in single precision."""
 SAME_PLANE = 1e-6
-"""Distance in mm below which two parallel planes are one; a margin for rounding."""
+"""Distance (mm) below which two parallel planes are one: about the rounding of coordinates in
+single precision."""
 STRAIGHT = 1e-6
-"""Sine of the angle between the sides of a corner below which the outline is straight there."""
+"""Sine of the angle between the sides of a corner (6e-5 degrees) below which the outline is
+straight there, so that the corner is not needed."""
 
 Loop = list[int]
 
@@ -54,7 +56,7 @@ def _patches(mesh: TriangleMesh) -> NDArray[np.int64]:
     flat = (np.einsum("ij,ij->i", normals[one], normals[other]) > 1 - SAME_DIRECTION) & (
         np.abs(offsets[one] - offsets[other]) < SAME_PLANE
     )
-    return linked_groups(len(faces), one[flat], other[flat])
+    return connected_components(len(faces), one[flat], other[flat])
 
 
 def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.int64] | None:

@@ -7,14 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.geometry.box_pairs import meeting_boxes, meeting_each_other
+from optisense.geometry.box_pairs import overlapping_boxes, overlapping_pairs
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 TOUCH = 1e-4
-"""Depth (mm) up to which faces that reach through one another only touch."""
+"""Depth (mm) up to which faces that reach through one another only touch: above the rounding of
+mesh files, and a twentieth of the depth from which on parts overlap."""
 
 _PAIRS_AT_ONCE = 500_000
-"""Number of pairs of faces that are intersected together, which bounds the memory of the arrays."""
+"""Number of pairs of faces that are intersected together, which bounds the memory of the arrays to
+some 200 MB."""
 
 
 class Crossings(NamedTuple):
@@ -37,7 +39,7 @@ def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
         mesh: a mesh whose neighbours share vertices (see `TriangleMesh.welded`).
         limit: number of crossings after which the search ends; None finds all.
     """
-    one, other = meeting_each_other(*mesh.face_bounds)
+    one, other = overlapping_pairs(*mesh.face_bounds)
     solid = (mesh.face_areas[one] > 0.0) & (mesh.face_areas[other] > 0.0)
     return _crossings(mesh, mesh, one[solid], other[solid], limit)
 
@@ -55,8 +57,10 @@ def crossings(first: TriangleMesh, second: TriangleMesh, limit: int | None = Non
 def near_pairs(
     first: TriangleMesh, second: TriangleMesh
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the pairs of faces whose boxes overlap; faces without area are left out."""
-    one, other = meeting_boxes(*first.face_bounds, *second.face_bounds)
+    """Return the pairs of faces whose boxes overlap: the number (k,) of a face of the first mesh
+    and (k,) of the second. Faces without area are left out.
+    """
+    one, other = overlapping_boxes(*first.face_bounds, *second.face_bounds)
     solid = (first.face_areas[one] > 0.0) & (second.face_areas[other] > 0.0)
     return one[solid], other[solid]
 

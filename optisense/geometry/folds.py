@@ -15,7 +15,8 @@ from optisense.geometry.crossings import self_crossings
 from optisense.geometry.mesh import TriangleMesh
 
 COLLAPSED = 1e-6
-"""Share of its area at rest below which a face has collapsed."""
+"""Share of its area at rest below which a face has collapsed: its sides are then a thousandth of
+what they were, or its corners lie on one line."""
 
 _outlines: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int64]] = weakref.WeakKeyDictionary()
 
@@ -55,7 +56,9 @@ def find_fold(
     Args:
         mesh: the mesh at rest, mm.
         bent: the same mesh, bent.
-        box, resolution, points: box, resolution and control points of the cage.
+        box: (2, 3) lower and upper corner of the cage, mm.
+        resolution: number of its points along x, y, z.
+        points: (nx * ny * nz, 3) its control points, mm.
     """
     vanished = bent.face_areas <= COLLAPSED * mesh.face_areas
     vanished &= mesh.face_areas > 0.0

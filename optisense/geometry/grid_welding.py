@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 WELD_DISTANCE = 1e-6
-"""Distance (mm) below which vertices count as one when edges are compared."""
+"""Distance (mm) below which vertices count as one when edges are compared: about the rounding of
+coordinates in mesh files of single precision."""
 
 
 def welded(

@@ -190,7 +190,7 @@ class MeshIndenter(IndenterKind):
     def from_text(cls, text: str) -> MeshIndenter:
         """Read PATH or PATH,SCALE; the path may contain commas. See `IndenterKind.from_text`."""
         if not text:
-            raise ContactError("no mesh file is named", hint="write mesh:PATH@U,V:DEPTH")
+            raise ContactError("the indenter names no mesh file", hint="Write mesh:PATH@U,V:DEPTH")
         path, separator, scale = text.rpartition(",")
         if separator and path:
             try:
@@ -220,7 +220,10 @@ class MeshIndenter(IndenterKind):
         `IndenterKind.to_plain`.
         """
         if isinstance(self.source, TriangleMesh):
-            raise ContactError("an indenter that is a mesh in memory has no file to name")
+            raise ContactError(
+                "an indenter that is a mesh in memory cannot be written to a file",
+                hint="Save the mesh, and give the path of its file as the source",
+            )
         return {"kind": self.kind, "file": str(self.source), "scale": self.scale}
 
     @cached_property

@@ -18,7 +18,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 CREASE = 40.0
-"""Default angle (degrees) between faces above which an edge stays sharp in shading."""
+"""Default angle (degrees) between faces above which an edge stays sharp in shading: edges of
+machined parts are at 45 degrees and more, and facets of curved surfaces at a few degrees."""
 
 _BOX_SIDES = (  # (axis across the side, the two axes in it, which end of the axis)
     (2, 0, 1, 1), (2, 1, 0, 0), (0, 1, 2, 1), (0, 2, 1, 0), (1, 2, 0, 1), (1, 0, 2, 0),
@@ -53,7 +54,7 @@ class TriangleMesh:
             if len(normals) != len(vertices):
                 raise MeshError(
                     f"a mesh has {len(vertices)} vertices but {len(normals)} normals",
-                    hint="give one normal a vertex, or none",
+                    hint="Give one normal for each vertex, or none",
                 )
             object.__setattr__(self, "normals", normals)
 
@@ -72,7 +73,12 @@ class TriangleMesh:
     def box(
         lower: ArrayLike, upper: ArrayLike, divisions: tuple[int, int, int] = (1, 1, 1)
     ) -> TriangleMesh:
-        """A closed box from corner `lower` to corner `upper` (mm), each side cut into a grid."""
+        """Return a closed box, each side of which is divided into a grid.
+
+        Args:
+            lower, upper: (3,) corners of the box, mm.
+            divisions: number of cells along x, y and z.
+        """
         corners = np.array([lower, upper], dtype=np.float64)
         sides = []
         for across, first, second, end in _BOX_SIDES:
@@ -89,7 +95,13 @@ class TriangleMesh:
     def grid(
         size: tuple[float, float], divisions: tuple[int, int] = (1, 1), height: float = 0.0
     ) -> TriangleMesh:
-        """A flat rectangle `size` (x, y mm) around the z axis at z = `height`, facing +z."""
+        """Return a flat rectangle around the z axis whose normal is +z.
+
+        Args:
+            size: sides along x and y, mm.
+            divisions: number of cells along x and y.
+            height: z of the rectangle, mm.
+        """
         nx, ny = divisions
         x = np.linspace(-0.5, 0.5, nx + 1) * size[0]
         y = np.linspace(-0.5, 0.5, ny + 1) * size[1]
@@ -99,7 +111,7 @@ class TriangleMesh:
 
     @staticmethod
     def joined(meshes: list[TriangleMesh]) -> TriangleMesh:
-        """Join all meshes in one, without welding; normals are kept if every mesh has them."""
+        """Return all meshes as one, without welding; normals are kept if every mesh has them."""
         offsets = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes[:-1]])
         normals = [mesh.normals for mesh in meshes if mesh.normals is not None]
         return TriangleMesh(
@@ -197,7 +209,9 @@ class TriangleMesh:
     # ---- changing
 
     def transformed(self, matrix: ArrayLike) -> TriangleMesh:
-        """Apply a (4, 4) or (3, 3) affine matrix; a mirroring one also turns the faces over."""
+        """Return the mesh transformed by a (4, 4) or (3, 3) affine matrix, mm; a mirroring matrix
+        also turns the faces over.
+        """
         full = np.eye(4)
         given = np.asarray(matrix, dtype=np.float64)
         full[: given.shape[0], : given.shape[1]] = given
@@ -230,14 +244,15 @@ class TriangleMesh:
         return replace(self, faces=self.faces[:, ::-1], normals=normals)
 
     def welded(self, distance: float = WELD_DISTANCE) -> TriangleMesh:
-        """Merge vertices that agree to `distance` (mm) and drop faces that collapse.
+        """Return the mesh with vertices that agree to `distance` (mm) merged, and without faces
+        that collapse.
 
         Shading normals are dropped.
         """
         return TriangleMesh(*welded(self.vertices, self.faces, distance))
 
     def with_winding_from_normals(self) -> TriangleMesh:
-        """Reverse the faces whose normals are opposite to their shading normals."""
+        """Return the mesh with the faces reversed whose normals oppose their shading normals."""
         if self.normals is None:
             return self
         shading = self.normals[self.faces].sum(axis=1)
@@ -245,7 +260,8 @@ class TriangleMesh:
         return self.with_faces(np.where(wrong[:, None], self.faces[:, ::-1], self.faces))
 
     def vertex_normals(self, crease: float = CREASE) -> TriangleMesh:
-        """Add smooth shading normals, kept apart across edges sharper than `crease` degrees.
+        """Return the mesh with smooth shading normals, kept apart across edges sharper than
+        `crease` degrees.
 
         Vertices are split where their corners disagree; see `shading_normals`.
         """
@@ -273,8 +289,8 @@ def turn_about_x_and_y(angle_x: float, angle_y: float) -> NDArray[np.float64]:
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:
-    """Return two triangles per cell, (2 (rows-1) (columns-1), 3) int32, for vertices numbered row
-    by row.
+    """Return two triangles for each cell of a grid of vertices that are numbered row by row, as an
+    array (m, 3) int32 with m = 2 (rows - 1) (columns - 1).
 
     Face normals point along (row direction) x (column direction).
     """

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import MeshError
-from optisense.geometry.linked import linked_groups
+from optisense.geometry.connected import connected_components
 
 if TYPE_CHECKING:
     from optisense.geometry.mesh import TriangleMesh
@@ -23,24 +23,24 @@ def validate(mesh: TriangleMesh, name: str, closed: bool) -> TriangleMesh:
     """Check a mesh; see `TriangleMesh.validate`."""
     if len(mesh.faces) == 0:
         raise MeshError(
-            "the mesh has no triangles", where=f"part {name}", hint="check the mesh file"
+            "the mesh has no triangles", where=f"part {name}", hint="Check the mesh file"
         )
     bad = np.flatnonzero(~np.isfinite(mesh.vertices).all(axis=1))
     if len(bad):
         raise MeshError(
             f"{len(bad)} vertices are not finite numbers, the first is vertex {bad[0]}",
             where=f"part {name}",
-            hint="export the mesh again",
+            hint="Export the mesh again",
         )
     if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
         raise MeshError(
-            f"a face names a vertex that is not there (the mesh has {len(mesh.vertices)})",
+            f"a face names a vertex that does not exist (the mesh has {len(mesh.vertices)})",
             where=f"part {name}",
-            hint="export the mesh again",
+            hint="Export the mesh again",
         )
     if mesh.area <= 0.0:
         raise MeshError(
-            "all triangles have zero area", where=f"part {name}", hint="check the mesh file"
+            "all triangles have zero area", where=f"part {name}", hint="Check the mesh file"
         )
     return _closed_and_outward(mesh, name) if closed else mesh
 
@@ -59,14 +59,14 @@ def _closed_and_outward(mesh: TriangleMesh, name: str) -> TriangleMesh:
             f"the solid is not closed: {max(len(leaky), 1)} edges have no second face, "
             f"one of them near ({x:.3f}, {y:.3f}, {z:.3f}) mm",
             where=f"part {name}",
-            hint="fill the hole in your modelling program and export again",
+            hint="Fill the hole in your modelling program and export again",
         )
     size = float(np.ptp(mesh.bounds, axis=0).max())
     if abs(mesh.volume) <= LEAST_VOLUME * size**3:
         raise MeshError(
             "the solid encloses no volume: its faces lie upon one another, or in a plane",
             where=f"part {name}",
-            hint="export the solid again, with thickness",
+            hint="Export the solid again, with thickness",
         )
     return mesh if mesh.volume >= 0.0 else mesh.flipped()
 
@@ -123,7 +123,7 @@ def with_consistent_winding(mesh: TriangleMesh) -> TriangleMesh:
     turns = count * disagree
     starts = np.concatenate([one, one + count])
     ends = np.concatenate([other + turns, other + count - turns])
-    label = linked_groups(2 * count, starts, ends)
+    label = connected_components(2 * count, starts, ends)
     as_is, over = label[:count], label[count:]
     # The two halves of a shell are the same pair of labels; its first face stays as it is.
     _, leader, shell = np.unique(np.minimum(as_is, over), return_index=True, return_inverse=True)

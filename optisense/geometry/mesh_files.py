@@ -29,10 +29,12 @@ MOST_TRIANGLES = 1_000_000
 """Largest number of triangles of one file; the built-in sensors have at most 25,000 in a part."""
 
 MOST_TWICE = 1000
-"""Largest number of duplicate faces. Some programs write a few; rays meet each of them."""
+"""Largest number of duplicate faces in a file. Some programs write a few; rays meet each of them,
+so that more are an error of the export."""
 
 MOST_CORNERS = 10_000
-"""Largest number of corners of one face; CAD programs write faces of a few hundred."""
+"""Largest number of corners of one face in a file, so that a malformed one is not triangulated for
+minutes; CAD programs write faces of a few hundred."""
 
 
 class MeshArrays(NamedTuple):
@@ -50,13 +52,17 @@ class MeshArrays(NamedTuple):
 
 
 def read_mesh(path: Path) -> MeshArrays:
-    """Read the arrays of a mesh file; raises the errors of `TriangleMesh.load`."""
+    """Return the vertices (n, 3), faces (m, 3) and normals of a mesh file.
+
+    Raises:
+        MeshError: the file is missing, of another format, or malformed.
+    """
     suffix = path.suffix.lower()
     if suffix not in FORMATS:
         raise MeshError(
-            f"cannot read a mesh of type '{suffix or 'unknown'}'",
+            f"a mesh of type '{suffix or 'unknown'}' cannot be read",
             where=str(path),
-            hint="use one of " + ", ".join(FORMATS),
+            hint="Use one of " + ", ".join(FORMATS),
         )
     data = read_bytes(path, MOST_MESH, MeshError, "the mesh file")
     if suffix == ".obj":
@@ -69,7 +75,7 @@ def read_mesh(path: Path) -> MeshArrays:
     _refuse_many(len(mesh.faces), path)
     if len(mesh.faces) == 0:
         raise MeshError(
-            "the mesh file has no triangles", where=str(path), hint="export a surface, not points"
+            "the mesh file has no triangles", where=str(path), hint="Export a surface, not points"
         )
     far = np.abs(mesh.vertices).max(axis=1, initial=0.0)
     if (far[np.isfinite(far)] > FARTHEST).any():
@@ -77,14 +83,14 @@ def read_mesh(path: Path) -> MeshArrays:
         raise MeshError(
             f"vertex {number + 1} is {far[number]:g} away from the origin",
             where=str(path),
-            hint="check the unit of the file, or export it again",
+            hint="Check the unit of the file, or export it again",
         )
     twice = _faces_twice(mesh)
     if twice > MOST_TWICE:
         raise MeshError(
-            f"{twice:,} faces of the mesh are there more than once",
+            f"{twice:,} faces of the mesh occur more than once",
             where=str(path),
-            hint="merge duplicate faces in your modelling program and export again",
+            hint="Merge duplicate faces in your modelling program and export again",
         )
     return mesh
 
@@ -141,17 +147,17 @@ def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
             raise MeshError(
                 "the mesh file is cut off: it ends without 'endsolid'",
                 where=str(path),
-                hint="export or copy it again",
+                hint="Export or copy it again",
             )
         _refuse_many(data.count(b"endfacet"), path)
         return
     count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else 0
     if len(data) < 84 + 50 * count:
         raise MeshError(
-            f"the mesh file is cut off, or is no STL file: it says {count} triangles and has room "
-            f"for {max(len(data) - 84, 0) // 50}",
+            f"the mesh file is cut off, or is no STL file: it announces {count} triangles and has "
+            f"the length of {max(len(data) - 84, 0) // 50}",
             where=str(path),
-            hint="export or copy it again",
+            hint="Export or copy it again",
         )
     _refuse_many(count, path)
 
@@ -167,7 +173,7 @@ def _load_with_trimesh(data: bytes, path: Path, suffix: str) -> MeshArrays:
         faces = np.asarray(loaded.faces, dtype=np.int32).reshape(-1, 3)
     except Exception as error:  # trimesh raises many kinds on malformed files
         raise MeshError(
-            f"the mesh file is malformed: {error}", where=str(path), hint="export it again"
+            f"the mesh file is malformed: {error}", where=str(path), hint="Export it again"
         ) from error
     near = bool((np.abs(vertices) <= FARTHEST).all())  # others are refused, with their place
     if suffix == ".stl" and near:
@@ -250,7 +256,7 @@ def _parse_obj(data: bytes, path: Path) -> MeshArrays:
             raise MeshError(
                 f"malformed line '{line.strip()[:60]}': {error}",
                 where=f"{path}:{number}",
-                hint="export the mesh again",
+                hint="Export the mesh again",
             ) from error
     vertices = np.array(positions, dtype=np.float64).reshape(-1, 3)
     faces = _triangulated(polygons, vertices)
@@ -282,7 +288,7 @@ def _triangulated(polygons: list[list[int]], vertices: NDArray[np.float64]) -> N
         if max(polygon) >= len(vertices):
             raise MeshError(
                 f"a face names vertex {max(polygon) + 1}, but there are {len(vertices)}",
-                hint="export the mesh again",
+                hint="Export the mesh again",
             )
         if len(polygon) == 3:
             faces.append(polygon)

@@ -7,24 +7,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.geometry.linked import linked_groups
+from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 Faces = NDArray[np.int64]
 
 SHARP = 30.0
-"""Angle (degrees) between neighbouring faces above which they meet in a sharp edge."""
+"""Angle (degrees) between neighbouring faces above which they meet in a sharp edge: facets of a
+curved surface differ by some degrees, and the edges of machined parts by 45 degrees and more."""
 
 
 def faces_towards(mesh: TriangleMesh, direction: ArrayLike, within: float) -> Faces:
-    """Return the faces whose normals are within an angle (degrees) of a direction."""
+    """Return the numbers (k,) of the faces whose normals are within an angle (degrees) of a
+    direction (3,) of any length.
+    """
     way = np.asarray(direction, dtype=np.float64)
     cosine = mesh.face_normals @ (way / np.linalg.norm(way))
     return np.flatnonzero((cosine >= np.cos(np.radians(within)) - 1e-12) & (mesh.face_areas > 0))
 
 
 def angle_to_nearest(mesh: TriangleMesh, direction: ArrayLike) -> float:
-    """Return the angle (degrees) between a direction and the face normal nearest to it."""
+    """Return the angle (degrees) between a direction (3,) and the face normal nearest to it."""
     way = np.asarray(direction, dtype=np.float64)
     cosine = (mesh.face_normals @ (way / np.linalg.norm(way)))[mesh.face_areas > 0]
     return float(np.degrees(np.arccos(np.clip(cosine.max(), -1.0, 1.0))))
@@ -41,7 +44,7 @@ def smoothly_joined(mesh: TriangleMesh, start: Faces, sharp: float = SHARP) -> F
     one, other = neighbours(mesh)
     cosine = np.einsum("ij,ij->i", mesh.face_normals[one], mesh.face_normals[other])
     smooth = cosine >= np.cos(np.radians(sharp)) - 1e-12
-    label = linked_groups(len(mesh.faces), one[smooth], other[smooth])
+    label = connected_components(len(mesh.faces), one[smooth], other[smooth])
     return np.flatnonzero(np.isin(label, label[start]))
 
 
@@ -54,7 +57,7 @@ def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
     chosen = np.zeros(len(mesh.faces), dtype=bool)
     chosen[faces] = True
     both = chosen[one] & chosen[other]
-    label = linked_groups(len(mesh.faces), one[both], other[both])[faces]
+    label = connected_components(len(mesh.faces), one[both], other[both])[faces]
     groups = [faces[label == number] for number in np.unique(label)]
 
     def order(group: Faces) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from optisense.errors import ContactError
 FloatArray = NDArray[np.float64]
 
 _ROUNDS = 200
-"""Largest number of rounds of the clustering, which usually converges much sooner."""
+"""Largest number of rounds of the clustering, which usually converges in a tenth of them."""
 _STILL = 1e-4
 """Movement of the places in one round, relative to the size of the surface, below which the
 clustering has converged."""
@@ -38,7 +38,7 @@ def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[
     if len(seen) < 9:
         raise ContactError(
             f"only {len(seen)} points of the sensing surface are visible, nine are needed",
-            hint="check that the camera sees the sensing surface",
+            hint="Check that the camera sees the sensing surface",
         )
     where, share = where[seen], share[seen]
     where = where - np.average(where, axis=0, weights=share)

@@ -12,8 +12,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 MAX_PASSES = 40
-"""Number of passes after which refinement ends; each pass halves the area of the triangles that it
-cuts."""
+"""Number of passes after which refinement ends. Each pass halves the area of the triangles that it
+cuts, so that forty make their sides a million times shorter."""
 MOST_VERTICES = 2**31
 """Number above all numbers of vertices: two of them in one integer of 64 bits name an edge."""
 
@@ -77,7 +77,7 @@ class _Edges:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: IntArray) -> _Edges:
-        """Return the edges of a mesh."""
+        """Return the edges of a mesh of vertices (n, 3) and faces (m, 3)."""
         ends = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         key, edge = np.unique(ends[:, 0] * MOST_VERTICES + ends[:, 1], return_inverse=True)
         ends = np.stack([key // MOST_VERTICES, key % MOST_VERTICES], axis=1)

@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import MeshError
+from optisense.geometry.connected import connected_components
 from optisense.geometry.containment import inside
 from optisense.geometry.crossings import self_crossings
-from optisense.geometry.linked import linked_groups
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 from optisense.geometry.mesh_checks import with_consistent_winding
 from optisense.geometry.welding import merged_vertices
 
 WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
-"""Distances (mm) below which vertices are merged, tried in ascending order."""
+"""Distances (mm) below which vertices are merged, tried in ascending order until the mesh is
+closed: from the rounding of single precision to a tenth of the usual tolerance of a part."""
 
 
 def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh, list[str]]:
@@ -55,7 +56,7 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
     notes: list[str] = []
     mended, doubled = _without_doubles(mesh.welded())
     if doubled:
-        notes.append(f"{doubled} doubled faces were dropped")
+        notes.append(f"{doubled} duplicate faces were dropped")
     if closed:
         mended = _closed(mended, where, notes)
         mended = _outward(mended, where, notes)
@@ -78,7 +79,7 @@ def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
 def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
     """Return the number (m,) int64 of the connected shell that each face belongs to."""
     ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    group = linked_groups(len(mesh.vertices), ends[:, 0], ends[:, 1])
+    group = connected_components(len(mesh.vertices), ends[:, 0], ends[:, 1])
     _, labels = np.unique(group[mesh.faces[:, 0]], return_inverse=True)
     return np.asarray(labels.reshape(-1), dtype=np.int64)
 
@@ -113,7 +114,7 @@ def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
 
 def _hole(mesh: TriangleMesh, edges: NDArray[np.int64], where: str) -> MeshError:
     """Return the error for open edges, with the number of holes and the place of the widest one."""
-    group = linked_groups(len(mesh.vertices), edges[:, 0], edges[:, 1])
+    group = connected_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
     rims = np.unique(group[edges[:, 0]])
     sizes, middles = [], []
     for rim in rims:

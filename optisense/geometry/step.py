@@ -30,17 +30,18 @@ from optisense.untrusted_files import MOST_STEP, check_size
 SUFFIXES = (".step", ".stp")
 
 CHORD = 0.003
-"""Largest distance in mm between the triangles and the exact surface; parts are made to tolerances
-of 0.01 mm and more."""
+"""Largest distance (mm) between the triangles and the exact surface: a third of the tolerance to
+which parts are made (0.01 mm and more)."""
 
 BEND = 6.0
-"""Largest angle (degrees) between neighbouring triangles on a curved surface."""
+"""Largest angle (degrees) between neighbouring triangles on a curved surface: 60 triangles around a
+cylinder, whose shading normals are then interpolated."""
 
 _WELD = 1e-5
-"""Distance (mm) within which vertices of neighbouring faces are merged; Open CASCADE's triangles
-meet with this accuracy."""
+"""Distance (mm) within which vertices of neighbouring faces are merged: the accuracy with which
+Open CASCADE's triangles of neighbouring faces meet."""
 
-BODIES, WRONG = "bodies.npz", "wrong.json"
+BODIES_FILE, ERROR_FILE = "bodies.npz", "wrong.json"
 """Files that the process writes into its folder: the bodies found, or the error."""
 
 READER = "optisense.geometry.step_process"
@@ -119,7 +120,7 @@ def _read_apart(path: Path) -> list[StepBody]:
             stderr=subprocess.DEVNULL,
             env={**os.environ, "PYTHONPATH": search},
         )
-        wrong = Path(folder, WRONG)
+        wrong = Path(folder, ERROR_FILE)
         if wrong.exists():
             report = json.loads(wrong.read_text(encoding="utf-8"))
             kind: type[OptiSenseError] = getattr(errors, report.pop("kind"))
@@ -130,7 +131,7 @@ def _read_apart(path: Path) -> list[StepBody]:
                 where=str(path),
                 hint="In the CAD tool: export it again as STEP AP214 or AP242, or as STL",
             )
-        with np.load(Path(folder, BODIES), allow_pickle=False) as found:
+        with np.load(Path(folder, BODIES_FILE), allow_pickle=False) as found:
             return [
                 StepBody(
                     str(name), TriangleMesh(found[f"vertices{n}"], found[f"faces{n}"]), bool(solid)
@@ -161,7 +162,7 @@ def bodies_of(path: Path) -> list[StepBody]:
     document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
     if "RetDone" not in str(status) or not reader.Transfer(document):
         raise MeshError(
-            "this is not a STEP file that can be read",
+            "the file is not a STEP file that can be read",
             where=str(path),
             hint="In the CAD tool: export it again as STEP AP214 or AP242",
         )

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from optisense.errors import OptiSenseError
-from optisense.geometry.step import BODIES, WRONG, bodies_of
+from optisense.geometry.step import BODIES_FILE, ERROR_FILE, bodies_of
 
 LONGEST = 600
 """Largest processor time (s) for one file; the largest STEP files of sensors take about a
@@ -37,14 +37,14 @@ def main() -> int:
     except OptiSenseError as error:
         report: dict[str, str | None] = {"kind": type(error).__name__, "message": error.message}
         report |= {"where": error.where, "hint": error.hint}
-        (folder / WRONG).write_text(json.dumps(report), encoding="utf-8")
+        (folder / ERROR_FILE).write_text(json.dumps(report), encoding="utf-8")
         return 1
     arrays: dict[str, Any] = {}
     for number, body in enumerate(bodies):
         arrays[f"vertices{number}"] = body.mesh.vertices
         arrays[f"faces{number}"] = body.mesh.faces
     names = np.array([body.name for body in bodies], dtype=str)
-    np.savez(folder / BODIES, names=names, solids=[body.solid for body in bodies], **arrays)
+    np.savez(folder / BODIES_FILE, names=names, solids=[body.solid for body in bodies], **arrays)
     return 0
 
 

@@ -14,9 +14,8 @@ from optisense.geometry.mesh import TriangleMesh
 FloatArray = NDArray[np.float64]
 
 _ARRIVED = 1e-9
-"""Remaining distance (mm) below which a walk over the surface has arrived; a margin for
-rounding."""
-
+"""Remaining distance (mm) below which a walk over the surface has arrived: far above the rounding
+of double precision (1e-14 mm)."""
 
 KEPT_POINTS = 256
 """Number of places that a surface keeps with their coordinates: a press asks for the same place
@@ -84,7 +83,7 @@ class SensingSurface:
             raise ContactError(
                 f"the place ({u:g}, {v:g}) is off the sensing surface, whose edge lies "
                 f"{length - left:.2f} mm from its middle in that direction",
-                hint="choose a place nearer to the middle",
+                hint="Choose a place nearer to the middle",
             )
         return self._surface_point(face, point)
 
@@ -102,7 +101,10 @@ class SensingSurface:
     def _closest(self, point: ArrayLike) -> tuple[int, FloatArray]:
         where = np.asarray(point, dtype=np.float64).reshape(3)
         if not np.isfinite(where).all():
-            raise ContactError("a contact point is not a finite number", hint="give x,y,z in mm")
+            raise ContactError(
+                "a coordinate of a contact point is not a finite number",
+                hint="Give x, y, z in mm",
+            )
         middle, square = self.mesh.face_spheres
         away, radius = np.linalg.norm(middle - where, axis=1), np.sqrt(square)
         near = np.flatnonzero(away - radius <= (away + radius).min())
@@ -162,8 +164,9 @@ class SensingSurface:
             face = across[0]
             direction = self._unfolded(direction, ends, face)
         raise MeshError(
-            "a straight way over the sensing surface does not end",
-            hint="the mesh has degenerate triangles; export it again",
+            "the path to a place on the sensing surface does not end, as the mesh has degenerate "
+            "triangles",
+            hint="Export the mesh of the sensing surface again",
         )
 
     def _unfolded(self, direction: FloatArray, ends: list[int], face: int) -> FloatArray:
@@ -212,6 +215,6 @@ def _in_plane(axis: FloatArray, square_to: list[FloatArray], name: str) -> Float
     if not rest > 1e-6 * length:
         raise ContactError(
             f"the {name} axis does not lie along the sensing surface",
-            hint="check the camera's `up` and `direction`: they must not be parallel",
+            hint="Check the camera's `up` and `direction`: they must not be parallel",
         )
     return axis / rest

@@ -9,7 +9,7 @@ from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import boxes_overlap, find_coincident
-from optisense.geometry.meeting import find_meeting, resting_on
+from optisense.geometry.overlaps import find_overlap, touching_vertices
 
 GLUE = 0.05
 """Largest distance (mm) between the faces of a gel and of a part that holds it: the thickness of a
@@ -50,7 +50,7 @@ def _hold_each_other(gel: TriangleMesh, other: TriangleMesh) -> bool:
         return False
     return (
         len(find_coincident(gel, other, GLUE, facing=False).pairs) > 0
-        or len(resting_on(gel, other)) > 0
-        or len(resting_on(other, gel)) > 0
-        or find_meeting(gel, other) is not None
+        or len(touching_vertices(gel, other)) > 0
+        or len(touching_vertices(other, gel)) > 0
+        or find_overlap(gel, other) is not None
     )

@@ -14,7 +14,7 @@ from scipy.interpolate import make_interp_spline
 from optisense.design import Cage
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import bernstein, deformed
-from optisense.geometry.linked import linked_groups
+from optisense.geometry.connected import connected_components
 from optisense.geometry.step import triangles
 from optisense.workshop._domes import Dome, dome
 from optisense.workshop._occ import SEWN, array_of, compound, numbers, point, sewn, wire
@@ -100,7 +100,7 @@ def _apart(sheet: Shape) -> list[Shape]:
     """Return the pieces of a sheet that do not touch one another."""
     mesh = sheet.mesh
     ends = np.concatenate([mesh.faces[:, :2], mesh.faces[:, 1:]])
-    labels = linked_groups(len(mesh.vertices), ends[:, 0], ends[:, 1])
+    labels = connected_components(len(mesh.vertices), ends[:, 0], ends[:, 1])
     if not labels.any():
         return [sheet]
     owner = labels[mesh.faces[:, 0]]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from optisense.geometry import TriangleMesh
-from optisense.geometry.linked import linked_groups
+from optisense.geometry.connected import connected_components
 from optisense.geometry.patches import smoothly_joined
 
 FloatArray = NDArray[np.float64]
@@ -121,7 +121,7 @@ def _joined(points: FloatArray, distance: float) -> NDArray[np.int64]:
     grid = np.unique(np.round(points / distance).astype(np.int64), axis=0, return_inverse=True)
     cells, inverse = grid[0], np.asarray(grid[1]).reshape(-1)
     pairs = cKDTree(cells).query_pairs(1.5, output_type="ndarray")
-    return linked_groups(len(cells), pairs[:, 0], pairs[:, 1])[inverse]
+    return connected_components(len(cells), pairs[:, 0], pairs[:, 1])[inverse]
 
 
 def _walk(sides: NDArray[np.int64], count: int) -> list[int] | None:
@@ -211,7 +211,7 @@ def extruded_along(mesh: TriangleMesh, axis: int) -> Extrusion | None:
 def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:
     """Return outlines by their corners; None if more than two sides meet."""
     sides = np.unique(np.sort(sides, axis=1), axis=0)
-    labels = linked_groups(count, sides[:, 0], sides[:, 1])
+    labels = connected_components(count, sides[:, 0], sides[:, 1])
     loops = []
     for label in range(int(labels.max(initial=-1)) + 1):
         members = np.flatnonzero(labels == label)

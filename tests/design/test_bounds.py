@@ -143,7 +143,7 @@ def test_a_mesh_whose_faces_are_there_a_million_times(folder: Path) -> None:
     face = next(line for line in mesh.read_text().splitlines() if line.startswith("f "))
     with mesh.open("a") as file:
         file.write(f"{face}\n" * 900_000)
-    with pytest.raises(OptiSenseError, match="900,000 faces of the mesh are there more than once"):
+    with pytest.raises(OptiSenseError, match="900,000 faces of the mesh occur more than once"):
         load_design(folder)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.geometry import box_pairs
-from optisense.geometry.box_pairs import meeting_boxes, meeting_each_other
+from optisense.geometry.box_pairs import overlapping_boxes, overlapping_pairs
 from optisense.geometry.mesh import FloatArray
 
 
@@ -38,7 +38,7 @@ def test_pairs_are_those_of_comparing_all(
     monkeypatch.setattr(box_pairs, "_AT_ONCE", at_once)
     monkeypatch.setattr(box_pairs, "_DENSE", dense)
     one, other = boxes(counts[0], 1.0, 1), boxes(counts[1], 0.5, 2)
-    assert as_set(*meeting_boxes(*one, *other)) == pairs_one_by_one(*one, *other)
+    assert as_set(*overlapping_boxes(*one, *other)) == pairs_one_by_one(*one, *other)
 
 
 @pytest.mark.parametrize("count", [3, 64, 65, 1000])
@@ -49,12 +49,12 @@ def test_pairs_of_one_lot_come_once(
     monkeypatch.setattr(box_pairs, "_DENSE", dense)
     low, high = boxes(count, 1.0, 3)
     everything = pairs_one_by_one(low, high, low, high)
-    assert as_set(*meeting_each_other(low, high)) == {(a, b) for a, b in everything if a < b}
+    assert as_set(*overlapping_pairs(low, high)) == {(a, b) for a, b in everything if a < b}
 
 
 def test_boxes_that_touch_meet_and_equal_points_do_not_hinder() -> None:
     corner = np.zeros((400, 3))
-    one, other = meeting_boxes(corner, corner + 1.0, corner + 1.0, corner + 2.0)
+    one, other = overlapping_boxes(corner, corner + 1.0, corner + 1.0, corner + 2.0)
     assert len(one) == len(other) == 400 * 400
-    one, other = meeting_boxes(corner, corner + 1.0, corner + 1.0 + 1e-9, corner + 2.0)
+    one, other = overlapping_boxes(corner, corner + 1.0, corner + 1.0 + 1e-9, corner + 2.0)
     assert len(one) == 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.geometry import TriangleMesh
-from optisense.geometry.containment import WAY, _turns, inside
+from optisense.geometry.containment import RAY_DIRECTION, _turns, inside
 from optisense.sensors._shapes import arc, revolve
 
 
@@ -45,7 +45,7 @@ def test_a_ray_through_an_edge_or_a_corner(share: float) -> None:
     """A ray that meets an edge is counted exactly once."""
     box = TriangleMesh.box((-1.0, -1.0, -1.0), (1.0, 1.0, 1.0), (2, 2, 2))
     on_edge = np.array([share, 0.0, 1.0])  # on an edge of the top's grid
-    below, above = on_edge - 0.5 * WAY, on_edge + 0.5 * WAY
+    below, above = on_edge - 0.5 * RAY_DIRECTION, on_edge + 0.5 * RAY_DIRECTION
     assert inside([below, above], box).tolist() == [True, False]
 
 

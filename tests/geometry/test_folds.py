@@ -8,7 +8,7 @@ import pytest
 from optisense.geometry import TriangleMesh, cage_points
 from optisense.geometry.cage import deformed
 from optisense.geometry.folds import Fold, find_fold, is_in_full_view
-from optisense.geometry.meeting import find_meeting, resting_on, touching
+from optisense.geometry.overlaps import find_overlap, touching, touching_vertices
 
 BOX = np.array([[-5.0, -4.0, -1.0], [5.0, 4.0, 1.0]])
 LATTICE = (3, 3, 3)
@@ -105,7 +105,7 @@ class TestMeeting:
     @pytest.mark.parametrize("shift", [(3.0, 1.3, 1.7), (0.5, 3.9, 0.3)])
     def test_overlapping_boxes(self, shift: tuple[float, float, float]) -> None:
         other = TriangleMesh(self.block.vertices + shift, self.block.faces)
-        meeting = find_meeting(self.block, other)
+        meeting = find_overlap(self.block, other)
         assert meeting is not None and meeting.kind == "cuts into"
         low, high = np.array(shift), np.full(3, 4.0)
         assert ((meeting.place >= low - 1e-9) & (meeting.place <= high + 1e-9)).all()
@@ -113,17 +113,17 @@ class TestMeeting:
     def test_touching_and_separate_boxes_do_not_meet(self) -> None:
         for shift in ((4.0, 0, 0), (4.0, 1.3, 2.0), (4.0005, 0, 0), (9.0, 0, 0), (3.999, 0, 0)):
             other = TriangleMesh(self.block.vertices + shift, self.block.faces)
-            assert find_meeting(self.block, other) is None, shift
+            assert find_overlap(self.block, other) is None, shift
 
     def test_one_in_the_other(self) -> None:
         small = TriangleMesh.box((1, 1, 1), (2, 2, 2))
-        inner, outer = find_meeting(small, self.block), find_meeting(self.block, small)
+        inner, outer = find_overlap(small, self.block), find_overlap(self.block, small)
         assert inner is not None and inner.kind == "is inside"
         assert outer is not None and outer.kind == "encloses"
 
     def test_resting_on_another_whatever_its_triangles(self) -> None:
         table = TriangleMesh.box((-10, -10, -1), (10, 10, 0))
-        rows = resting_on(self.block, table)
+        rows = touching_vertices(self.block, table)
         assert set(rows) == set(np.flatnonzero(self.block.vertices[:, 2] == 0.0))
         lifted = self.block.with_vertices(self.block.vertices + [0, 0, 0.01])
         assert np.isinf(touching(lifted, rows, table)).all()

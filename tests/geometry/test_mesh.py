@@ -55,7 +55,7 @@ def test_stl_and_ply_are_read_as_closed_solids(tmp_path: Path, suffix: str) -> N
 
 @pytest.mark.parametrize(
     ("file_type", "told"),
-    [("stl", "it says 44 triangles and has room for 41"), ("stl_ascii", "endsolid")],
+    [("stl", "it announces 44 triangles and has the length of 41"), ("stl_ascii", "endsolid")],
 )
 def test_an_stl_file_that_is_cut_off_says_so(tmp_path: Path, file_type: str, told: str) -> None:
     import trimesh

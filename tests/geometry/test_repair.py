@@ -86,7 +86,7 @@ def test_doubled_faces_are_dropped() -> None:
     doubled = BLOCK.with_faces(np.concatenate([BLOCK.faces, np.roll(BLOCK.faces[:4], 1, axis=1)]))
     mesh, notes = repaired(doubled, "gel", closed=True)
     assert len(mesh.faces) == len(BLOCK.faces)
-    assert "4 doubled faces" in notes[0]
+    assert "4 duplicate faces" in notes[0]
 
 
 def faulty(kind: str) -> TriangleMesh:

@@ -1,4 +1,7 @@
-"""Signed distances (mm) to plane figures, negative inside, and height profiles."""
+"""Signed distances (mm) to plane figures, negative inside, and height profiles.
+
+Coordinates ``x``, ``y`` and distances are arrays of any one shape (...), in mm, and so are results.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +13,27 @@ from numpy.typing import ArrayLike, NDArray
 FloatArray = NDArray[np.float64]
 
 STEEP = 5.67
-"""Slope of walls: the tangent of 80 degrees, with the draft of a mould's wall."""
+"""Slope of walls, mm of height per mm: the tangent of 80 degrees, as the walls of moulded parts
+have a draft."""
 
 
 def disc(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
-    """Return the distance to a disc around the origin."""
+    """Return the distance (...), mm, to a disc of a radius (mm) around the origin."""
     return np.hypot(x, y) - radius
 
 
 def rectangle(x: FloatArray, y: FloatArray, width: float, height: float) -> FloatArray:
-    """Return the distance to a rectangle around the origin."""
+    """Return the distance (...), mm, to a rectangle around the origin; ``width`` (mm) is its side
+    along x.
+    """
     over_x, over_y = np.abs(x) - 0.5 * width, np.abs(y) - 0.5 * height
     outside = np.hypot(np.maximum(over_x, 0.0), np.maximum(over_y, 0.0))
     return outside + np.minimum(np.maximum(over_x, over_y), 0.0)
 
 
 def hexagon(x: FloatArray, y: FloatArray, across_flats: float) -> FloatArray:
-    """Return the distance to the sides of a regular hexagon around the origin, perpendicular to the
-    nearest side.
+    """Return the distance (...), mm, to the sides of a regular hexagon around the origin,
+    perpendicular to the nearest side; ``across_flats`` (mm) is the distance of opposite sides.
     """
     turns = np.radians([0.0, 60.0, 120.0])
     sides = [np.abs(x * np.cos(turn) + y * np.sin(turn)) for turn in turns]
@@ -35,8 +41,8 @@ def hexagon(x: FloatArray, y: FloatArray, across_flats: float) -> FloatArray:
 
 
 def strokes(x: FloatArray, y: FloatArray, lines: list[list[tuple[float, float]]]) -> FloatArray:
-    """Return the distance to the nearest of several polylines, each a list of points (mm); never
-    negative.
+    """Return the distance (...), mm, to the nearest of several polylines, each a list of points
+    (mm); it is never negative.
     """
     nearest = np.full(x.shape, np.inf)
     for line in lines:
@@ -53,20 +59,22 @@ def _segment(x: FloatArray, y: FloatArray, start: FloatArray, end: FloatArray) -
 
 
 def wall(distance: FloatArray) -> FloatArray:
-    """Return the height of a steep wall that begins where a distance is 0 and rises outside."""
+    """Return the height (...), mm, of a steep wall that begins where a distance (...), mm, is 0 and
+    rises outside.
+    """
     return STEEP * np.maximum(distance, 0.0)
 
 
 def raised(distance: FloatArray, height: float) -> FloatArray:
-    """Return the amount (mm) to subtract from a ground for a figure that stands out by `height`
-    (mm): all of it inside, and less along its steep wall.
+    """Return the height (...), mm, to subtract from a ground for a figure that stands out by
+    `height` (mm): all of it inside, and less along its steep wall.
     """
     return np.clip(height - wall(distance), 0.0, height)
 
 
 def dome(distance: FloatArray, radius: float, height: float) -> FloatArray:
-    """Return the amount (mm) to subtract from a ground for a spherical cap of a base radius and a
-    height (mm), by the distance from its middle.
+    """Return the height (...), mm, to subtract from a ground for a spherical cap of a base radius
+    and a height (mm), by the distance (...), mm, from its middle.
     """
     sphere = (radius**2 + height**2) / (2.0 * height)
     top = np.sqrt(np.maximum(sphere**2 - distance**2, 0.0)) - (sphere - height)
@@ -74,9 +82,15 @@ def dome(distance: FloatArray, radius: float, height: float) -> FloatArray:
 
 
 def star(x: FloatArray, y: FloatArray, points: int, outer: float, inner: float) -> FloatArray:
-    """Return the relative depth of a place inside a star, from 0 at its outline to 1 in its middle.
+    """Return the relative depth (...) of places inside a star, from 0 at its outline to 1 in its
+    middle.
 
     Level lines are smaller stars, so that a relief of these heights has plane facets.
+
+    Args:
+        x, y: the places, mm.
+        points: number of the star's points.
+        outer, inner: radii (mm) of its points and of the corners between them.
     """
     sector = np.pi / points
     angle = np.abs(np.mod(np.arctan2(y, x) + sector, 2.0 * sector) - sector)

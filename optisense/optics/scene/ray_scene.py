@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.geometry.linked import linked_groups
+from optisense.geometry.connected import connected_components
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.bsdf import SMOOTH_ALPHA, surface_table
 from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
@@ -89,7 +89,7 @@ class Piece:
             return np.unique(way, axis=0, return_inverse=True)[1].reshape(-1)
         faces = np.asarray(self.faces, dtype=np.int64)
         ends = np.concatenate([faces[:, :2], faces[:, 1:]])
-        number = linked_groups(len(self.vertices), *ends.T)
+        number = connected_components(len(self.vertices), *ends.T)
         return np.unique(number[faces[:, 0]], return_inverse=True)[1].reshape(-1)
 
 

@@ -17,7 +17,7 @@ from optisense.design.material_checks import is_gas
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import find_coincident
 from optisense.geometry.containment import inside
-from optisense.geometry.meeting import CONTACT, near_surface
+from optisense.geometry.overlaps import CONTACT, near_surface
 from optisense.geometry.surface import closest_points
 from optisense.search.space.constraints import same_shape
 

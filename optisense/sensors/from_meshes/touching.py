@@ -15,7 +15,7 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import cut, find_coincident
 from optisense.geometry.containment import inside
 from optisense.geometry.joining import EXACT, join, touching_area
-from optisense.geometry.meeting import find_meeting
+from optisense.geometry.overlaps import find_overlap
 from optisense.sensors.from_meshes.recipe import Recipe
 
 WIDE_GAP = 0.5
@@ -102,7 +102,7 @@ def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
                 f"{mover} and {fixed}: a {what} of up to {abs(joined.gap):.3f} mm was closed by "
                 f"moving {'a flat face' if joined.kind == 'flat' else 'curved faces'} of {mover}"
             )
-    meeting = find_meeting(other, one)
+    meeting = find_overlap(other, one)
     if meeting is not None and not _only_joined(other, one, recipe.join):
         at = "({:.2f}, {:.2f}, {:.2f})".format(*meeting.place)
         result.notes.append(

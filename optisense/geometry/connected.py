@@ -1,0 +1,27 @@
+"""Connected components of a graph, such as the shells of a mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def connected_components(
+    count: int, one: NDArray[np.integer], other: NDArray[np.integer]
+) -> NDArray[np.int64]:
+    """Return the number of the connected component, from 0, that each of `count` nodes belongs to.
+
+    Args:
+        count: number of nodes (n).
+        one, other: (k,) numbers of the two nodes of each edge, in either order.
+
+    Returns:
+        (n,) int64; nodes without edges are components of their own.
+    """
+    from scipy.sparse import (
+        coo_array,  # takes a tenth of a second to load
+        csgraph,
+    )
+
+    edges = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(count, count))
+    return np.asarray(csgraph.connected_components(edges, directed=False)[1], dtype=np.int64)
