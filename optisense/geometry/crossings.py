@@ -16,7 +16,7 @@ mesh files, and a twentieth of the depth from which on parts overlap."""
 
 _PAIRS_AT_ONCE = 500_000
 """Number of pairs of faces that are intersected together, which bounds the memory of the arrays to
-some 200 MB."""
+some 100 MB."""
 
 
 class Crossings(NamedTuple):

@@ -22,8 +22,8 @@ ROUNDS = 4
 faces of the other part; further rounds remove few."""
 
 MOST_PROBED = 4000
-"""Largest number of vertices, spread over all, that are tested for contact: 0.3 mm apart on the
-skin of a GelSight Mini, and tested in some milliseconds."""
+"""Largest number of vertices, spread over all, that are tested for contact: 0.4 mm apart on the
+skin of a GelSight Mini."""
 
 _boxes: weakref.WeakKeyDictionary[TriangleMesh, tuple[FloatArray, FloatArray]]
 _boxes = weakref.WeakKeyDictionary()

@@ -10,7 +10,7 @@ from optisense.errors import ContactError
 FloatArray = NDArray[np.float64]
 
 _ROUNDS = 200
-"""Largest number of rounds of the clustering, which usually converges in a tenth of them."""
+"""Largest number of rounds of the clustering, which usually converges much sooner."""
 _STILL = 1e-4
 """Movement of the places in one round, relative to the size of the surface, below which the
 clustering has converged."""

@@ -11,7 +11,7 @@ from optisense.geometry.mesh import TriangleMesh
 
 _PAIRS_AT_ONCE = 1_000_000
 """Number of pairs of ray and face that are tested together, which bounds the memory of the arrays
-to some 100 MB."""
+to some 50 MB."""
 _NEAR = 1e-9
 """Margin of the test whether a ray passes a face's bounding sphere, as a share of the square of the
 largest coordinate: far above the rounding of double precision (1e-16)."""

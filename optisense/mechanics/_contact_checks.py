@@ -14,12 +14,12 @@ from optisense.mechanics._footprint import Footprint
 FloatArray = NDArray[np.float64]
 
 SHALLOWEST = 1e-3
-"""Depth (mm) of skin inside both of two indenters above which they count as overlapping; smaller
-depths are rounding."""
+"""Depth (mm) of skin inside both of two indenters above which they count as overlapping: some
+facet errors of indenters (4e-4 mm), as smaller depths may be due to them."""
 
 ALONG_AN_EDGE = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Places along the part of an open edge inside the gel, as shares of its length, at which it is
-tested for whether it touches the skin."""
+tested for whether it touches the skin: the middles of five equal parts."""
 
 
 def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
@@ -35,11 +35,11 @@ def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
     near = np.abs(there[:, 2]) < min(one.thickness, other.thickness)
     if (_overlap_at(other, there[near]) > SHALLOWEST).any():
         raise ContactError(
-            "two contacts overlap: their indenters are in one another where they meet the skin",
+            "two contacts overlap: their indenters lie inside each other where they touch the skin",
             where="at ({:.2f}, {:.2f}, {:.2f}) and ({:.2f}, {:.2f}, {:.2f}) mm".format(
                 *other.origin, *one.origin
             ),
-            hint="move them apart, or join them to one mesh",
+            hint="Move them apart, or join them to one mesh",
         )
 
 
@@ -71,7 +71,7 @@ def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
             f"an indenter has a hole where it touches the skin: {int(touching.sum())} edges there "
             "have one face only",
             where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*place.origin),
-            hint="close the mesh; it may be open only above the skin",
+            hint="Close the mesh; it may be open only above the skin",
         )
 
 

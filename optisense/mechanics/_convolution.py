@@ -89,49 +89,54 @@ class GridResponse:
         return LoadKernels(*spectra)
 
     def normal(self, pressure: FloatArray) -> FloatArray:
-        """Return the normal displacement (mm), into the layer, due to a pressure (MPa) on each
-        square.
+        """Return the normal displacement (rows, columns), mm, into the layer, due to a pressure
+        (rows, columns), MPa, on each square.
         """
-        return self._back(self._pressure_kernel * self._there(pressure))
+        return self._restored(self._pressure_kernel * self._transformed(pressure))
 
     def displacement(self, pressure: FloatArray, shear: FloatArray | None = None) -> FloatArray:
-        """Return the displacement (3, rows, columns), mm, along x, y and into the layer."""
-        p = self._there(pressure)
+        """Return the displacement (3, rows, columns), mm, along x, y and into the layer.
+
+        Args:
+            pressure: (rows, columns) pressure, MPa.
+            shear: (2, rows, columns) shear along x and y, MPa; None for none.
+        """
+        p = self._transformed(pressure)
         kernels = self._kernels
         x, y, z = kernels.xz * p, kernels.yz * p, kernels.zz * p
         if shear is not None:
-            along_x, along_y = self._there(shear[0]), self._there(shear[1])
+            along_x, along_y = self._transformed(shear[0]), self._transformed(shear[1])
             x += kernels.xx * along_x + kernels.xy * along_y
             y += kernels.xy * along_x + kernels.yy * along_y
             # By Betti's theorem, the normal displacement due to shear is the mirrored tangential
             # displacement due to pressure.
             z -= kernels.xz * along_x + kernels.yz * along_y
-        return np.stack([self._back(each) for each in (x, y, z)])
+        return np.stack([self._restored(each) for each in (x, y, z)])
 
-    def sideways(self, shear: FloatArray) -> FloatArray:
+    def tangential(self, shear: FloatArray) -> FloatArray:
         """Return the displacement (2, rows, columns), mm, along x and y due to a shear
         (2, rows, columns), MPa.
         """
         kernels = self._kernels
-        along_x, along_y = self._there(shear[0]), self._there(shear[1])
+        along_x, along_y = self._transformed(shear[0]), self._transformed(shear[1])
         return np.stack(
             [
-                self._back(kernels.xx * along_x + kernels.xy * along_y),
-                self._back(kernels.xy * along_x + kernels.yy * along_y),
+                self._restored(kernels.xx * along_x + kernels.xy * along_y),
+                self._restored(kernels.xy * along_x + kernels.yy * along_y),
             ]
         )
 
-    def largest_sideways(self) -> float:
-        """Largest ratio (mm/MPa) of the RMS displacement along the surface to the RMS of the shear
-        that causes it.
+    def largest_tangential(self) -> float:
+        """Return the largest ratio (mm/MPa) of the RMS displacement along the surface to the RMS of
+        the shear that causes it.
         """
         kernels = self._kernels
         crossed = np.abs(kernels.xy)
         return float(max((np.abs(each) + crossed).max() for each in (kernels.xx, kernels.yy)))
 
-    def _there(self, load: FloatArray) -> NDArray[np.complex128]:
+    def _transformed(self, load: FloatArray) -> NDArray[np.complex128]:
         return np.asarray(fft.rfft2(load, self._padded))
 
-    def _back(self, spectrum: NDArray[np.complex128]) -> FloatArray:
+    def _restored(self, spectrum: NDArray[np.complex128]) -> FloatArray:
         rows, columns = self.shape
         return np.asarray(fft.irfft2(spectrum, self._padded)[:rows, :columns])

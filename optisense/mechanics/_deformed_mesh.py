@@ -16,9 +16,11 @@ from optisense.mechanics._pressed_skin import PressedSkin
 FloatArray = NDArray[np.float64]
 
 EDGE_IN_CONTACT = 1.5
-"""Smallest value of the greatest edge length in a contact, in units of the pitch of its grid."""
+"""Smallest value of the greatest edge length in a contact, in units of the pitch of its grid:
+smaller triangles would show no more than the grid holds."""
 SMOOTH_EDGE = 3.0
-"""Largest value of the greatest edge length in a contact, in units of the pitch of its grid."""
+"""Largest value of the greatest edge length in a contact, in units of the pitch of its grid: some
+twenty triangles across a contact, which follow the outline of a smooth indenter."""
 FACET_TILT = 0.01
 """Error of slopes between the corners of a triangle in a contact, above which triangles are
 smaller. Shading normals vary linearly over triangles, so that facets of this error, half a degree,
@@ -28,14 +30,17 @@ EDGE_AT_RIM = 0.8
 at the rim, and larger triangles would make it jagged. With half of it, the light at the rim of a
 ball changes by 0.9 % (RMS) in a picture 640 pixels wide."""
 RIM = 1.5
-"""Distance from the rim, in units of the grid's pitch, within which triangles are finer."""
+"""Distance from the rim, in units of the grid's pitch, within which triangles are finer: the slope
+jumps between two points of the grid, which lie within it."""
 GROWTH = 0.3
 """Increase of the greatest edge length with the distance from a contact: displacements change over
 lengths of about that distance."""
 LONGEST_EDGE = 0.25
-"""Greatest edge length in displaced parts of the skin, in thicknesses of the gel."""
+"""Greatest edge length in displaced parts of the skin, in thicknesses of the gel: bulges are as
+wide as the gel is thick, and get four triangles."""
 MAX_FACES = 600_000
-"""Largest number of triangles of a deformed skin; finer detail of contacts is left out."""
+"""Largest number of triangles of a deformed skin, which take some 100 MB; finer detail of contacts
+is left out."""
 BENT_SHARE = 0.1
 """Share of the greatest depth of a contact from which on inward-displaced skin around it counts as
 bent. Bent skin casts shadows and is lit like indenters; skin that bulges outward never counts as

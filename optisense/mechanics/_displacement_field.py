@@ -68,7 +68,7 @@ class DisplacementField:
     Attributes:
         place: the grid of the pressure.
         shear: (2, rows, columns) shear (MPa) of a dragged indenter; it must be set before
-            `sideways` is called.
+            `tangential` is called.
     """
 
     def __init__(
@@ -124,10 +124,13 @@ class DisplacementField:
         )
 
     def at(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the displacement (mm) into the gel at points of the tangent plane, and its slopes
-        by x and y.
+        """Return the displacement (n,), mm, into the gel at points of the tangent plane, and its
+        slopes (n,) by x and (n,) by y.
 
         The slope jumps at the edge of a contact; inside, it equals that of the indenter.
+
+        Args:
+            x, y: (n,) coordinates of the points, mm.
         """
         result = np.zeros((3, len(x)))
         near = self._around.holds(x, y)
@@ -135,7 +138,7 @@ class DisplacementField:
         if near.any():
             result[:, near] = self._fine.at(x[near], y[near])
         if reached.any():
-            result[:, reached] = self._coarse.at_once(x[reached], y[reached])
+            result[:, reached] = self._coarse.at_linear(x[reached], y[reached])
         inside = self.touching(x, y)
         if inside.any():
             column, row = (
@@ -163,10 +166,10 @@ class DisplacementField:
             result[known] += self._beyond.value(x[known], y[known])
         return result
 
-    def sideways(self, x: FloatArray, y: FloatArray) -> FloatArray:
+    def tangential(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the displacement (2, n), mm, of points of the tangent plane along x and y."""
         result = np.zeros((2, len(x)))
-        (near, near_y), (far, far_y) = self._sideways_splines
+        (near, near_y), (far, far_y) = self._tangential_splines
         close = near.holds(x, y)
         reached = ~close & far.holds(x, y)
         for where, splines in ((close, (near, near_y)), (reached, (far, far_y))):
@@ -174,8 +177,8 @@ class DisplacementField:
                 for k, spline in enumerate(splines):
                     result[k, where] = spline.value(x[where], y[where])
         if self._patch is not None:
-            known = self._sideways_beyond[0].holds(x, y)
-            for k, spline in enumerate(self._sideways_beyond):
+            known = self._tangential_beyond[0].holds(x, y)
+            for k, spline in enumerate(self._tangential_beyond):
                 result[k, known] += spline.value(x[known], y[known])
         return result
 
@@ -193,15 +196,15 @@ class DisplacementField:
         return GridSpline(wide.normal(coarse), *start)
 
     @cached_property
-    def _sideways_beyond(self) -> tuple[GridSpline, GridSpline]:
+    def _tangential_beyond(self) -> tuple[GridSpline, GridSpline]:
         """Return the contribution of the gel's shape to displacements along x and y."""
         assert self._patch is not None
         shear = np.zeros((2, *self._pressure.shape)) if self.shear is None else self.shear
         loads = np.concatenate([shear, self._pressure[None]])
-        return sideways_beyond(self._patch, loads, self.place, self._shear_modulus)
+        return tangential_beyond(self._patch, loads, self.place, self._shear_modulus)
 
     @cached_property
-    def _sideways_splines(self) -> list[tuple[GridSpline, GridSpline]]:
+    def _tangential_splines(self) -> list[tuple[GridSpline, GridSpline]]:
         """Return splines of the displacements along x and along y on the fine and the coarse
         grid.
         """
@@ -258,13 +261,15 @@ class DisplacementField:
         return np.asarray(maximum_filter(np.where(whole, found, 0.0), 2 * BEND_REACH + 1))
 
     def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Return a mask of the points of the tangent plane that lie in the contact."""
+        """Return a mask (n,) of the points (n,), mm, of the tangent plane that lie in the
+        contact.
+        """
         rows, columns, inside = self._cells(x, y)
         return inside & self._touching[rows, columns]
 
     def nearby(self, x: FloatArray, y: FloatArray) -> Nearby:
-        """Return where points of the tangent plane lie in or beside the contact, and how smooth the
-        contact is there.
+        """Return where points (n,), mm, of the tangent plane lie in or beside the contact, and how
+        smooth the contact is there.
         """
         rows, columns, inside = self._cells(x, y)
         away = self._away[rows, columns]
@@ -315,7 +320,7 @@ def grid_response(
     return GridResponse(shape, pitch, thickness, elasticity, farthest)
 
 
-def sideways_beyond(
+def tangential_beyond(
     patch: GelPatch, loads: FloatArray, place: Footprint, shear_modulus: float
 ) -> tuple[GridSpline, GridSpline]:
     """Return splines of the contribution (mm) of a gel's shape to displacements along x and y.
@@ -328,5 +333,5 @@ def sideways_beyond(
     """
     pitch, start = patch.columns.pitch, (patch.x[0], patch.y[0])
     coarse = np.stack([binned(a, place, start, pitch, patch.shape) for a in loads])
-    along_x, along_y = patch.sideways(coarse * pitch**2 / shear_modulus)
+    along_x, along_y = patch.tangential(coarse * pitch**2 / shear_modulus)
     return GridSpline(along_x, *start, pitch), GridSpline(along_y, *start, pitch)

@@ -32,17 +32,17 @@ class Elasticity:
         if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0.0):
             raise ContactError(
                 f"Young's modulus of a gel is {self.youngs_modulus:g} MPa",
-                hint="give a number above 0, in MPa",
+                hint="Give a number above 0, in MPa",
             )
         if not 0.0 <= self.poisson_ratio <= MAX_POISSON_RATIO:
             raise ContactError(
                 f"the Poisson ratio of a gel is {self.poisson_ratio:g}",
-                hint=f"give a number from 0 to {MAX_POISSON_RATIO:g}",
+                hint=f"Give a number from 0 to {MAX_POISSON_RATIO:g}",
             )
         if not (math.isfinite(self.friction) and self.friction >= 0.0):
             raise ContactError(
                 f"the friction coefficient of a gel is {self.friction:g}",
-                hint="give 0 or a number above it",
+                hint="Give 0 or a number above it",
             )
 
     @property
@@ -52,7 +52,7 @@ class Elasticity:
 
 
 def youngs_modulus_of_shore_a(hardness: float) -> float:
-    """Young's modulus (MPa) of a rubber from its Shore A hardness.
+    """Return Young's modulus (MPa) of a rubber from its Shore A hardness.
 
     The relation is Gent's, "On the relation between indentation hardness and Young's modulus",
     Rubber Chemistry and Technology 31 (1958): E = 0.0981 (56 + 7.62336 S) /
@@ -64,7 +64,7 @@ def youngs_modulus_of_shore_a(hardness: float) -> float:
     """
     if not 0.0 < hardness < 100.0:
         raise ContactError(
-            f"a Shore A hardness of {hardness:g} does not exist",
-            hint="give a number above 0 and below 100",
+            f"a Shore A hardness of {hardness:g} is outside the scale",
+            hint="Give a number above 0 and below 100",
         )
     return 0.0981 * (56.0 + 7.62336 * hardness) / (0.137505 * (254.0 - 2.54 * hardness))

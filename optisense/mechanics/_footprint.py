@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 MARGIN = 1.15
 """Ratio of the sides of a grid to those of the overlap of the undeformed shapes. The contact area
-of a convex indenter lies inside the overlap, except on thin gels that bulge."""
+of a convex indenter lies inside the overlap, except on thin gels that bulge by some per cent."""
 POINTS_ACROSS = 64
 """Number of grid points across the shorter side of a contact. The error of a ball's force is then
 0.1 %, and that of its contact radius 0.2 %."""
@@ -72,7 +72,7 @@ class Footprint:
         return float(self.x[1] - self.x[0])
 
     def local(self, points: FloatArray) -> FloatArray:
-        """Transform points (n, 3), mm, of the design's frame to this frame."""
+        """Return points (n, 3), mm, of the design's frame in this frame."""
         # `einsum` rather than `@`, whose threads cost more than they save for three columns.
         return np.einsum("ni,ij->nj", points - self.origin, self.axes)
 
@@ -111,7 +111,7 @@ def footprint(
         raise ContactError(
             DOES_NOT_REACH,
             where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*spot.point),
-            hint="press deeper, or check the indenter's shape: it may have a hole there",
+            hint="Press deeper, or check the indenter's shape: it may have a hole there",
         )
     columns, rows = np.flatnonzero(inside.any(axis=0)), np.flatnonzero(inside.any(axis=1))
     spans = [
@@ -143,7 +143,12 @@ def _overlap(body: TriangleMesh, skin: TriangleMesh, x: FloatArray, y: FloatArra
 
 
 def outer_faces(skin: TriangleMesh, x: FloatArray, y: FloatArray) -> TriangleMesh:
-    """Return the faces of a skin that face outward and lie in the rectangle of a grid."""
+    """Return the faces of a skin that face outward and lie in the rectangle of a grid.
+
+    Args:
+        skin: a skin in the frame of a contact, mm.
+        x, y: (columns,) and (rows,) coordinates of the grid, mm.
+    """
     low, high = skin.face_bounds
     near = (high[:, 0] >= x[0]) & (low[:, 0] <= x[-1]) & (high[:, 1] >= y[0]) & (low[:, 1] <= y[-1])
     near &= skin.face_normals[:, 2] < 0.0  # face normals of sensing surfaces point into the gel

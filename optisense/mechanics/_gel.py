@@ -53,7 +53,7 @@ COARSE_POINTS_ACROSS = 24
 """Number of grid points across the shorter side of a contact in coarse mode. The error of a ball's
 contact radius is then about 1 %, a fraction of a pixel of a draft."""
 COARSE_THICKNESS = 0.1
-"""Step (mm) of the thicknesses of layers in coarse mode. The kernels of a thickness take a tenth of
+"""Step (mm) of the thicknesses of layers in coarse mode: the kernels of a thickness take a tenth of
 a second to compute, and a slightly bent skin keeps its step; forces change by 1 to 2 % from step to
 step."""
 
@@ -71,7 +71,9 @@ def elasticity_of(design: SensorDesign) -> Elasticity:
 
 
 def elasticity_in_words(design: SensorDesign) -> str:
-    """Describe the elastic constants that are used for a design's gel, and the status of each."""
+    """Return a text with the elastic constants that are used for a design's gel, and the status of
+    each.
+    """
     used = elasticity_of(design)
     given = next(
         (
@@ -215,7 +217,14 @@ class Gel:
         return self._last[1]
 
     def mesh(self, contacts: Sequence[Contact]) -> SkinMesh:
-        """Return the deformed sensing surface; raises the errors of `pressed`."""
+        """Return the deformed sensing surface.
+
+        Args:
+            contacts: the contacts.
+
+        Raises:
+            ContactError: as in `pressed`.
+        """
         pressed = self.pressed(contacts)
         if self._mesh is None or self._mesh[0] is not pressed:
             self._mesh = pressed, skin_mesh(self._skin, pressed)
@@ -254,7 +263,7 @@ class Gel:
                 f"a force of {wanted:g} N would press an indenter deeper than "
                 f"{100 * DEEPEST_SHARE:.0f} % of the gel, which is {limit:.2f} mm and takes "
                 f"{greatest:.3g} N there",
-                hint=f"give a force up to {greatest:.3g} N",
+                hint=f"Give a force up to {greatest:.3g} N",
             )
 
         # Forces of smooth indenters grow about as depth^1.5; the root is found in logarithms.

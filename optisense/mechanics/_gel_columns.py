@@ -23,13 +23,14 @@ PITCH = 1.0 / 3.0
 """Distance of columns under a contact over the thickness of the gel. The effect of the gel's shape
 varies over lengths of a thickness."""
 NEAR = 2.0
-"""Distance from the loads, in pitches, up to which columns have this distance; farther out it
-grows."""
+"""Distance from the loads, in pitches, up to which columns are a pitch apart; farther out, where
+displacements vary more slowly, their distance grows."""
 GROWTH = 0.5
 """Increase of the distance of columns from one to the next, in pitches. With 0.25, forces change by
 less than 0.1 %, and a press at a new place takes a tenth more time."""
 WIDEST = 1.5
-"""Largest distance of columns in pitches, half a thickness."""
+"""Largest distance of columns, in pitches: half a thickness, over which displacements far from the
+loads vary little."""
 REACH = 3.0
 """Distance from a footprint, in thicknesses, up to which the gel is modelled. Displacements of a
 bonded gel are below 1 % there of those at half a thickness."""
@@ -39,20 +40,22 @@ wider around large contacts."""
 LAYERS = 4
 """Number of elements from the skin to the base. With eight, corrections change by less than 2 %."""
 FINER = 8
-"""Number of steps between two columns in which the border of the skin is located."""
+"""Number of steps between two columns in which the border of the skin is located: to 0.04
+thicknesses, a sixth of a millimetre on GelSight Mini."""
 LEAST_UPRIGHT = 0.5
 """Cosine of the steepest slope of the skin against the tangent plane that is modelled, 60 degrees;
 beyond it a dome's skin is too steep for columns over the tangent plane."""
 TILE = 2.0
-"""Side of the cubes whose columns are traced together, over the longest column; it bounds the
-number of faces that are tested."""
+"""Side of the cubes whose columns are traced together, over the longest column. It bounds the
+number of faces that are tested: those within three lengths of a column."""
 LEAST_LEAVING = -0.5
 """Smallest cosine between the normal of a face and the mean direction of the lines of a tile at
 which the face is tested. Lines leave the base of a gel nearly at right angles, and single lines of
 a tile differ from their mean by up to 60 degrees; the skin itself, which is left out, faces
 them."""
 NEAREST_EXIT = 1e-3
-"""Distance (mm) behind the skin below which a face counts as the skin itself."""
+"""Distance (mm) behind the skin below which a face counts as the skin itself: half of the distance
+below which faces touch."""
 THINNEST, THICKEST = 0.15, 3.0
 """Smallest and largest length of a column, over the thickness under the contact; columns of other
 lengths miss the base, as at the side of a gel."""

@@ -15,7 +15,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 AT_ONCE = 128
-"""Number of elements whose matrices are computed together; they fit in a processor's cache."""
+"""Number of elements whose matrices are computed together: at 4.6 kB each, they fit in a
+processor's cache."""
 SIDES = ((0, 1, 1.0), (2, 3, -1.0), (0, 2, -1.0), (1, 3, 1.0))
 """Corners of each side of a cell along its run, and the sign that makes run x up point outward."""
 OPPOSITE = ((2, 3), (0, 1), (1, 3), (0, 2))
@@ -121,7 +122,7 @@ class GelElements:
         except LinAlgError:
             raise ContactError(
                 "the gel around a contact cannot be divided into elements",
-                hint="press elsewhere, or check the meshes of the skin and of the gel for folds",
+                hint="Press elsewhere, or check the meshes of the skin and of the gel for folds",
             ) from None
 
     def moved(self, right_side: FloatArray) -> FloatArray:

@@ -31,11 +31,11 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 TAPER = 1.0
-"""Distance, in thicknesses, over which the correction falls to 0 at the rim of the modelled
-region."""
+"""Distance, in thicknesses, over which the correction falls to 0 at the rim of the modelled region:
+a third of the distance between the loads and the rim."""
 BLIND = 0.5
-"""Distance from a load, in pitches, below which its stresses on the skin are neglected, as the
-facets are not known more finely."""
+"""Distance from a load, in pitches, below which its stresses on the skin are neglected: half of a
+facet, as the skin's shape is not known more finely."""
 
 
 class _BySource:
@@ -100,7 +100,7 @@ class GelPatch:
         self._right_sides = [_BySource(partial(self._right_side, axis), count) for axis in range(3)]
         self._beside = _BySource(self._beside_into, count)
         self._beside_along = [
-            _BySource(partial(self._beside_sideways, axis), count) for axis in range(3)
+            _BySource(partial(self._beside_tangential, axis), count) for axis in range(3)
         ]
 
     def correction(self, force: FloatArray) -> FloatArray:
@@ -120,7 +120,7 @@ class GelPatch:
         inside = np.einsum("ci,ci->c", rest, self._inward) / upright
         return self._on_grid(inside + self._beside.total(loads))
 
-    def sideways(self, force: FloatArray) -> FloatArray:
+    def tangential(self, force: FloatArray) -> FloatArray:
         """Return the displacement beyond that of a flat layer, along the tangent plane.
 
         Args:
@@ -146,7 +146,7 @@ class GelPatch:
         beside = np.sum([self._beside_along[a].total(loads[a]) for a in axes], axis=0)
         return np.stack([self._on_grid(each) for each in rest[:, :2].T + beside])
 
-    def _beside_sideways(self, axis: int, new: IntArray) -> FloatArray:
+    def _beside_tangential(self, axis: int, new: IntArray) -> FloatArray:
         """Return the displacement (2, columns, new) along x and y of the half-spaces minus that of
         the flat layer.
 

@@ -30,7 +30,8 @@ compared, which are the next larger ones. With few of them, contacts at differen
 kernels of their layer. A softer layer also lets the iteration over pressure and shape converge
 where the free sides of a gel make it softer."""
 SAME_PLACE = 6
-"""Number of decimals (of mm) to which equal places agree."""
+"""Number of decimals (of mm) to which equal places agree: far below any distance that matters, and
+above the rounding of double precision."""
 
 
 class _Kept(NamedTuple):

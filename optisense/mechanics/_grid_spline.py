@@ -21,7 +21,9 @@ class GridArea:
         self._start, self._pitch, self._shape = (x0, y0), pitch, shape
 
     def holds(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Return a mask of the points on the grid that are at least one grid point from its rim."""
+        """Return a mask (n,) of the points (n,), mm, on the grid that are at least one grid point
+        from its rim.
+        """
         column, row = self._place(x, y)
         rows, columns = self._shape
         return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
@@ -42,12 +44,14 @@ class GridSpline(GridArea):
         self._coefficients = spline_filter(values, order=3, mode="mirror")
 
     def value(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the value (n,) at points."""
+        """Return the value (n,) at points (n,), mm."""
         column, row = self._place(x, y)
         return self._between(row, column)
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return (3, n): the value, and its slopes by x and y from differences over one pitch."""
+        """Return the value, and its slopes by x and y from differences over one pitch, (3, n), at
+        points (n,), mm.
+        """
         column, row = self._place(x, y)
         half = 0.5
         rows = np.concatenate([row, row, row, row - half, row + half])
@@ -61,8 +65,10 @@ class GridSpline(GridArea):
             ]
         )
 
-    def at_once(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return `at` with slopes that are linear between grid points; a third of the time."""
+    def at_linear(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the values (3, n) of `at` with slopes that are linear between grid points, which
+        takes a third of the time.
+        """
         column, row = self._place(x, y)
         by_y, by_x = self._slopes
         return np.stack(
@@ -94,7 +100,18 @@ def binned(
     step: float,
     shape: tuple[int, int],
 ) -> FloatArray:
-    """Return a pressure on a coarser grid with the same force and centre, distributed linearly."""
+    """Return a pressure on a coarser grid with the same force and centre, distributed linearly.
+
+    Args:
+        pressure: (rows, columns) pressure, MPa.
+        place: its grid.
+        start: x and y of the first point of the coarser grid, mm.
+        step: pitch of the coarser grid, mm.
+        shape: its numbers of rows and columns.
+
+    Returns:
+        The pressure (shape), MPa.
+    """
     column = (place.x - start[0]) / step
     row = (place.y - start[1]) / step
     result = np.zeros(shape)

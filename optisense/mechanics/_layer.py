@@ -37,8 +37,8 @@ TABLE_POINTS = 1200
 """Number of entries of a table of distances from 0 to `FARTHEST`; a cubic spline through them is
 exact to 1e-6."""
 TINY = 1e-300
-"""Length (mm) added to arguments of logarithms, which keeps them finite where they are multiplied
-by zero."""
+"""Length (mm) added to arguments of logarithms: near the smallest number in double precision, it
+keeps them finite where they are multiplied by zero, and changes no other."""
 
 
 class Compliance(NamedTuple):
@@ -58,15 +58,15 @@ class Compliance(NamedTuple):
 
 
 def layer_compliance(wave_number: ArrayLike, poisson_ratio: float) -> Compliance:
-    """Return the compliances of a bonded layer of thickness 1.
+    """Return the compliances (...) of a bonded layer of thickness 1.
 
     With a = q h and k = 3 - 4 nu, all but `across` share the denominator k cosh 2a + 2 a^2 + (k^2 +
     1) / 2; their numerators are (1 - nu) (k sinh 2a - 2a), (1 - nu) (k sinh 2a + 2a) and (k (k - 1)
     (cosh 2a - 1) / 2 - 2 a^2) / 2. `across` is tanh a.
 
     Args:
-        wave_number: q h, 0 or more.
-        poisson_ratio: below 0.5.
+        wave_number: (...) the product q h, 0 or more.
+        poisson_ratio: Poisson's ratio, below 0.5.
     """
     a = np.asarray(wave_number, dtype=np.float64)
     k = 3.0 - 4.0 * poisson_ratio
@@ -137,11 +137,11 @@ def layer_correction(distance: FloatArray, poisson_ratio: float) -> FloatArray:
     """Return the normal displacement of a layer by a point force, minus that of a half-space.
 
     Args:
-        distance: distance from the force, 0 to `FARTHEST` thicknesses.
+        distance: (...) distance from the force, 0 to `FARTHEST` thicknesses.
         poisson_ratio: Poisson's ratio, below 0.5.
 
     Returns:
-        The displacement (mm) for 1 N, a thickness of 1 mm and a shear modulus of 1 MPa.
+        The displacement (...), mm, for 1 N, a thickness of 1 mm and a shear modulus of 1 MPa.
     """
     return np.asarray(_corrections(poisson_ratio).normal(distance))
 
@@ -218,15 +218,13 @@ class SquareLoad:
     poisson_ratio: float
 
     def pressed_in(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the normal displacement (mm) of points (arrays of one shape, mm) by a pressure of
-        1 MPa.
-        """
+        """Return the normal displacement (...), mm, of points (...), mm, by a pressure of 1 MPa."""
         half_space = self._sum(_x_squared, x, y) + self._sum(_y_squared, x, y)
         half_space *= (1.0 - self.poisson_ratio) / (2.0 * np.pi)
         return self._total(half_space + self._corrected("normal", x, y), x, y)
 
     def kernels(self, x: FloatArray, y: FloatArray) -> LoadKernels:
-        """Return all displacements (mm) of points (arrays of one shape, mm) by loads of 1 MPa."""
+        """Return all displacements, (...) each, mm, of points (...), mm, by loads of 1 MPa."""
         nu, inverse = self.poisson_ratio, 1.0 / (2.0 * np.pi)
         x_part, y_part = self._sum(_x_squared, x, y), self._sum(_y_squared, x, y)
         r = np.hypot(x, y)
@@ -251,7 +249,9 @@ class SquareLoad:
     def _sum(
         self, term: Callable[[FloatArray, FloatArray], FloatArray], x: FloatArray, y: FloatArray
     ) -> FloatArray:
-        """Return the definite integral over the square, from an antiderivative at its corners."""
+        """Return the definite integral (...) over the square, from an antiderivative at its
+        corners.
+        """
         half = self.side / 2.0
         upper = term(x + half, y + half) - term(x - half, y + half)
         return upper - term(x + half, y - half) + term(x - half, y - half)

@@ -97,7 +97,7 @@ def solve_normal_contact(
     raise ContactError(
         f"the pressure under an indenter is not found in {MAX_ITERATIONS} iterations; {rest:.2g} "
         f"mm of gap or overlap remain, where {tolerance * deepest:.2g} mm would do",
-        hint="press less deep, or check the indenter's shape for spikes",
+        hint="Press less deep, or check the indenter's shape for spikes",
     )
 
 

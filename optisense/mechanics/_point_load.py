@@ -13,8 +13,7 @@ FloatArray = NDArray[np.float64]
 
 NEAREST_SQUARE = 1e-12
 """Lower bound on squared distances (mm^2), so that results are finite at the point of the load
-itself."""
-
+itself: that of a distance of 1e-6 mm."""
 
 INTO = 2
 """Axis of a force into the half-space; those of forces along its surface are 0 and 1."""
@@ -56,7 +55,7 @@ def _displacements_along(offsets: FloatArray, poisson_ratio: float) -> FloatArra
 
 def gradients(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> FloatArray:
     """Return the derivatives (..., 3, 3) of `displacements`: row i has those of component i by x, y
-    and z.
+    and z. The arguments are those of `displacements`.
     """
     if axis == 1:
         found = gradients(offsets[..., SWAPPED], poisson_ratio, 0)

@@ -13,7 +13,7 @@ from optisense.errors import ContactError
 from optisense.mechanics._displacement_field import (
     DisplacementField,
     grid_response,
-    sideways_beyond,
+    tangential_beyond,
 )
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._footprint import Footprint
@@ -33,7 +33,7 @@ FloatArray = NDArray[np.float64]
 
 SETTLED = 1e-4
 """Change (mm) of the displacements that contacts cause at each other at which the iteration over
-contacts has converged."""
+contacts has converged: below the tolerance of the pressure of a press of 0.8 mm."""
 UNSETTLED = 1e-3
 """Change (mm) of the displacements in the last iteration from which on the result is refused: a
 sixtieth of a pixel of GelSight Mini. Below it, an iteration may stall at the tolerance of the
@@ -192,7 +192,7 @@ class PressedSkin:
             x, y = local[:, 0].copy(), local[:, 1].copy()
             found[facing, 0] += field.pressure(x, y)
             found[facing, 1] = np.maximum(found[facing, 1], field.penetration(x, y))
-            moved = np.stack([*field.sideways(x, y), -field.depth(x, y)], axis=1)
+            moved = np.stack([*field.tangential(x, y), -field.depth(x, y)], axis=1)
             found[facing, 2:] += moved @ place.axes.T
         return SkinMaps(
             found[:, 0].reshape(shape), found[:, 1].reshape(shape), found[:, 2:].reshape(*shape, 3)
@@ -291,7 +291,7 @@ def _dragged(
         if patch is None or not shear.any():
             break
         loads = np.concatenate([shear, np.zeros((1, *place.overlap.shape))])
-        splines = sideways_beyond(patch, loads, place, elasticity.shear_modulus)
+        splines = tangential_beyond(patch, loads, place, elasticity.shear_modulus)
         found = np.stack([each.value(x, y) for each in splines]).reshape(wanted.shape)
         change = float(np.abs(found - beyond).max())
         beyond = relaxation.next(found)
@@ -320,7 +320,7 @@ def _refuse_unsettled(what: str, turns: int, change: float) -> None:
     raise ContactError(
         f"{what}, in a gel of this shape, does not settle in {turns} iterations; the last one "
         f"moved the skin by {change:.2g} mm, where {UNSETTLED:g} mm would do",
-        hint="press less deep, move contacts apart, or away from the sides of the gel",
+        hint="Press less deep, move contacts apart, or away from the sides of the gel",
     )
 
 

@@ -9,7 +9,7 @@ FloatArray = NDArray[np.float64]
 
 LEAST, MOST = 0.2, 1.5
 """Smallest and largest share of a change that is taken, so that no single iteration throws the next
-one far off."""
+one far off: Aitken's estimate is unreliable where two changes are nearly equal."""
 
 
 class Relaxation:
@@ -28,7 +28,7 @@ class Relaxation:
         self._share = 1.0
 
     def next(self, found: FloatArray) -> FloatArray:
-        """Return the next argument, from the result of the last one.
+        """Return the next argument (...), from the result of the last one.
 
         Args:
             found: (...) result of the function for the last argument.

@@ -24,13 +24,15 @@ FREE_SIDE = 1.0
 """Distance (mm) of the middle of a contact from a free side of the gel, below which the force is
 more than 3 % too small; measured with a ball of radius 1.5 mm on the pad of GelSight Mini."""
 TOO_SMALL = 22
-"""Largest error (%) of that force, at 0.2 mm from the side."""
+"""Largest error (%) of that force, measured as above at 0.2 mm from the side."""
 STEEP = "skin that is steeper than 60 degrees against it"
 """Description of the skin for which there are no elements (`gel_columns.LEAST_UPRIGHT`)."""
 
 
 def rims_in_words(design: SensorDesign) -> str:
-    """Describe where forces of contacts on a design's skin are inaccurate; empty if nowhere."""
+    """Return a sentence part that says where forces of contacts on a design's skin are inaccurate;
+    empty if nowhere.
+    """
     meshes = design.deformed_meshes()
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     return Rims(TriangleMesh.joined(skins).welded()).in_words() if skins else ""
@@ -62,7 +64,9 @@ class Rims:
         return ""
 
     def in_words(self) -> str:
-        """Describe where forces of contacts are inaccurate; empty if the skin has no rim."""
+        """Return a sentence part that says where forces of contacts are inaccurate; empty if the
+        skin has no rim.
+        """
         if self._has_steep_rim():
             return f"forces within {STEEP_RIM:g} mm of the steep rim of the gel are not reliable"
         if len(self._border):

@@ -13,7 +13,8 @@ from optisense.mechanics._convolution import GridResponse
 FloatArray = NDArray[np.float64]
 
 TOLERANCE = 1e-4
-"""Relative change of the shear in a step at which the iteration ends."""
+"""Relative change of the shear (root of the sum of squares) in a step at which the iteration ends,
+far below the accuracy of friction coefficients."""
 MAX_ITERATIONS = 1000
 """Number of iterations after which the solver fails; contacts of 64 points across take 50 to
 150."""
@@ -79,10 +80,10 @@ def solve_shear(
         return shear
     if start is not None:
         shear = _within(start, limit)
-    step = 1.0 / response.largest_sideways()
+    step = 1.0 / response.largest_tangential()
     ahead, momentum = shear, 1.0
     for _ in range(MAX_ITERATIONS):
-        slope = response.sideways(ahead) - wanted
+        slope = response.tangential(ahead) - wanted
         found = _within(ahead - step * slope, limit)
         change = found - shear
         if ((ahead - found) * change).sum() > 0.0:  # the momentum points uphill: restart
@@ -97,7 +98,7 @@ def solve_shear(
     raise ContactError(
         f"the shear under an indenter is not found in {MAX_ITERATIONS} iterations; its last change "
         f"was {100 * rest:.2g} %",
-        hint="shift or turn the indenter less, or check its shape for spikes",
+        hint="Shift or turn the indenter less, or check its shape for spikes",
     )
 
 

@@ -153,9 +153,9 @@ def test_a_flat_gel_is_dragged_and_turned_alike_by_both_solvers(monkeypatch):
     assert elements.shear_force == pytest.approx(flat.shear_force, rel=0.005, abs=1e-3)
     assert elements.torque == pytest.approx(flat.torque, rel=0.005)
     x, y = np.array([0.0, 2.5, 3.0]), np.array([0.0, 0.5, -2.0])
-    moved = flat.field.sideways(x, y)
+    moved = flat.field.tangential(x, y)
     assert moved[:, 0] == pytest.approx(motion["shift"], rel=0.01)
-    assert elements.field.sideways(x, y) == pytest.approx(moved, abs=0.002)
+    assert elements.field.tangential(x, y) == pytest.approx(moved, abs=0.002)
     assert elements.torque != flat.torque
 
 
@@ -243,7 +243,7 @@ def test_shear_on_a_dome_does_the_same_work_on_other_shear():
     for axis, offset in spots:
         force = np.zeros((3, *patch.shape))
         force[(axis, *(middle + offset))] = 1.0
-        found.append(patch.sideways(force))
+        found.append(patch.tangential(force))
     matrix = np.array([[each[(a, *(middle + o))] for a, o in spots] for each in found])
     assert np.abs(matrix).max() > 2e-3
     assert matrix == pytest.approx(matrix.T, abs=0.05 * np.abs(matrix).max())
