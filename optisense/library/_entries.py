@@ -20,7 +20,7 @@ Value = TypeVar("Value", bound=Model)
 Text = Annotated[str, Field(min_length=1, max_length=2000)]
 
 NOT_NUMBERS = frozenset({"kind", "shape", "library", "colour", "part", "maker"})
-"""Fields that need no source: words, and the names of colours."""
+"""Fields of an entry that need no source: words, and the names of colours."""
 
 
 class Source(Model):

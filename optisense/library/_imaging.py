@@ -47,8 +47,11 @@ def with_imaging(
         }
         sources["blur"] = found.source("f_number")
     if not values:
-        knowing = "no distortion, shading, noise, colours or tone curve"
-        raise LibraryError(f"the library knows {knowing} of camera '{name}'")
+        raise LibraryError(
+            f"the library has no data on distortion, shading, noise, colours or tone curve of "
+            f"camera '{name}'",
+            hint="Choose a camera with such data, or give the design's camera its own",
+        )
     of_camera = design.camera.model_dump(mode="json") | values
     result = set_value(design, "camera", of_camera)
     replaced = [["camera", field] for field in values]

@@ -7,9 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 LENS_MISFIT = 0.1
-"""Largest relative difference between the focal length and that of the field of view: vendors round
-and lenses distort (of the Raspberry Pi cameras the worst is off by 5 %).
-"""
+"""Largest relative difference between the focal length and that of the field of view. Vendors round
+and lenses distort; of the Raspberry Pi cameras the worst is off by 5 %, half of this."""
 
 PROJECTIONS: dict[str, Callable[[float], float]] = {
     "perspective": lambda half: float(np.tan(half)) if half < np.pi / 2.0 else np.inf,
@@ -25,7 +24,7 @@ def lens_misfit(
     pixel_size: float | None,
     focal_length: float | None,
 ) -> tuple[str, str] | None:
-    """Check whether a field of view fits the focal length and the width of the image.
+    """Return the problem of a field of view that does not fit the focal length and image width.
 
     A perspective lens of focal length f shows 2 atan(w / 2f) across a width w, an equidistant one w
     / f.

@@ -64,7 +64,7 @@ def add_file(file: str | Path, kind: str | None = None, name: str | None = None)
         detected = kind_of(data)
         if detected is None:
             raise LibraryError(
-                "can't tell what kind of part this is",
+                "the kind of part in the file is unclear",
                 where=f"{file}:{lines.get(('value',), 1)}",
                 hint="Name it: --kind material, coating, light or camera; a file holds one entry "
                 "with 'description', 'value' and 'sources'",
@@ -126,7 +126,10 @@ def add_ies(
     about = Source(status=Status.SOURCED, source=_about(data) or file.name, date=source.date)
     sources = {field: source for field, value in given.items() if value is not None}
     if not light.flux or max(light.colour) <= 0.0:
-        raise LibraryError("the flux and at least one value of the colour must be above 0")
+        raise LibraryError(
+            "a light needs a flux above 0, and a colour with a value above 0",
+            hint="Give its radiant flux in mW, and its colour as R,G,B from 0 to 1",
+        )
     entry = LightEntry(
         description=description or f"Light with the IES file {file.name}",
         value=IesEmitter(file=f"{name}.ies"),
@@ -195,7 +198,7 @@ def check_new_name(name: str) -> None:
     """
     if NAME.fullmatch(name) is None:
         raise LibraryError(
-            f"'{name}' can't be a name",
+            f"'{name}' can't be the name of a part",
             hint="Give one of letters, digits, '-' and '_' with --name",
         )
     for kind in KINDS:
@@ -239,7 +242,7 @@ def parse_colour(text: str) -> tuple[str, Colour]:
 
 
 def _about(ies: bytes) -> str:
-    """Return the header of an IES file on its origin."""
+    """Return what the header of an IES file says about its origin."""
     header = ies.decode("latin-1").split("TILT=")[0]
     words = [
         match[1].strip()

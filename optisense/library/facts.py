@@ -21,11 +21,12 @@ UNITS = {
     "pixel_size": "micrometres",
     "focal_length": "mm",
 }
-"""Units of the fields around a value, and of a camera; those of a kind are in its class."""
-
+"""Units of the fields of an entry beside its value, and of a camera; those of a kind are in its
+class."""
 
 LONGEST_TABLE = 4
-"""Largest number of rows of a table that is shown number by number."""
+"""Largest number of rows of a table that is shown number by number: a colour matrix has three, and
+a shading table of twelve would fill the screen."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class Fact:
 
 
 def summary(entry: AnyEntry) -> str:
-    """Return the most informative numbers, in a few words."""
+    """Return the most informative numbers of an entry, in a few words."""
     value: Any = entry.value
     if isinstance(value, CameraModel):
         wide, high, _ = value.angles()

@@ -33,10 +33,11 @@ room lighting. Tactile sensors have no white light of their own to balance by.
 """
 
 LARGEST_FILE = 4_000_000
-"""Largest size of a tuning file, bytes; the largest of libcamera's own has some 100,000."""
+"""Largest size of a tuning file, bytes: forty times that of the largest of libcamera's own, some
+100,000."""
 
 ROUNDING = 5
-"""Number of decimals that are kept of computed values: the files have up to 5."""
+"""Number of decimals that are kept of computed values, as many as the files have at most."""
 
 LEAST_DETERMINANT = 1e-3
 """Smallest determinant of a colour matrix that can be inverted; those of real cameras have some 2
@@ -100,7 +101,7 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
             ) from None
     if not values:
         raise LibraryError(
-            "the tuning file tells nothing of black level, noise, shading, colours or tone curve",
+            "the tuning file has no data on black level, noise, shading, colours or tone curve",
             where=str(path),
             hint=NO_TUNING,
         )
@@ -108,7 +109,7 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             _add_crosstalk(values, derived)
     except (ArithmeticError, np.linalg.LinAlgError) as error:
-        message = f"the colours can't be undone ({error})"
+        message = f"the processor's change of colours can't be inverted ({error})"
         raise LibraryError(message, where=f"{path}: rpi.ccm", hint=NO_TUNING) from None
     except LibraryError as error:
         raise LibraryError(error.message, where=f"{path}: rpi.ccm", hint=NO_TUNING) from None
@@ -134,7 +135,7 @@ def _algorithms(path: Path) -> dict[str, Any]:
                 }
     if not found:
         raise LibraryError(
-            "this is no tuning file: it has no section whose name begins with 'rpi.'",
+            "the file is no tuning file: it has no section whose name begins with 'rpi.'",
             where=str(path),
             hint=NO_TUNING,
         )
@@ -224,7 +225,8 @@ def _add_crosstalk(values: dict[str, Any], derived: dict[str, str]) -> None:
     matrix = np.array(values["colour_matrix"])
     if abs(np.linalg.det(matrix)) < LEAST_DETERMINANT:
         raise LibraryError(
-            "the colour matrix mixes the channels so that it can't be undone", hint=NO_TUNING
+            "the colour matrix can't be inverted, as it maps different colours to the same one",
+            hint=NO_TUNING,
         )
     undone = np.linalg.inv(matrix * np.array(values.get("white_balance", (1.0, 1.0, 1.0))))
     values["crosstalk"] = np.round(undone, ROUNDING).tolist()

@@ -28,10 +28,10 @@ METRES = 1e-3
 KILOGRAMS = 1e-6
 """Mass of one mm^3 of a density of 1 g/cm^3, kg."""
 USUAL_FRICTION = 1.0
-"""Friction of a gel whose material gives none: that of the library's silicones."""
+"""Coefficient of friction of a gel whose material gives none: that of the library's silicones."""
 WIDEST_PINHOLE = 170.0
-"""Largest vertical angle (degrees) of the pinhole camera that stands for a fisheye: a pinhole sees
-less than 180 degrees, and near it only the rim of its picture."""
+"""Largest vertical angle (degrees) of the pinhole camera that stands for a fisheye. A pinhole sees
+less than 180 degrees, and near this limit nearly all of its picture shows the rim of its view."""
 
 
 @dataclass(frozen=True)
@@ -212,7 +212,12 @@ def _without_overlaps(design: SensorDesign, solids: list[Shape]) -> dict[str, An
 def mass_properties(
     bodies: list[Any], densities: list[float]
 ) -> tuple[float, FloatArray, FloatArray]:
-    """Return the mass (kg), the centre (3,), m, and the inertia (3, 3), kg m^2, about it."""
+    """Return the mass (kg), the centre (3,), m, and the inertia (3, 3), kg m^2, about it.
+
+    Args:
+        bodies: closed bodies, each a `manifold3d.Manifold`, mm.
+        densities: mass of one mm^3 of each, kg.
+    """
     total, moment, about_origin = 0.0, np.zeros(3), np.zeros((3, 3))
     for body, density in zip(bodies, densities, strict=True):
         mesh = body.to_mesh64()

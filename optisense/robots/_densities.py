@@ -11,7 +11,8 @@ OF_MATERIALS: dict[str, float] = {
     "polycarbonate": 1.20,  # ISO 1183, usual in data sheets
     "glass-bk7": 2.51,  # Schott, data sheet of N-BK7
 }
-"""Densities of materials of the library that differ from those of their roles."""
+"""Densities (g/cm^3) of materials of the library that differ from those of their roles, from the
+sources beside them."""
 
 OF_ROLES: dict[Role, float] = {
     Role.SENSING_SURFACE: 1.03,
@@ -21,7 +22,8 @@ OF_ROLES: dict[Role, float] = {
     Role.MIRROR: 2.50,  # of float glass (EN 572)
     Role.BLOCKER: 1.24,  # of printed PLA without cavities
 }
-"""Densities that are assumed for the parts of a role."""
+"""Densities (g/cm^3) that are assumed for the parts of a role: those of its usual material, which
+is named beside each."""
 
 
 def density_of(shape: Shape) -> float:

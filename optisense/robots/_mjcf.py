@@ -10,8 +10,8 @@ import numpy as np
 from optisense.robots._body import SensorBody
 
 LEAST_HALF_SIDE = 5e-4
-"""Half the smallest side (m) of the box in which the touch sensor counts contacts: objects rest on
-the skin with their contacts up to some tenths of a mm off it."""
+"""Half of the smallest side (m) of the box in which the touch sensor counts contacts, which is 1
+mm: objects rest on the skin with their contacts up to some tenths of a millimetre off it."""
 
 
 def mjcf(body: SensorBody, folder: str) -> str:
@@ -72,7 +72,7 @@ def mjcf(body: SensorBody, folder: str) -> str:
 
 
 _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-"""Elements of a symmetric matrix in the order of MJCF."""
+"""Rows and columns of the elements of a symmetric matrix in the order of MJCF's `fullinertia`."""
 
 
 def numbers(values: Iterable[float]) -> str:

@@ -179,7 +179,7 @@ class TestRefusals:
         library.add_file(file)
         with pytest.raises(LibraryError, match="one of your own parts"):
             library.add_file(file)
-        with pytest.raises(LibraryError, match="can't be a name"):
+        with pytest.raises(LibraryError, match="can't be the name of a part"):
             library.add_file(file, name="our gel")
 
     def test_an_own_file_with_a_built_in_name_is_told_not_chosen(self, own: Path) -> None:

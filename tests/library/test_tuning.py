@@ -107,7 +107,7 @@ def without(key: str, **changes: Any) -> dict[str, Any]:
         (without("rpi.contrast", gamma_curve=[0, 0, 1]), "'rpi.contrast' is not as in"),
         (without("rpi.awb", ct_curve=[5000, 1, 1, 3000, 1, 1]), "does not rise"),
         (without("rpi.ccm", ccms=[]), "'rpi.ccm' is not as in"),
-        (without("rpi.ccm", ccms=[{"ct": 1, "ccm": [1.0] * 9}]), "can't be undone"),
+        (without("rpi.ccm", ccms=[{"ct": 1, "ccm": [1.0] * 9}]), "can't be inverted"),
     ],
 )
 def test_what_is_no_tuning_file_is_refused(tmp_path: Path, content: Any, says: str) -> None:

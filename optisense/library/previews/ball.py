@@ -24,18 +24,20 @@ from optisense.library.previews.studio import Studio, coloured_studio, white_stu
 FloatArray = NDArray[np.float64]
 
 SMOOTH = 1e-3
-"""GGX alpha below which a face is drawn as a plain mirror; its lobe is narrower than a pixel."""
+"""GGX alpha below which a face is drawn as a plain mirror: its lobe is 0.1 degrees wide, narrower
+than a pixel."""
 
 SHARP = 0.25
-"""Roughness below which lamps are found by sampled rays; above it they are points."""
+"""GGX alpha below which lamps are found by sampled rays. Above it, lobes are wider than the lamps
+(17 degrees), which then count as points of their solid angle."""
 
 SAMPLES_SMOOTH, SAMPLES_ROUGH = 6, 20
-"""Number of rays per pixel at smooth and at rough faces, where they scatter more."""
+"""Numbers of rays per pixel at smooth faces, where six smooth the edges, and at rough ones, where
+rays scatter and twenty leave little grain; the picture takes about a second."""
 
 STEPS = np.array([0.7548776662466927, 0.5698402909980532])
-"""Steps of a sequence that, added repeatedly modulo 1, fills the unit square evenly (Roberts, R2
-sequence).
-"""
+"""Steps of a sequence that, added repeatedly modulo 1, fills the unit square evenly (the R2
+sequence of Roberts 2018)."""
 
 
 def picture_of_ball(material: Material | CoatingModel, size: int = 280) -> NDArray[np.uint8]:
@@ -69,7 +71,7 @@ def picture_of_ball(material: Material | CoatingModel, size: int = 280) -> NDArr
 
 
 def _even(offset: FloatArray, number: int) -> FloatArray:
-    """Return the points of a sample's number in the unit square, (n, 2), shifted by offsets
+    """Return the points (n, 2) of a sample in the unit square, by its number, shifted by offsets
     (n, 2).
     """
     return np.asarray((offset + number * STEPS) % 1.0)

@@ -16,18 +16,21 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 DISTANCES = (40.0, 20.0, 10.0)
-"""Distances in front of the pupil at which the preview draws the camera's field, mm."""
+"""Distances in front of the pupil at which the preview draws the camera's field, mm: those of skins
+in tactile sensors."""
 
 STEEPEST = 80.0
-"""Largest angle from the axis up to which a footprint is drawn, degrees."""
-
+"""Largest angle from the axis up to which a footprint is drawn, degrees: it is then nearly six
+times as far from the axis as from the camera, and grows without limit towards 90."""
 
 SIDE_POINTS = 64
-"""Number of points on each side of the border of an image; an edge then looks smooth."""
+"""Number of points on each side of the border of an image; the curved border of a fisheye's
+footprint then looks smooth."""
 
 
 def border_directions(camera: CameraModel) -> FloatArray:
-    """Return unit directions (4 `SIDE_POINTS`, 3) of the image's border: x right, y up, z ahead.
+    """Return unit directions (n, 3) of n = 4 `SIDE_POINTS` points of the image's border: x right, y
+    up, z ahead.
 
     An equidistant camera's angle from the axis is proportional to the distance from the picture's
     middle; both projections see `fov` across the width.
@@ -49,8 +52,8 @@ def border_directions(camera: CameraModel) -> FloatArray:
 
 
 def footprint(camera: CameraModel, distance: float) -> FloatArray:
-    """Return the border of the visible area of a plane across the axis, without refraction, (n, 2)
-    mm.
+    """Return the border (n, 2), mm, of the visible area of a plane across the axis at a distance
+    (mm), without refraction.
 
     Beyond `STEEPEST` degrees from the axis the border is cut, as it extends to infinity.
     """
@@ -61,8 +64,8 @@ def footprint(camera: CameraModel, distance: float) -> FloatArray:
 
 
 def footprint_size(camera: CameraModel, distance: float) -> tuple[float, float]:
-    """Return width and height of the visible area of a plane across the axis, through its middle,
-    mm.
+    """Return width and height (mm), through its middle, of the visible area of a plane across the
+    axis at a distance (mm).
     """
     wide, high, _ = camera.angles()
     angles = np.minimum(np.array([wide, high]) / 2.0, STEEPEST)

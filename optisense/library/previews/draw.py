@@ -16,12 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 110
-"""Resolution of the pictures in dots per inch, at which letters are easy to read on a usual
-screen.
-"""
+"""Resolution of the pictures, dots per inch: letters of 9 points are then 14 pixels high, easy to
+read on a usual screen."""
 
 LONGEST = 130
-"""Number of characters of a description that fit across the picture."""
+"""Number of characters of a description that fit across the picture, which is 9 inches wide."""
 
 
 def draw(name: str, entry: AnyEntry) -> Figure:

@@ -22,7 +22,7 @@ LEGEND_COLOURS = 4
 
 
 def equivalent_solid_angle(emitter: LightModel) -> float:
-    """Return the flux of a light divided by its largest intensity, steradians."""
+    """Return the solid angle (sr) of a light: its flux divided by its largest intensity."""
     edges = np.linspace(0.0, 180.0, 3601)
     middle = 0.5 * (edges[1:] + edges[:-1])
     turns = np.arange(72) * 5.0

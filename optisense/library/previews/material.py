@@ -26,7 +26,8 @@ FloatArray = NDArray[np.float64]
 
 RGB = (("red", "#d62728"), ("green", "#2ca02c"), ("blue", "#1f5fd0"))
 INCIDENCE = 45.0
-"""Angle of incidence in the picture of a lobe, degrees from the normal."""
+"""Angle of incidence in the picture of a lobe, degrees from the normal: at 45 the mirror direction
+is at a right angle to the light, so that both are easy to tell apart."""
 
 
 def draw_material(figure: Figure, material: Material | CoatingModel) -> None:
@@ -87,7 +88,7 @@ def _reflectance_of_metal(axes: Axes, metal: Reflection) -> None:
 
 
 def lobes(surface: Reflection, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the light scattered in the plane of incidence, per steradian: reflectance times
+    """Return the light scattered in the plane of incidence, per steradian: the BRDF times the
     cosine.
 
     Args:

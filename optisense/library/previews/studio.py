@@ -14,7 +14,8 @@ FLOOR = -1.0
 SQUARE = 0.6
 """Side of a square of the floor, in radii of the ball; about three squares are visible below it."""
 DARK, BRIGHT = 0.16, 0.62
-"""Reflectance of the dark and of the bright squares of the floor."""
+"""Reflectances of the dark and of the bright squares of the floor, which clear balls refract
+visibly and without outshining the lamps."""
 
 
 @dataclass(frozen=True)
