@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-AGREES, DISAGREES, OPEN = "agrees", "disagrees", "cannot be told"
+AGREES, DISAGREES, OPEN = "agrees", "disagrees", "inconclusive"
 
 
 @dataclass(frozen=True)

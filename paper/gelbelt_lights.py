@@ -97,10 +97,12 @@ def claims(numbers: Values) -> list[Claim]:
     found = [
         Claim(
             "Light from the sides of the acrylic (design 1) hardly reaches the belt.",
-            f"it brings {number(100 * share if share is not None else None, 2)} % of the light of "
-            "the brightest design to what the camera sees",
+            "the part of the belt that the camera sees receives "
+            f"{number(100 * share if share is not None else None, 2)} % of the light of the "
+            "brightest design",
             None if share is None else share < DARK,
-            "The film of air between tape and acrylic decides: without it the light gets through.",
+            "The film of air between tape and acrylic is decisive: without it, the light reaches "
+            "the belt.",
         )
     ]
     for name, title in OBJECTIVES.items():
@@ -140,15 +142,16 @@ def third_is_best(column: Values, title: str) -> Claim:
 
 
 WHY_THIRD = (
-    "Both designs light two colours alike, from the sides of the belt, and differ in how far green "
-    "reaches. A score over balls tells that only as far as green decides it; and where green "
-    "competes with the other two it can cost what it brings. The paper judges the third design by "
-    "pictures, too. The roller, its angle, and where the LEDs are, are assumed in our model."
+    "Both designs have the same red and blue light from the sides of the belt, and differ in the "
+    "range of the green light. A score of pressed balls depends only in part on green, and where "
+    "green overlaps with the other two colours, more of it can also lower the score. The paper "
+    "also judges the third design by images. In the model, the roller, its angle and the positions "
+    "of the LEDs are assumed."
 )
 WHY_COATING = (
-    "Along a belt that is lit from its edges, light that a metallic coating sends on reaches the "
-    "middle, where a grey one would have stopped it; sizes of the window, of the belt and of the "
-    "rows of LEDs are assumed, and the paper shows normalised scores only."
+    "A metallic coating reflects light from the lit edges of the belt onwards to its middle, "
+    "whereas a diffuse grey coating would not. The sizes of the window, of the belt and of "
+    "the rows of LEDs are assumed, and the paper shows only normalised scores."
 )
 
 

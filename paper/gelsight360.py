@@ -245,10 +245,10 @@ def notes(numbers: Values) -> list[str]:
     """Notes on how many pixels a contact needs in order to count."""
     least = numbers["least_pixels"]
     return [
-        "The camera sees the far wall at a grazing angle, and few pixels of a ball there: a "
-        f"contact (NormDiff) and a line across it (RGB2Normal) count from {least} pixels on, where "
-        f"other sensors are asked for {LEAST_OF_NORMDIFF} and {LEAST_OF_RGB2NORMAL}. A design one "
-        "of whose nine contacts has less is left without a score."
+        "The camera sees the far wall at a grazing angle, and a ball there covers few pixels. A "
+        f"contact (NormDiff) and a line across it (RGB2Normal) therefore need only {least} pixels, "
+        f"instead of {LEAST_OF_NORMDIFF} and {LEAST_OF_RGB2NORMAL} as on the other sensors. A "
+        "design with fewer pixels in one of its nine contacts gets no score."
     ]
 
 
@@ -256,7 +256,7 @@ def tables(numbers: Values) -> list[Table]:
     """Colourings, the best of all, tips, resins, and what NormDiff hangs on."""
     found = [
         Table(
-            "Colourings of the paper's table (the paper's own scores in brackets)",
+            "Colourings of the paper's table (in brackets the paper's scores)",
             ["colouring", *OBJECTIVES.values()],
             [
                 [letters, *(f"{shown(each[n], 4)} ({PAPER[letters][n]:g})" for n in OBJECTIVES)]
@@ -266,7 +266,8 @@ def tables(numbers: Values) -> list[Table]:
     ]
     found.append(
         Table(
-            "The same by NormDiff in other ways; last, the rank correlation with the paper's",
+            "The same colourings by other definitions of NormDiff; the last row is the rank "
+            "correlation with the paper's scores",
             ["colouring", *BLIND],
             [
                 [letters, *(shown(each["ways"][way]) for way in BLIND)]
@@ -280,7 +281,7 @@ def tables(numbers: Values) -> list[Table]:
         found.append(
             Table(
                 f"All {every['colourings']:,} colourings, one seed",
-                ["objective", "best", "its score", "median", "worst", "rank of RGBRGBRG"],
+                ["objective", "best", "best score", "median", "worst", "rank of RGBRGBRG"],
                 [
                     [
                         title,
@@ -294,8 +295,8 @@ def tables(numbers: Values) -> list[Table]:
         )
     found.append(
         Table(
-            "Tips by 2to3PW (no random numbers in it: ± is over grids of chief rays)",
-            ["tip", "2to3PW", "with triangles that leap"],
+            "Tips by 2to3PW (which uses no random numbers: ± is over grids of chief rays)",
+            ["tip", "2to3PW", "with triangles across folds and gaps"],
             [
                 [tip, shown(each), shown(numbers["tips_with_leaps"][tip])]
                 for tip, each in numbers["tips"].items()
@@ -315,7 +316,7 @@ def tables(numbers: Values) -> list[Table]:
     )
     found.append(
         Table(
-            "What NormDiff hangs on (one seed)",
+            "NormDiff of other lights, coatings, resolutions and numbers of photons (one seed)",
             ["sensor", *BLIND, "pixels of the smallest contact"],
             [
                 [

@@ -52,8 +52,8 @@ def colour_claims(colourings: Values) -> list[Claim]:
             "RGBRGBRG has the best NormDiff of the five.",
             "no scores"
             if top is None
-            else f"{top} ({shown(column[top], 4)}); alike: {_all_but(alike, top)}; "
-            f"with {LITTLE_NOISE}: {little}",
+            else f"{top} ({shown(column[top], 4)}); not significantly different: "
+            f"{_all_but(alike, top)}; with {LITTLE_NOISE}: {little}",
             None
             if top is None
             else True
@@ -93,8 +93,8 @@ def _order(colourings: Values, name: str, title: str) -> Claim:
     reached, chance = spearman([p for p, _ in pairs], [m for _, m in pairs])
     agrees = None if reached != reached else reached >= MATCH
     return Claim(
-        f"The five colourings in the paper's order by {title}.",
-        f"rank correlation {reached:+.2f}; by chance as high in {100 * chance:.0f} % of orders"
+        f"The five colourings have the paper's order by {title}.",
+        f"rank correlation {reached:+.2f}; {100 * chance:.0f} % of random orders reach it"
         if agrees is not None
         else "no scores",
         agrees,
@@ -107,7 +107,7 @@ def _alike(colourings: Values) -> Claim:
     there = [mean for mean in means if mean is not None]
     paper = [each["rgb2normal"] for each in PAPER.values()]
     return Claim(
-        f"The five score alike by RGB2Normal ({min(paper):g} to {max(paper):g}).",
+        f"The five have similar scores by RGB2Normal ({min(paper):g} to {max(paper):g}).",
         f"{number(min(there))} to {number(max(there))}" if there else "no scores",
         max(there) - min(there) <= WIDER * (max(paper) - min(paper)) if there else None,
         WHY_RGB,
@@ -127,23 +127,25 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
             "2to3PW.",
             "no scores"
             if top is None
-            else f"tip {top} ({shown(tips[top])}); alike: {_all_but(alike, top)}",
+            else f"tip {top} ({shown(tips[top])}); not significantly different: "
+            f"{_all_but(alike, top)}",
             agrees,
-            "What lies between the ends of the family is our choice, and so are height and width "
-            "of the tip. 2to3PW grows with the evenness of the whole picture, so the wall and the "
-            "field of the camera count as much as the tip does. A neighbour of the paper's number "
-            "counts as the same.",
+            "The shapes between the ends of the family are assumed, and so are the height and the "
+            "width of the tip. 2to3PW depends on the uniformity over the whole image, so that the "
+            "wall and the field of view of the camera matter as much as the tip. A neighbour of "
+            "the paper's tip counts as agreement.",
         ),
         Claim(
             f"Its 2to3PW is {PAPERS_TIP_SCORE:g}.",
             "no scores"
             if top is None
-            else f"{shown(tips[top])}; {shown(with_leaps[top])} with triangles that leap over a "
-            "fold or a gap",
+            else f"{shown(tips[top])}; {shown(with_leaps[top])} with triangles across a fold or "
+            "a gap",
             None if score is None else abs(score - PAPERS_TIP_SCORE) <= 0.5 * PAPERS_TIP_SCORE,
-            "A ratio as small as the paper's means that areas scatter by many times their mean, as "
-            "they do where some triangles are huge: at grazing rays, and where neighbouring pixels "
-            "see different sides of an edge. The field and the lens of the camera are assumed.",
+            "A ratio as small as the paper's means that the standard deviation of the areas is "
+            "many times their mean. This happens if some triangles are very large: at grazing "
+            "rays, and where neighbouring pixels see different sides of an edge. The field of view "
+            "and the lens of the camera are assumed.",
         ),
     ]
 
@@ -158,23 +160,23 @@ def _resin(column: Values, title: str) -> Claim:
         f"({title}).",
         "no scores"
         if top is None
-        else f"{top} ({shown(column[top])}); alike: {_all_but(alike, top)}",
+        else f"{top} ({shown(column[top])}); not significantly different: {_all_but(alike, top)}",
         agrees,
-        "Gel and shell thickness, the places of the LEDs in the wall and the family between its "
-        "ends are assumed. The resin bends the camera's view and the light at the tip only; most "
-        "of the nine places are on the wall.",
+        "The thicknesses of gel and shell, the positions of the LEDs in the wall and the shapes "
+        "between the ends of the family are assumed. The resin refracts the camera's view and the "
+        "light only at the tip, and most of the nine places are on the wall.",
     )
 
 
 WHY_RGB = (
-    "The original has no blue among its eight groups, so that the ring at the foot is all the blue "
-    "there is; that ring, its colour and its power are assumed. The paper's own five differ by no "
-    "more than 0.03."
+    "The original colouring has no blue group among its eight groups, so that all blue light comes "
+    "from the ring at the foot. This ring, its colour and its power are assumed. The paper's five "
+    "scores differ by at most 0.03."
 )
 WHY_NORMDIFF = (
-    "The paper adds the ranges of two angles with weights that it does not give, and takes a "
-    "noise of 30 % without saying whether to either side or from end to end. Here both angles "
-    "count alike as degrees on the sphere, and the noise is to either side. The tables below have "
-    "the colourings in other ways, and NormDiff with other lights, fewer pixels and fewer photons. "
-    "Shapes of the body and power of the lights are assumed."
+    "The paper adds the ranges of two angles with weights that it does not give, and uses a noise "
+    "of 30 % without saying whether this is the half-width or the width of the range. Here, both "
+    "angles have the same weight as degrees on the sphere, and 30 % is the half-width. The tables "
+    "below show the colourings with other definitions, and NormDiff with other lights, fewer "
+    "pixels and fewer photons. The shape of the body and the power of the lights are assumed."
 )

@@ -118,7 +118,7 @@ def _cylinder(column: Values, title: str) -> Claim:
     top, alike = best(column)
     agrees = None if top is None or len(alike) == len(column) else f"{CYLINDER_BEST:g}" in alike
     return Claim(
-        f"On the cylinder a specularity of about {CYLINDER_BEST:g} scores best ({title}).",
+        f"On the cylinder, a specularity of about {CYLINDER_BEST:g} is best ({title}).",
         told_best(column, top, alike),
         agrees,
         WHY_COATING,
@@ -133,7 +133,7 @@ def _sphere(column: Values, title: str) -> Claim:
         if not agrees and any(float(value) <= SPHERE_MOST for value in alike):
             agrees = None
     return Claim(
-        f"On the sphere a specularity of up to {SPHERE_MOST:g} scores best ({title}).",
+        f"On the sphere, a specularity of up to {SPHERE_MOST:g} is best ({title}).",
         told_best(column, top, alike),
         agrees,
         WHY_COATING,
@@ -147,9 +147,9 @@ def _similar(all_scores: Values, label: str) -> Claim:
         if flat is None or bent is None:
             continue
         below.append(flat - bent <= SIMILAR[name] * abs(flat))
-        texts.append(f"{title} {number(bent)} against {number(flat)}")
+        texts.append(f"{title} {number(bent)}, flat sensor {number(flat)}")
     return Claim(
-        f"With the best coating the {label} is about as good as the flat sensor.",
+        f"With the best coating, the {label} is about as good as the flat sensor.",
         ", ".join(texts) or "no scores",
         all(below) if below else None,
         WHY_FLAT,
@@ -162,34 +162,34 @@ def _best_mean(column: Values) -> float | None:
 
 
 def told_best(column: Values, top: str | None, alike: list[str]) -> str:
-    """Such as ``best at 0.4 (0.81 ± 0.01); 0.3 can't be told from it``."""
+    """Such as ``best at 0.4 (0.81 ± 0.01); not significantly different: 0.3``."""
     if top is None:
         return "no scores"
     others = ", ".join(value for value in alike if value != top)
-    more = f"; not told from it by the seeds: {others}" if others else ""
+    more = f"; not significantly different: {others}" if others else ""
     return f"best at {top} ({shown(column[top])}){more}"
 
 
 WHY_COATING = (
-    "A metallic coating sends light on, away from where it came from, and so evens out how the "
-    "light of a curved gel arrives; how much of that is good depends on how low the light enters. "
-    "The paper gives neither the light guide nor the places of the LEDs, nor the depth of the "
-    "presses, nor how rough its metal is at a given specularity; ours are assumed (see the "
-    "sensor's provenance, and the experiment on robustness)."
+    "A metallic coating reflects light away from its source and thereby makes the illumination of "
+    "a curved gel more even. The specularity at which this effect is best depends on the height at "
+    "which the light enters. The paper gives neither the light guide, the positions of the LEDs, "
+    "the depth of the presses, nor the roughness of the metal at a given specularity. Those of the "
+    "models are assumed (see the provenance of the sensor, and the experiment on robustness)."
 )
 WHY_FLAT = (
-    "Where the gel bulges, the light from the sides of the guide meets it on one flank only, and a "
-    "ball's far flank is in shadow: colours there no longer follow the tilt. The paper counts as "
-    "similar what its figure shows without numbers; here it is within "
-    f"{100 * SIMILAR['rgb2normal']:g} % of RGB2Normal and {100 * SIMILAR['normdiff']:g} % of "
-    "NormDiff."
+    "Where the gel is curved, the light from the sides of the guide reaches only one flank of a "
+    "ball, and the other flank is in shadow: colours there do not depend on the tilt. The paper "
+    "shows the similarity in a figure without numbers. Here, scores are similar if they differ by "
+    f"at most {100 * SIMILAR['rgb2normal']:g} % (RGB2Normal) and {100 * SIMILAR['normdiff']:g} % "
+    "(NormDiff)."
 )
 
 
 FITTED_NOTE = (
-    "With the light and camera of a real unit, the built-in `gelsight-mini` and its bent forms, "
-    "2 and 6 hold, 1 cannot be told, and the others do not hold; [the page on calibration]"
-    "(calibration.md#a-real-gelsight-mini) has its scores."
+    "With the light and camera of a real unit (the built-in `gelsight-mini` and its cylindrical "
+    "and spherical forms), statements 2 and 6 hold, 1 is inconclusive, and the others do not hold; "
+    "[the page on calibration](calibration.md#a-real-gelsight-mini) has the scores."
 )
 
 

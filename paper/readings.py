@@ -1,8 +1,8 @@
-"""The paper's statements under other readings of what it leaves open.
+"""The paper's statements under other interpretations of its definitions.
 
 The OptiSense paper leaves several definitions open: what specularity changes, how the camera is
-exposed, how deep the balls are pressed, and details of both scores. Each choice is a *reading*. All
-combinations of them are scored, and each statement is held against each.
+exposed, how deep the balls are pressed, and details of both scores. Each combination of choices is
+an interpretation, a *reading*. All of them are scored, and each statement is tested under each.
 """
 
 from __future__ import annotations
@@ -207,18 +207,19 @@ def _named(what: str, claim: Claim) -> Claim:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """Each statement: true under all readings, under none, or hanging on the reading."""
+    """Whether each statement holds under all readings, under none, or under some of them."""
     found = []
     rows = [item for group in _groups(numbers) for item in group["held"].items()]
     for says, row in rows:
         told = [holds for holds in row if holds is not None]
         count = sum(told)
         agrees = None if not told or 0 < count < len(row) else count == len(row)
-        as_read = {True: "holds", False: "does not hold", None: "cannot be told"}[row[0]]
+        as_read = {True: "holds", False: "does not hold", None: "is inconclusive"}[row[0]]
         found.append(
             Claim(
                 says,
-                f"holds under {count} of {len(row)} readings; as read here it {as_read}",
+                f"holds under {count} of {len(row)} interpretations; under the default it "
+                f"{as_read}",
                 agrees,
                 WHY_SOME if agrees is None else WHY_NONE,
             )
@@ -226,10 +227,11 @@ def claims(numbers: Values) -> list[Claim]:
     return found
 
 
-WHY_SOME = "What is left open in the paper decides (see the table)."
+WHY_SOME = "The verdict depends on definitions that the paper does not give (see the table)."
 WHY_NONE = (
-    "None of these readings makes it true. What remains are others, and the sensor itself: its "
-    "geometry, lights and materials (see the experiment on robustness)."
+    "The statement holds under none of these interpretations. Other interpretations, or the "
+    "geometry, lights and materials of the sensor, must be the cause (see the experiment on "
+    "robustness)."
 )
 
 
@@ -252,8 +254,8 @@ def tables(numbers: Values) -> list[Table]:
         rows += own
         shares.append(
             Table(
-                "Share of readings under which each statement holds, %, by the options in the "
-                "order of the first table",
+                "Share of interpretations under which each statement holds, %, by the options in "
+                "the order of the first table",
                 ["statement", *names],
                 [[says, *cell] for says, cell in zip(held, cells, strict=True)],
             )
@@ -261,13 +263,14 @@ def tables(numbers: Values) -> list[Table]:
     return [
         Table(
             "Statements that hold with one option changed from the default, and the share of "
-            "statements that hold over all readings with this option",
-            ["factor", "option", "changed alone", "over all readings"],
+            "statements that hold over all interpretations with this option",
+            ["factor", "option", "changed alone", "over all interpretations"],
             rows,
         ),
         Table(
-            "The readings with which most statements on pressed balls and on the mirror hold",
-            ["statements", "reading"],
+            "The interpretations under which most statements on pressed balls and on the mirror "
+            "hold",
+            ["statements", "interpretation"],
             best,
         ),
         *shares,
@@ -305,13 +308,13 @@ def _counts(held: dict[str, list[bool | None]]) -> list[int]:
 def notes(numbers: Values) -> list[str]:
     """Notes on what is varied, and for which sensors."""
     return [
-        "Every combination of the options is one reading. *Cannot be told* means here that a "
-        "statement holds under some readings and not under others. Law, exposure and the readings "
-        "of RGB2Normal are varied for GelSight Mini and GelBelt; for GelSight360's colourings, "
-        "which are computed from layers, depth and NormDiff are. The bounds of the mirror and the "
-        "part of the skin are varied for GelSight Svelte, whose mirror is searched by gradient "
-        "here. "
-        "Defaults follow the paper's words and not this table. With few specularities a statement "
+        "Each combination of the options is one interpretation. In this section, *inconclusive* "
+        "means that a statement holds under some interpretations and not under others. The effect "
+        "of the specularity, the exposure and the definition of RGB2Normal are varied for GelSight "
+        "Mini and GelBelt. For GelSight360's colourings, which are computed from layers, the depth "
+        "and the definition of NormDiff are varied. For GelSight Svelte, whose mirror is optimised "
+        "by the gradient method, the bounds of the mirror and the part of the skin are varied. The "
+        "defaults follow the paper's text and not this table. With few specularities, a statement "
         "on the best one may hold by chance: a quick run has three."
     ]
 
@@ -325,15 +328,20 @@ def draw(numbers: Values, pictures: Pictures) -> Figure:
     counts = _counts(numbers["held"])
     most = len(numbers["held"])
     axes.bar(range(most + 1), [counts.count(k) for k in range(most + 1)], color=COLOURS[0])
-    axes.axvline(counts[0], color=COLOURS[1], linestyle="--", label="as read here")
-    finish(axes, "Readings by how many statements hold", f"statements of {most}", legend=True)
+    axes.axvline(counts[0], color=COLOURS[1], linestyle="--", label="default")
+    finish(
+        axes,
+        "Interpretations by number of statements that hold",
+        f"statements of {most}",
+        legend=True,
+    )
     return figure
 
 
 EXPERIMENT = Experiment(
     name="readings",
-    title="Other readings of the paper's definitions",
-    about="what holds if specularity, exposure, depth and both scores are read otherwise",
+    title="Other interpretations of the paper's definitions",
+    about="what holds under other definitions of specularity, exposure, depth and both scores",
     steps=steps,
     claims=claims,
     tables=tables,

@@ -92,19 +92,19 @@ def _claim(text: str, found: Values) -> Claim:
     unsure = [name for name, holds in verdicts.items() if holds is None]
     here = f"holds in {len(holding)} of {len(verdicts)} geometries"
     if failing:
-        here += f"; not with {', '.join(failing)}" if holding else ""
+        here += f"; does not hold for: {', '.join(failing)}" if holding else ""
     if unsure:
         here += f"; within the noise or without a score: {', '.join(unsure)}"
     agrees = True if holding and not failing and not unsure else None
     if failing and not holding:
         agrees = False
     why = (
-        "No change of the assumed dimensions within their plausible range brings it about, so "
-        "something else than these explains the difference."
+        "The statement does not hold for any of these values of the assumed dimensions, so that "
+        "another cause explains the difference."
         if agrees is False
-        else "It hangs on dimensions that are assumed here."
+        else "The statement depends on assumed dimensions."
         if failing
-        else "In some geometries the margin is no larger than its noise."
+        else "In some geometries, the margin is no larger than its noise."
     )
     return Claim(text, here, agrees, why)
 
@@ -113,9 +113,10 @@ def notes(numbers: Values) -> list[str]:
     """What a geometry is."""
     return [
         "A geometry is the sensor with one assumed dimension at an end of its plausible range, or "
-        "with all of them drawn. A statement agrees here if it holds in all of them, and disagrees "
-        "if it holds in none. The noise of a margin is its standard deviation over the seeds of "
-        "the sensor as assumed."
+        "with random values of all of them. A statement agrees if it holds in all geometries, and "
+        "disagrees if it holds in none. A margin is the amount by which a statement holds, and is "
+        "negative if it does not. Its noise is the standard deviation over the seeds of the sensor "
+        "as assumed."
     ]
 
 
@@ -136,7 +137,7 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def _cell(each: Values) -> str:
-    mark = {True: "holds", False: "does not", None: "?"}[each["holds"]]
+    mark = {True: "holds", False: "does not hold", None: "inconclusive"}[each["holds"]]
     return "no score" if each["margin"] is None else f"{each['margin']:+.3g} ({mark})"
 
 
@@ -167,7 +168,7 @@ def draw(numbers: Values, pictures: Pictures) -> Figure:
 EXPERIMENT = Experiment(
     name="robustness",
     title="Robustness of the conclusions",
-    about="which conclusions survive a change of the assumed dimensions, and which do not",
+    about="which conclusions hold for other values of the assumed dimensions, and which do not",
     steps=steps,
     claims=claims,
     tables=tables,

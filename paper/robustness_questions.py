@@ -206,8 +206,8 @@ QUESTIONS = (
     Question(
         "gelsight-mini-ideal-cylindrical",
         {
-            f"mini {name}": f"On the cylindrical Mini a specularity of {LOW} is better than {HIGH} "
-            f"by {title}."
+            f"mini {name}": f"On the cylindrical Mini, a specularity of {LOW} is better than "
+            f"{HIGH} by {title}."
             for name, title in OBJECTIVES.items()
         },
         _mini_units,
@@ -220,8 +220,8 @@ QUESTIONS = (
                 f"belt {name}": f"GelBelt's light design 3 is better than 2 by {title}."
                 for name, title in OBJECTIVES.items()
             },
-            "belt light": "GelBelt's light design 1 brings less than "
-            f"{100 * gelbelt_lights.DARK:g} % of design 3's light to the belt.",
+            "belt light": "With GelBelt's light design 1, the belt receives less than "
+            f"{100 * gelbelt_lights.DARK:g} % of the light of design 3.",
         },
         _belt_units,
         _belt_margins,
@@ -234,13 +234,13 @@ QUESTIONS = (
     ),
     Question(
         "gelsight360",
-        {"tip": "GelSight360's tip with the best 2to3PW is 6, or next to it."},
+        {"tip": "GelSight360's tip with the best 2to3PW is 6 or a neighbour of it."},
         _tip_units,
         _tip_margins,
     ),
     Question(
         "gelsight-svelte",
-        {"mirror": f"Bending GelSight Svelte's mirror makes AOAP {TIMES:g} times as large."},
+        {"mirror": f"Bending GelSight Svelte's mirror raises AOAP to {TIMES:g} times its value."},
         _mirror_units,
         _mirror_margins,
         has_chance=False,

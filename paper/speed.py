@@ -87,12 +87,12 @@ def claims(numbers: Values) -> list[Claim]:
                 Claim(
                     f"An image of {name} takes {seconds:g} s.",
                     f"{shown(row['new_light'])} s at {size} with {row['photons']:,} photons and "
-                    f"{number(row['noise']['mean'], 2)} % noise; {shown(row['light_kept'])} s more "
-                    "of the same sensor",
+                    f"{number(row['noise']['mean'], 2)} % noise; a further image of the same "
+                    f"sensor takes {shown(row['light_kept'])} s",
                     True if mean is not None and mean <= seconds else slow,
-                    "Times hang on the machine, and on what else it does: see the processor "
-                    "seconds. Not being slower counts as agreement; being slower on a machine that "
-                    "was busy tells nothing.",
+                    "Times depend on the machine and on its other load (compare the processor "
+                    "seconds). A time that is not longer counts as agreement; a longer time on a "
+                    "busy machine is inconclusive.",
                 )
             )
     return found
@@ -114,15 +114,16 @@ def notes(numbers: Values) -> list[str]:
         if _was_busy(row, about)
     ]
     text = (
-        f"{about['processor']}, {about['processors']} processors. *New light* traces all photons "
-        "anew, as for another design of the lights; *light kept* is a further contact on the same "
-        "sensor. Tracing does not depend on the pixels: it is timed at the first resolution, and "
-        "what it adds there counts at the others, too. *First* is the first image of a process, "
-        "with its scene, kernels and the guide of the photons. The noise is what two seeds differ "
-        "by in the contact."
+        f"The machine has {about['processors']} processors ({about['processor']}). *New light* is "
+        "an image for which all photons are traced anew, as after a change of the lights. *Light "
+        "kept* is an image of another contact on the same sensor. The time of photon tracing does "
+        "not depend on the number of pixels; it is measured at the first resolution and added at "
+        "the others. *First* is the first image of a process, which includes building the scene, "
+        "compiling kernels and learning the emission guide. The noise is computed from the "
+        "difference between two seeds in the contact."
     )
     if busy:
-        text += f" The machine was busy, or idle in part, during: {', '.join(busy)}."
+        text += f" The machine was busy, or partly idle, during: {', '.join(busy)}."
     return [text]
 
 
@@ -146,7 +147,7 @@ def tables(numbers: Values) -> list[Table]:
                 ]
             )
     heads = ["sensor", "pixels", "photons", "noise", *KINDS.values(), "first", "paper"]
-    return [Table("An image; in brackets processor seconds of all threads", heads, rows)]
+    return [Table("Time of an image (in brackets: processor seconds of all threads)", heads, rows)]
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
@@ -183,7 +184,7 @@ def draw(numbers: Values, pictures: Pictures) -> Figure:
 EXPERIMENT = Experiment(
     name="speed",
     title="Speed",
-    about="image times of the four sensors beside the paper's 6 to 9 s",
+    about="image times of the four sensors, compared with the paper's 6 to 9 s",
     steps=steps,
     claims=claims,
     tables=tables,

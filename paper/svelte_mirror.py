@@ -34,9 +34,9 @@ LESS = 0.8
 SHOWN = {
     "aoap": "AOAP",
     "coverage": "coverage",
-    "straight": "cosine of rays that arrive",
-    "seen": "pixels that see the skin",
-    "stretch": "longer than wide",
+    "straight": "mean cosine of rays that arrive",
+    "seen": "share of pixels that see the skin",
+    "stretch": "length over width",
 }
 METHODS = {"cma-es": "CMA-ES", "gradient": "gradient"}
 
@@ -183,32 +183,32 @@ def claims(numbers: Values) -> list[Claim]:
             f"AOAP of the first mirror is {FIRST:g}.",
             shown(first),
             _near(first, FIRST),
-            "The shape was measured in an animation, whose scale is assumed, and the field of the "
-            "camera decides how many rays arrive at all.",
+            "The shape was measured in an animation, whose scale is assumed, and the number of "
+            "rays that arrive depends on the field of view of the camera.",
         ),
         Claim(
-            f"CMA-ES brings AOAP to {BEST:g}.",
+            f"CMA-ES raises AOAP to {BEST:g}.",
             f"{shown(best)} after {_trials(numbers, 'cma-es')} trials; "
             f"{shown(gradient)} by gradient after {_trials(numbers, 'gradient')}",
             _near(best, BEST),
-            "The paper gives neither the number of trials nor the population. A search that is "
-            "stopped earlier ends lower, and coverage, which hardly counts, differs.",
+            "The paper gives neither the number of trials nor the population size. A search that "
+            "stops earlier reaches a lower score. The coverage, which hardly counts, also differs.",
         ),
     ]
     before, after = (mirrors[name]["stretch"] for name in ("first", "cma-es"))
     found.append(
         Claim(
-            "With the optimised mirror things are hardly distorted any more.",
-            f"a round thing appears {shown(before)} times as long as wide before, "
-            f"{shown(after)} times after (median over pixels)",
+            "With the optimised mirror, objects look hardly distorted.",
+            f"a round object looks {shown(before)} times as long as wide before the search, and "
+            f"{shown(after)} times after it (median over pixels)",
             None
             if before["mean"] is None or after["mean"] is None
             else bool(after["mean"] - 1.0 <= LESS * (before["mean"] - 1.0)),
-            "AOAP looks at how steeply each ray meets the skin, and counts rays that do not arrive "
-            "as 0; it does not look at how neighbouring rays spread. A search also "
-            "gains by letting more of the picture see the skin (see the table), which stretches it "
-            "across the finger. The "
-            "paper shows this on the middle of a simplified surface.",
+            "AOAP measures the angle at which each ray meets the skin, and counts rays that do not "
+            "arrive as 0. It does not measure how far neighbouring rays spread. A search therefore "
+            "also raises the score if more pixels see the skin (see the table), which stretches "
+            "the image across the finger. The paper shows the result for the middle of a "
+            "simplified surface.",
         )
     )
     return found
@@ -229,15 +229,15 @@ def tables(numbers: Values) -> list[Table]:
         [titles[name], *(shown(each[key]) for key in SHOWN)]
         for name, each in numbers["mirrors"].items()
     ]
-    return [Table("Mirrors, at full resolution", ["mirror", *SHOWN.values()], rows)]
+    return [Table("Mirrors at full resolution", ["mirror", *SHOWN.values()], rows)]
 
 
 def notes(numbers: Values) -> list[str]:
     """What spread means here."""
     return [
-        "Chief rays have no chance in them: the spread is that of CMA-ES with several seeds, and "
-        "the gradient method, which has none, has no spread. Searches trace fewer rays than the "
-        "table."
+        "Chief rays use no random numbers. The standard deviation is that of CMA-ES over several "
+        "seeds; the gradient method uses no random numbers. The searches trace fewer rays than the "
+        "values of the table."
     ]
 
 

@@ -106,12 +106,15 @@ def claims(numbers: Values) -> list[Claim]:
             guess = next(iter(numbers["tasks"][label]["misalignment"]["guess"].values()))
             found.append(
                 Claim(
-                    f"On the {label} the angle is read to as little as {PAPERS_ERROR:g} degrees.",
-                    f"{number(min(low))} degrees at best; guessing is {number(guess['mean'])} off",
+                    f"On the {label}, the error of the angle is as low as {PAPERS_ERROR:g} "
+                    "degrees.",
+                    f"{number(min(low))} degrees at best; a guess without images has an error of "
+                    f"{number(guess['mean'])}",
                     bool(min(low) <= 2.0 * PAPERS_ERROR),
-                    "The paper does not say how many contacts its forest learned from, from which "
-                    "range the angles were drawn, nor with which noise of the camera. With more "
-                    "contacts the error falls. Up to twice the paper's value counts as agreement.",
+                    "The paper gives neither the number of contacts in the training of the random "
+                    "forest, nor the range of the angles, nor the noise of the camera. The error "
+                    "decreases with more contacts. Up to twice the paper's value counts as "
+                    "agreement.",
                 )
             )
         for task, (what, unit) in TASKS.items():
@@ -133,12 +136,12 @@ def _trends(columns: Values, label: str, what: str, unit: str) -> list[Claim]:
         larger = is_larger(groups[1], groups[0])
         found.append(
             Claim(
-                f"On the {label} shiny coatings tell the {what} worse: {title}.",
-                f"{shown(groups[0])} below a specularity of {SHINY:g}, {shown(groups[1])} from "
-                "there on",
+                f"On the {label}, the {what} is estimated less well with shiny coatings: {title}.",
+                f"{shown(groups[0])} below a specularity of {SHINY:g}, {shown(groups[1])} at this "
+                "specularity and above",
                 None if larger is None else larger == (worse > 0),
-                "Few contacts make the ratio and the error of a forest rough; and a coating that "
-                "sends light on can also bring it to places which had none.",
+                "With few contacts, the error and the SNR of a random forest are uncertain. A "
+                "metallic coating can also reflect light to places that had none.",
             )
         )
     return found
@@ -169,11 +172,11 @@ def _follows(agreement: Values, name: str, title: str) -> Claim:
         if mean is None
         else f"mean rank correlation {mean:+.2f} (from {min(found):+.2f} to {max(found):+.2f})",
         None if mean is None else mean >= FOLLOWS,
-        "Tasks press large, gently tilted things in the middle and read mean colours; the "
-        "objectives press steep little balls at nine places. A coating may serve one better than "
-        "the other. NormDiff counts colours alike that differ by 30 %, far more than the camera "
-        "noise of the tasks, and so rewards colours that change quickly with the tilt more than "
-        "steady ones. A coating without a score is left out of the correlation.",
+        "The tasks press large, slightly tilted objects in the middle and use mean colours; the "
+        "objectives press small, steep balls at nine places. A coating may suit one better than "
+        "the other. For NormDiff, colours that differ by up to 30 %, far more than the camera "
+        "noise of the tasks, are similar. It therefore rewards colours that change quickly with "
+        "the tilt more than steady ones. The correlation omits coatings without a score.",
     )
 
 
@@ -202,8 +205,8 @@ def tables(numbers: Values) -> list[Table]:
     heads = list(next(iter(numbers["agreement"].values()))["rgb2normal"])
     found.append(
         Table(
-            "Rank correlation of objectives with tasks (1: the same order; in brackets the chance "
-            "that a random order agrees as well)",
+            "Rank correlation of objectives with tasks (1: the same order; in brackets the "
+            "probability that a random order agrees as well)",
             ["", *heads],
             rows,
         )
@@ -232,8 +235,8 @@ def draw(numbers: Values, pictures: Pictures) -> Figure:
 
 EXPERIMENT = Experiment(
     name="tasks",
-    title="Tasks of a robot",
-    about="angle and radius read from curved Minis, SNR, and whether objectives predict them",
+    title="Perception tasks",
+    about="angle and radius estimated with curved Minis, SNR, and correlation with objectives",
     steps=steps,
     claims=claims,
     tables=tables,

@@ -23,19 +23,19 @@ MOST_GAPS = 6
 
 
 def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> str:
-    """Markdown of one experiment.
+    """Return the Markdown text of one experiment.
 
     Args:
-        experiment: which.
+        experiment: the experiment.
         result: the content of its result.json.
-        picture: where the picture is, seen from the text.
+        picture: path of the picture, relative to the text.
     """
     numbers = result["numbers"]
     parts = [f"## {experiment.title}", f"![{experiment.title}]({picture})"]
     if result["quick"]:
-        parts.append("**A quick run:** less of everything, so less sure.")
+        parts.append("**Quick run:** fewer evaluations at lower quality, and less certain results.")
     if result["settings"].get("seeds") == 1:
-        parts.append("**One seed:** nothing tells what chance does to the differences.")
+        parts.append("**One seed:** the random scatter of the differences is not known.")
     parts += [_verdicts(result["claims"]), *experiment.notes(numbers)]
     parts += [table.markdown() for table in experiment.tables(numbers)]
     if result["gaps"]:
@@ -45,15 +45,16 @@ def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> 
 
 
 def _verdicts(claims: list[Mapping[str, Any]]) -> str:
-    """A table of statements, and what explains those that don't hold: each reason once."""
-    lines = ["| | the paper | here | |", "| --- | --- | --- | --- |"]
+    """A table of statements, and the reasons why some do not hold, each reason once."""
+    lines = ["| | statement of the paper | result | verdict |", "| --- | --- | --- | --- |"]
     reasons: dict[str, list[str]] = {}
     for number, claim in enumerate(claims, 1):
         lines.append(f"| {number} | {claim['says']} | {claim['here']} | **{claim['verdict']}** |")
         if claim["why"] and not claim["holds"]:
             reasons.setdefault(claim["why"], []).append(str(number))
     for why, numbers in reasons.items():
-        lines += ["", f"*To {_listed(numbers)}.* {why}"]
+        which = "Statement" if len(numbers) == 1 else "Statements"
+        lines += ["", f"*{which} {_listed(numbers)}.* {why}"]
     return "\n".join(lines)
 
 
@@ -62,10 +63,10 @@ def _listed(words: list[str]) -> str:
 
 
 def _gaps(gaps: list[Mapping[str, str]]) -> str:
-    lines = [f"Without a score ({len(gaps)}):", ""]
+    lines = [f"Evaluations without a score ({len(gaps)}):", ""]
     lines += [f"- {gap['what']}: {gap['reason'].rstrip('.')}." for gap in gaps[:MOST_GAPS]]
     if len(gaps) > MOST_GAPS:
-        lines.append(f"- and {len(gaps) - MOST_GAPS} more, in the result file.")
+        lines.append(f"- {len(gaps) - MOST_GAPS} more, which the result file lists.")
     return "\n".join(lines)
 
 
@@ -76,7 +77,7 @@ def _how(name: str, result: Mapping[str, Any]) -> str:
     release = result["versions"].get("optisense", "unknown")
     by = "an unrecorded release" if release == "unknown" else f"OptiSense {release}"
     return (
-        f"Made by `python -m paper {name}{' --quick' if result['quick'] else ''}` with {by}: "
+        f"Results of `python -m paper {name}{' --quick' if result['quick'] else ''}` with {by}: "
         f"{result['units']} evaluations{over}, {seconds['processor'] / 60:.1f} processor minutes. "
         "± is the standard deviation over seeds."
     )
@@ -127,11 +128,11 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         counts_text = ", ".join(_counted(verdicts.count(v), v) for v in counts if v in verdicts)
         rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {counts_text} |")
     head = [
-        "# The paper's tables and figures, made again",
-        "Written by `python -m paper all --page FILE`; do not edit.",
+        "# The paper's tables and figures",
+        "The command `python -m paper all --page FILE` writes this page; do not edit it.",
         INTRODUCTION,
-        "\n".join(["| experiment | the paper's statements |", "| --- | --- |", *rows]),
-        f"In all: {', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
+        "\n".join(["| experiment | statements of the paper |", "| --- | --- |", *rows]),
+        f"In total: {', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
         _took(spent.values()),
     ]
     write_text(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
@@ -148,9 +149,8 @@ def _took(spent: Iterable[Sequence[float]]) -> str:
     alone = sum(wall for wall, _, alone in rows if alone)
     processor = sum(seconds for _, seconds, _ in rows)
     return (
-        f"{len(rows)} evaluations, by the times kept with them: {processor / 60:.0f} processor "
-        f"minutes, which two processes side by side take {(shared / 2 + alone) / 60:.0f} minutes "
-        "for."
+        f"According to the recorded times, the {len(rows)} evaluations take {processor / 60:.0f} "
+        f"processor minutes. Two parallel processes take {(shared / 2 + alone) / 60:.0f} minutes."
     )
 
 
@@ -165,15 +165,15 @@ def _anchor(title: str) -> str:
 
 
 INTRODUCTION = """\
-Each experiment of the OptiSense paper by one command, on our own models of its four sensors. The
-geometry of three of them is partly [assumed](sensors.md), and nothing was tuned towards the paper's
-figures: where a statement does not hold here, the text says so, and what explains it. Verdicts are
-worked out from the numbers. *Cannot be told* means that the differences are within what seeds
-scatter by.
+This page compares the statements of the OptiSense paper with experiments on models of its four
+sensors. One command runs each experiment. The geometry of three of the sensors is partly
+[assumed](sensors.md), and nothing was tuned towards the paper's figures. Where a statement does not
+hold, the text says so and gives the likely cause. Verdicts are computed from the numbers.
+*Inconclusive* means that the differences are within the random scatter of the seeds.
 
-The experiments are a part of the source and not of the installed package: their commands are typed
-in the folder of the clone. Without a name the command lists the experiments. A quick run makes
-fewer evaluations at lower quality; this one takes about twenty seconds:
+The experiments are a part of the source and not of the installed package. Type their commands in
+the folder of the clone. Without a name, the command lists the experiments. A quick run makes fewer
+evaluations at lower quality; this one takes about twenty seconds:
 
 ```console
 $ python -m paper
@@ -186,10 +186,10 @@ All experiments in full take about an hour and a half on two processors:
 $ python -m paper all --out results
 ```
 
-The same command continues a run that was stopped: what is finished in the folder is not done again.
-Running all experiments together is faster than one after the other, because they share sensors and
+The same command continues an interrupted run and does not repeat finished evaluations. Running all
+experiments together is faster than running one after the other, because they share sensors and
 light.
 
-Each chapter names the release that made it. Those with an unrecorded release were made on 22
-November 2026: before the light of metal coatings was smoothed as it is now, and with LEDs of
-GelSight360 that are 0.8 mm high instead of 1 mm."""
+Each section names the release that produced its results. The results of an unrecorded release are
+from 22 November 2026. They differ from those of the present release in the smoothing of the light
+of metallic coatings, and in the LEDs of GelSight360, which are 0.8 mm high instead of 1 mm."""

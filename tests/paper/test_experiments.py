@@ -75,7 +75,7 @@ def test_where_everything_fails_nothing_is_claimed(
 ) -> None:
     finding, records = answered(experiment, experiment.settings(), failure="all is dark")
     found = [claim.verdict for claim in experiment.claims(finding.numbers)]
-    assert set(found) <= {"cannot be told"}
+    assert set(found) <= {"inconclusive"}
     assert {gap["reason"] for gap in gaps(records)} == {"all is dark"}
     result = result_of(experiment, finding.numbers, False)
     write(experiment, result, finding.pictures, tmp_path / "failed")
@@ -110,7 +110,7 @@ def test_mini_shapes_disagrees_where_it_is_not(answered: Answered) -> None:
 
 def test_mini_shapes_cannot_tell_where_all_coatings_are_alike(answered: Answered) -> None:
     found = verdicts("mini-shapes", lambda objective, design, seed: 0.01 * seed, answered)
-    assert {v for says, v in found.items() if "cylinder a spec" in says} == {"cannot be told"}
+    assert {v for says, v in found.items() if "cylinder, a spec" in says} == {"inconclusive"}
 
 
 @pytest.mark.parametrize(("winner", "verdict"), [(3, "agrees"), (2, "disagrees")])
@@ -164,8 +164,8 @@ def test_robustness_counts_geometries(answered: Answered) -> None:
     settings = {**experiment.settings(), "draws": 0}
     finding, _ = answered(experiment, settings, hangs_on_the_guide)
     claim = next(c for c in experiment.claims(finding.numbers) if "cylindrical" in c.says)
-    assert claim.verdict == "cannot be told"
-    assert claim.here == "holds in 8 of 9 geometries; not with guide_thickness 6"
+    assert claim.verdict == "inconclusive"
+    assert claim.here == "holds in 8 of 9 geometries; does not hold for: guide_thickness 6"
 
 
 def test_readings_tell_what_decides(answered: Answered) -> None:
@@ -180,8 +180,10 @@ def test_readings_tell_what_decides(answered: Answered) -> None:
     experiment = EXPERIMENTS["readings"]
     finding, _ = answered(experiment, experiment.settings(True), by_law)
     claim = next(c for c in experiment.claims(finding.numbers) if "about 0.2" in c.says)
-    assert claim.verdict == "cannot be told"
-    assert claim.here.startswith("holds under 100 of 300 readings; as read here it does not hold")
+    assert claim.verdict == "inconclusive"
+    assert claim.here.startswith(
+        "holds under 100 of 300 interpretations; under the default it does not hold"
+    )
     row = next(r for r in experiment.tables(finding.numbers)[2].rows if "about 0.2" in r[0])
     assert row[1:] == ["0 / 0 / 100", "33 / 33", "33 / 33", *[" / ".join(["33"] * 5)] * 2]
     mirror = next(r for r in experiment.tables(finding.numbers)[3].rows if "0.635" in r[0])
@@ -204,7 +206,7 @@ def test_a_slow_image_on_a_busy_machine_tells_nothing(answered: Answered) -> Non
 
     assert verdict(2.0, 3.9) == "agrees"
     assert verdict(20.0, 39.0) == "disagrees"
-    assert verdict(20.0, 4.0) == "cannot be told"
+    assert verdict(20.0, 4.0) == "inconclusive"
 
 
 def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path) -> None:
