@@ -65,7 +65,7 @@ def main() -> None:
         settings={"photons": photons},
     )
     runner = KeptRunner()
-    result = StudyRun(Study.create(options.out, design, plan), runner.begin).go()
+    result = StudyRun(Study.create(options.out, design, plan), runner.begin).run()
     total, processor = time.perf_counter() - began, time.process_time() - spent
     trials = [trial for trial in result.trials if not trial.is_start]
     seconds = [trial.outcome.seconds for trial in result.trials]

@@ -26,10 +26,10 @@ from optisense.optics.camera.projection import Pose, RayCamera
 from optisense.search import Around, SearchResult, SearchSpace, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.methods.base import Problem
-from optisense.search.methods.checked_slopes import (
+from optisense.search.methods.checked_gradients import (
     GRADIENT_BY,
     GRADIENT_HOLDS,
-    SlopeEvaluator,
+    GradientEvaluator,
 )
 from optisense.search.methods.gradient import Gradient
 from optisense.search.methods.score_differences import STEP
@@ -180,14 +180,14 @@ def _compared(
     problem = Problem(space, (objective,), DIRECTIONS)
     method = Gradient(problem)
     evaluator = method.evaluator(DesignEvaluator(space, [objective], apart=False))
-    assert isinstance(evaluator, SlopeEvaluator)
+    assert isinstance(evaluator, GradientEvaluator)
     span = space.upper - space.lower
     outcome = evaluator(space.start, 0)
     assert outcome.gradient is not None, outcome.failure
     method.tell(space.start[None], [outcome])
     by_rays = None
     with suppress(NoDerivativeError):
-        by_rays = evaluator.slope(space.start)[1] * span
+        by_rays = evaluator.gradient(space.start)[1] * span
     rows = []
     for way, (far, near) in zip(ways, differences.tolist(), strict=True):
         row = {"far": far, "near": near, "used": float(outcome.gradient * span @ way)}

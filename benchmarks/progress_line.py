@@ -28,7 +28,7 @@ from dataclasses import dataclass, field
 
 import pyte
 
-LOOK_EVERY = 0.5
+POLL_INTERVAL = 0.5
 """Time (s) between two readings of the screen."""
 
 ROWS = 50
@@ -94,7 +94,7 @@ def watch(command: list[str], columns: int, presses: list[float]) -> Watched:
     stream = pyte.ByteStream(screen)
     found = Watched()
     began = time.monotonic()
-    look_at, waiting, pressed = LOOK_EVERY, list(presses), None
+    look_at, waiting, pressed = POLL_INTERVAL, list(presses), None
     while True:
         ready, _, _ = select.select([terminal], [], [], 0.05)
         now = time.monotonic() - began
@@ -113,7 +113,7 @@ def watch(command: list[str], columns: int, presses: list[float]) -> Watched:
             pressed = pressed or now
             os.write(terminal, b"\x03")
         if now >= look_at:
-            look_at += LOOK_EVERY
+            look_at += POLL_INTERVAL
             line = _line(screen)
             found.looks.append(DesignView(now, line, _left(line)))
     _, status = os.waitpid(pid, 0)

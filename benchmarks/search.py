@@ -85,7 +85,7 @@ def overhead() -> dict[str, Any]:
             study = Study.create(Path(folder) / "study", design, plan)
             run = StudyRun(study, make_runner)
             cpu, wall, children = time.process_time(), time.perf_counter(), _children()
-            run.go()
+            run.run()
             cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
             children = _children() - children
             study.close()

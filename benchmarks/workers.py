@@ -105,7 +105,7 @@ def _measured(design: SensorDesign, plan: Plan, count: int, threads: int) -> dic
     def runner(evaluator: Evaluator) -> Runner:
         return ProcessPool(Clocked(evaluator), count, threads=threads)
 
-    StudyRun(study, runner, stop).go()
+    StudyRun(study, runner, stop).run()
     study.close()
     rates = [(len(rows) - 1) / (rows[-1].finished - rows[0].finished) for rows in counted]  # type: ignore[operator]
     cpu = [row.outcome.parts["clock"]["cpu"] for rows in counted for row in rows[1:] if row.outcome]

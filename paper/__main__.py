@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optisense.cli import stopping
-from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
 from optisense.cli.leaving import run_and_leave
 from optisense.cli.progress import progress_line
 from optisense.time_left import TimedStep, TimeLeft
@@ -28,7 +28,7 @@ app = typer.Typer(
 
 
 @app.command()
-@ends_well
+@handles_errors
 def experiment(
     name: Annotated[
         str | None,
@@ -73,7 +73,7 @@ def experiment(
 ) -> None:
     """Make tables and figures of the OptiSense paper again, and say what agrees.
 
-    Stopped or killed at any moment, the same command goes on: every single evaluation is kept.
+    Stopped or killed at any moment, the same command continues: every single evaluation is kept.
     """
     if name is None:
         _print_list()
@@ -100,7 +100,9 @@ def experiment(
                 result = run(each, Bench(out, count, show), quick, seeds)
             _print_result(each, result, out)
     except KeyboardInterrupt:
-        messages.print(f"interrupted: what is finished is kept in {out}; the same command goes on")
+        messages.print(
+            f"interrupted: what is finished is kept in {out}; the same command continues"
+        )
         raise typer.Exit(EXIT_INTERRUPTED) from None
     if page is not None:
         write_page(page, out, chosen)
@@ -161,7 +163,7 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
 
 def main() -> None:
     """Run the command with the process's arguments and exit."""
-    stopping.watch()
+    stopping.install_handlers()
     run_and_leave(app)
 
 

@@ -20,7 +20,7 @@ from optisense.design import SensorDesign, set_value
 from optisense.geometry import Contact, parse_contact
 from optisense.mechanics import CONFORMING
 from optisense.objectives import Evaluation, Score, Settings, evaluate
-from optisense.search.evaluation.models import ModelKeeper
+from optisense.search.evaluation.models import ModelCache
 from optisense.sensors import SENSORS
 from paper.unit import Found
 
@@ -35,9 +35,9 @@ NINE = "nine balls"
 SAME_IMAGES = ("contacts", "untouched image", "untouched radiance", "pressed images")
 """Values of an evaluation that do not depend on the exposure."""
 
-_keepers: dict[tuple[Any, ...], tuple[SensorDesign, ModelKeeper]] = {}
+_keepers: dict[tuple[Any, ...], tuple[SensorDesign, ModelCache]] = {}
 _current: dict[tuple[Any, ...], tuple[str, OpticalModel]] = {}
-"""The model that a keeper gave last, with its change as text."""
+"""The model that a models gave last, with its change as text."""
 
 
 def sensor(name: str, change: Plain | None = None, **dimensions: Any) -> dict[str, Any]:
@@ -318,11 +318,11 @@ def _model(plain: Plain) -> OpticalModel:
     if key not in _keepers:
         _keepers.clear()  # two models are more than many machines have memory for
         _current.clear()
-        _keepers[key] = _base(plain), ModelKeeper()
-    (base, keeper), change = _keepers[key], repr(json_ready(plain["change"]))
+        _keepers[key] = _base(plain), ModelCache()
+    (base, models), change = _keepers[key], repr(json_ready(plain["change"]))
     if key not in _current or _current[key][0] != change:
         _current.pop(key, None)
-        _current[key] = (change, keeper.model(_changed(base, plain)))
+        _current[key] = (change, models.model(_changed(base, plain)))
     return _current[key][1]
 
 

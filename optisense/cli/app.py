@@ -56,5 +56,5 @@ render.
 def main() -> None:
     """Run the command line with the process's arguments and exit."""
     gc.set_threshold(NEW_OBJECTS)
-    stopping.watch()
+    stopping.install_handlers()
     run_and_leave(app)

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, output
+from optisense.cli.console import handles_errors, output
 
 
-@ends_well
+@handles_errors
 def apply(
     study: Annotated[
         Path,

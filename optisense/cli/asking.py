@@ -51,7 +51,7 @@ def ask_word(question: str, words: Iterable[str], default: str) -> str:
         begun = [word for word in known if answer and word.startswith(answer.lower())]
         if len(begun) == 1:
             return begun[0]
-        raise ValueError("one of: " + ", ".join(begun or known))
+        raise ValueError("the answer must be one of: " + ", ".join(begun or known))
 
     return ask(question, read, default)
 
@@ -66,9 +66,9 @@ def ask_name(question: str, default: str, taken: Iterable[str] = ()) -> str:
         if answer.lower() in _NONE:
             return ""
         if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", answer):
-            raise ValueError("letters, digits, '-' and '_' only, at most 64")
+            raise ValueError("a name consists of at most 64 letters, digits, '-' and '_'")
         if answer in used:
-            raise ValueError(f"'{answer}' is taken")
+            raise ValueError(f"the name '{answer}' is in use")
         return answer
 
     return ask(question, read, default)
@@ -89,7 +89,7 @@ def ask_number_or_none(
             return None
         value = _number(answer, least)
         if whole and value != int(value):
-            raise ValueError("a whole number")
+            raise ValueError("the answer must be a whole number")
         return value
 
     return ask(question, read, "-")
@@ -100,7 +100,7 @@ def ask_count(question: str, default: int) -> int:
 
     def read(answer: str) -> int:
         if not answer.isdecimal() or int(answer) < 1:
-            raise ValueError("a whole number from 1")
+            raise ValueError("the answer must be a whole number, 1 or larger")
         return int(answer)
 
     return ask(question, read, str(default))
@@ -119,7 +119,7 @@ def three_numbers(answer: str) -> tuple[float, float, float]:
     """
     words = answer.replace(",", " ").split()
     if len(words) != 3:
-        raise ValueError("three numbers: x, y, z")
+        raise ValueError("the answer must be three numbers: x, y, z")
     x, y, z = (_number(word) for word in words)
     return x, y, z
 
@@ -130,7 +130,7 @@ def _number(text: str, least: float = float("-inf")) -> float:
     except ValueError:
         raise ValueError(f"'{text}' is not a number") from None
     if not abs(value) < float("inf"):
-        raise ValueError("a finite number")
+        raise ValueError(f"'{text}' is not finite")
     if value < least:
-        raise ValueError(f"at least {least:g}")
+        raise ValueError(f"the number must be at least {least:g}")
     return value

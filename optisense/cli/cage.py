@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, cast
 import typer
 from rich.table import Table
 
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.options import DesignArgument
 from optisense.errors import DesignError
 
@@ -47,7 +47,7 @@ MoveOption = Annotated[
 
 
 @cage_app.command("show")
-@ends_well
+@handles_errors
 def show(
     design: DesignArgument,
     cage: Annotated[
@@ -74,7 +74,7 @@ def show(
 
 
 @cage_app.command("add")
-@ends_well
+@handles_errors
 def add(
     design: DesignArgument,
     cage: Annotated[str, typer.Argument(metavar="CAGE", help="A name for the cage.")],
@@ -110,7 +110,7 @@ def add(
 
 
 @cage_app.command("remove")
-@ends_well
+@handles_errors
 def remove(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
     """Remove a cage. Its parts get their undeformed shapes back."""
     from optisense.design.cage_edit import remove_cage
@@ -120,7 +120,7 @@ def remove(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
 
 
 @cage_app.command("refine")
-@ends_well
+@handles_errors
 def refine(
     design: DesignArgument,
     cage: CageArgument,
@@ -138,7 +138,7 @@ def refine(
 
 
 @cage_app.command("move")
-@ends_well
+@handles_errors
 def move(
     design: DesignArgument,
     cage: CageArgument,
@@ -166,7 +166,7 @@ def move(
 
 
 @cage_app.command("range")
-@ends_well
+@handles_errors
 def set_range(
     design: DesignArgument,
     cage: CageArgument,
@@ -216,7 +216,7 @@ def set_range(
 
 
 @cage_app.command("blend")
-@ends_well
+@handles_errors
 def blend(
     design: DesignArgument,
     cage: CageArgument,
@@ -244,7 +244,7 @@ def blend(
 
 
 @cage_app.command("settle")
-@ends_well
+@handles_errors
 def settle(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
     """Turn a blend of c_min and c_max into control points that can be moved; the range stays."""
     from optisense.design.cage_edit import settle_cage
@@ -331,7 +331,7 @@ def _check_ends(design: SensorDesign, name: str) -> None:
 
     for end, share in (("c_min", 0.0), ("c_max", 1.0)):
         for problem in cage_problems(set_value(design, f"cages.{name}.blend", share)):
-            messages.print(f"odd at {end}: {problem}", markup=False, style="yellow")
+            messages.print(f"warning, at {end}: {problem}", markup=False, style="yellow")
 
 
 def _write(source: str, design: SensorDesign, cage: str | None, out: Path) -> None:
@@ -346,7 +346,7 @@ def _write(source: str, design: SensorDesign, cage: str | None, out: Path) -> No
     problems = cage_problems(design)
     raise_problems(problems, f"design '{design.name}'")
     for problem in problems:
-        messages.print(f"odd: {problem}", markup=False, style="yellow")
+        messages.print(f"warning: {problem}", markup=False, style="yellow")
     save_design(design, out, new=not is_own)
     if cage is not None:
         output.print(f"cage {cage}: {_shape(design, cage)}", markup=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.compare import PhotosArgument, reading_lines
-from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output, table_of
+from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output, table_of
 from optisense.cli.options import DesignArgument, VariantOption
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
@@ -29,7 +29,7 @@ COLUMNS = "unexplained", "contact", "ring", "similarity"
 JSON_FILE, PAGE_FILE = "calibration.json", "calibration.html"
 
 
-@ends_well
+@handles_errors
 def calibrate(
     design: DesignArgument,
     photos: PhotosArgument,
@@ -92,7 +92,7 @@ def calibrate(
                 progress=report,
             )
         except KeyboardInterrupt:
-            messages.print("interrupted: the same command goes on with what is rendered")
+            messages.print("interrupted: the same command continues; finished renderings are kept")
             raise typer.Exit(EXIT_INTERRUPTED) from None
         with written_together("the calibration") as stage:
             write_text(stage(out / PAGE_FILE), render_calibration(found))

@@ -6,20 +6,20 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
-from optisense.cli.console import ends_well, output
+from optisense.cli.console import handles_errors, output
 from optisense.cli.options import ContactOption, DesignArgument, parse_contacts
 from optisense.errors import SetupError
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
 
-MOST_TOLD = 40
+MOST_WARNINGS = 40
 """Largest number of lines about problems of a design; the others are counted, so that the end stays
 in sight.
 """
 
 
-@ends_well
+@handles_errors
 def check(design: DesignArgument, contact: ContactOption = None) -> None:
     """Check a design, and whether contacts can be pressed into its skin, without rendering."""
     contacts = parse_contacts(contact)
@@ -29,10 +29,10 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     sensor = sensors.load(design)
     problems = sensors.check(sensor)
     _describe(sensor)
-    for problem in problems[:MOST_TOLD]:
-        output.print(f"odd: {problem}", markup=False, style="yellow")
-    if len(problems) > MOST_TOLD:
-        output.print(f"odd: and {len(problems) - MOST_TOLD:,} more like these", style="yellow")
+    for problem in problems[:MOST_WARNINGS]:
+        output.print(f"warning: {problem}", markup=False, style="yellow")
+    if len(problems) > MOST_WARNINGS:
+        output.print(f"warning: {len(problems) - MOST_WARNINGS:,} more like these", style="yellow")
     if any(part.role == "mirror" for part in sensor.parts.values()):
         _tell_views(sensor)
     if contacts:
@@ -41,7 +41,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         model = OpticalModel(sensor)
         pressed = model.pressed(contacts, [model.place(each) for each in contacts])
         for warning in pressed.warnings:
-            output.print(f"odd: {warning}", markup=False, style="yellow")
+            output.print(f"warning: {warning}", markup=False, style="yellow")
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")
@@ -55,13 +55,13 @@ def _tell_views(design: SensorDesign) -> None:
 
         views = OpticalModel(design).views_by_mirrors(CHECK_RAYS)
     except SetupError as error:  # the rest of the check needs no renderer
-        output.print(f"Its mirrors are not checked: {error}", markup=False, style="yellow")
+        output.print(f"note: its mirrors are not checked: {error}", markup=False, style="yellow")
         return
     if views:
-        sentence = f"Of what the camera sees of the sensing surface: {views_in_words(views)}."
+        sentence = f"Views of the sensing surface, by their mirrors: {views_in_words(views)}."
         output.print(sentence, markup=False)
     for problem in mirror_problems(design, views):
-        output.print(f"odd: {problem}", markup=False, style="yellow")
+        output.print(f"warning: {problem}", markup=False, style="yellow")
 
 
 def _describe(design: SensorDesign) -> None:
@@ -101,14 +101,14 @@ def _describe(design: SensorDesign) -> None:
     shares = view_shares(design, design.deformed_meshes())
     if shares is not None:
         output.print(
-            f"        seen straight: {100 * shares[0]:.0f} % of the sensing surface is in the "
+            f"        without refraction, {100 * shares[0]:.0f} % of the sensing surface is in the "
             f"picture, and fills {100 * shares[1]:.0f} % of it",
             markup=False,
         )
     if design.parts_of(Role.ELASTOMER):
         output.print(f"elasticity  {elasticity_in_words(design)}", markup=False)
         if not is_attached(design):
-            sentence = "odd: the gel is attached to nothing; its elastic skin can't be pressed"
+            sentence = "warning: the gel touches no rigid part; its elastic skin can't be pressed"
             output.print(sentence, style="yellow")
         elif limits := rims_in_words(design):
             output.print(f"            {limits}", markup=False)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, messages, output, table_of
+from optisense.cli.console import handles_errors, messages, output, table_of
 from optisense.cli.options import DesignArgument, VariantOption
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CompareOptions
@@ -32,7 +32,7 @@ PhotosArgument = Annotated[
 ]
 
 
-@ends_well
+@handles_errors
 def compare(
     design: DesignArgument,
     photos: PhotosArgument,
@@ -98,8 +98,9 @@ def reading_lines(found: Realism) -> list[str]:
     if not found.readings:
         return []
     return [
-        f"a reader calibrated on {one} reads the balls {found.median_reading(radius):.2f} times as "
-        f"large as they are in {other}, and normals {found.median_reading(degrees):.1f} degrees off"
+        f"a reader calibrated on {one} reads the balls of {other} "
+        f"{found.median_reading(radius):.2f} times as large as they are, and normals with an error "
+        f"of {found.median_reading(degrees):.1f} degrees"
         for one, other, radius, degrees in (
             ("the model", "the photographs", "radius", "degrees"),
             ("the photographs", "the model", "radius_back", "degrees_back"),

@@ -69,7 +69,7 @@ def set_debug(debug: bool) -> None:
     _debug = debug
 
 
-def at_end(call: Callable[[], object]) -> None:
+def on_exit(call: Callable[[], object]) -> None:
     """Register a function that is called when the running command ends, however it ends."""
     _ending.get().callback(call)
 
@@ -84,7 +84,7 @@ def table_of(*heads: str, texts: int = 1) -> Table:
     return table
 
 
-def say_error(message: str, *, where: str | None = None, hint: str | None = None) -> None:
+def print_error(message: str, *, where: str | None = None, hint: str | None = None) -> None:
     """Print an error: the problem, its place, and the remedy."""
     messages.print("error:", style="bold red", end=" ")
     messages.print(message, markup=False)
@@ -94,7 +94,7 @@ def say_error(message: str, *, where: str | None = None, hint: str | None = None
         messages.print(f"  try:   {hint}", markup=False)
 
 
-def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
+def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
     """Decorate a command so that errors of the user show no traceback.
 
     Parameters of the command that are models of options become options of the command line.
@@ -111,7 +111,7 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
                 ending.callback(_ending.reset, before)
                 return command(*args, **kwargs)
         except OptiSenseError as error:
-            say_error(error.message, where=error.where, hint=error.hint)
+            print_error(error.message, where=error.where, hint=error.hint)
             failure = isinstance(error, (OutputError, SetupError))
             raise typer.Exit(EXIT_FAILURE if failure else EXIT_BAD_INPUT) from None
         except KeyboardInterrupt:
@@ -123,11 +123,11 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
             raise typer.Exit(EXIT_FAILURE) from None
         except OSError as error:
             failed = output_error(error)
-            say_error(failed.message, where=failed.where, hint=failed.hint)
+            print_error(failed.message, where=failed.where, hint=failed.hint)
             _show_traceback()
             raise typer.Exit(EXIT_FAILURE) from None
         except MemoryError:
-            say_error("not enough memory", hint="Use a smaller --resolution or fewer --photons")
+            print_error("not enough memory", hint="Use a smaller --resolution or fewer --photons")
             raise typer.Exit(EXIT_FAILURE) from None
         except typer.Exit:
             raise
@@ -135,7 +135,7 @@ def ends_well(command: Callable[_P, _R]) -> Callable[..., _R]:
             # Typer prints usage errors itself; every other error is a defect.
             if type(error).__module__.split(".")[0] in ("click", "typer"):
                 raise
-            say_error(
+            print_error(
                 f"unexpected {type(error).__name__}: {error}",
                 hint="This is a defect of OptiSense; `optisense --debug ...` shows where it is",
             )

@@ -8,11 +8,11 @@ from typing import Annotated
 import typer
 
 from optisense.cli.compare import PhotosArgument
-from optisense.cli.console import ends_well, messages, output, table_of
+from optisense.cli.console import handles_errors, messages, output, table_of
 from optisense.commands.comparing import PhotographOptions
 
 
-@ends_well
+@handles_errors
 def contacts(
     photos: PhotosArgument,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The page to write.")],

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import EXIT_FAILURE, ends_well, messages, output
+from optisense.cli.console import EXIT_FAILURE, handles_errors, messages, output
 from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
@@ -19,7 +19,7 @@ from optisense.cli.sampling import (
     sensor_to_press,
     shown_samples,
 )
-from optisense.commands.options import MOST_THINGS
+from optisense.commands.options import MOST_ITEMS
 from optisense.commands.sampling import DatasetOptions
 from optisense.time_left import TimedStep
 from optisense.usual_times import USUAL_PIXELS, UsualTimes
@@ -36,14 +36,14 @@ SAMPLE_WORK = 0.5
 """Processor time of a sample of `USUAL_PIXELS`, files included, s; measured on GelSight Mini."""
 
 
-@ends_well
+@handles_errors
 def dataset(
     design: DesignArgument,
-    out: Annotated[Path, out_option("Folder of the dataset; a new one, or one to go on.")],
+    out: Annotated[Path, out_option("Folder of the dataset; a new one, or one to continue.")],
     count: Annotated[
         int,
         typer.Option(
-            "--count", "-n", min=1, max=MOST_THINGS, metavar="N", help="Total number of samples."
+            "--count", "-n", min=1, max=MOST_ITEMS, metavar="N", help="Total number of samples."
         ),
     ] = 100,
     *,
@@ -112,12 +112,14 @@ def dataset(
 
         if (out / LABELS).exists():
             finished = len(Dataset.load(out))
-            messages.print(f"{finished} of {count} samples are there; the same command continues")
+            messages.print(
+                f"{finished} of {count} samples are finished; the same command continues"
+            )
         raise
-    _say_what_came(made, count)
+    _print_summary(made, count)
 
 
-def _say_what_came(made: Dataset, count: int) -> None:
+def _print_summary(made: Dataset, count: int) -> None:
     """Print the number of samples, and why others failed.
 
     Raises:

@@ -15,7 +15,7 @@ from typing import Literal
 import typer
 
 from optisense import __version__
-from optisense.cli.console import EXIT_FAILURE, ends_well, output
+from optisense.cli.console import EXIT_FAILURE, handles_errors, output
 from optisense.errors import OptiSenseError
 
 State = Literal["good", "note", "bad"]
@@ -36,7 +36,7 @@ class Finding:
     hint: str = ""
 
 
-@ends_well
+@handles_errors
 def doctor() -> None:
     """Check that this machine has what rendering needs, and say how to install what is missing."""
     ill = False
@@ -75,7 +75,9 @@ def _package() -> Finding:
 def _python() -> Finding:
     text = f"{platform.python_version()} on {platform.platform()} ({sys.executable})"
     good = sys.version_info >= (3, 11)
-    return Finding("python", "good" if good else "bad", text, "" if good else "3.11 or newer")
+    return Finding(
+        "python", "good" if good else "bad", text, "" if good else "Install Python 3.11 or newer"
+    )
 
 
 def _renderer() -> Finding:

@@ -1,4 +1,4 @@
-"""``optisense engine``: run the process that front ends talk to."""
+"""``optisense engine``: run the process that serves front ends."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ def engine() -> None:
     """Serve a front end on standard input and output, with lines of JSON (see docs/engine.md)."""
     if sys.stdin.isatty():
         messages.print(
-            "this is for programs: they write requests to its standard input, one JSON object a "
-            "line. End it with Ctrl-D.",
+            "This command serves programs, which write requests to its standard input, one JSON "
+            "object per line. Ctrl-D ends it.",
             markup=False,
         )
     from optisense.engine.server import serve

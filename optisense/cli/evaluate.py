@@ -11,7 +11,7 @@ import typer
 from optisense.cli.console import (
     EXIT_FAILURE,
     EXIT_INTERRUPTED,
-    ends_well,
+    handles_errors,
     messages,
     output,
     table_of,
@@ -40,7 +40,7 @@ JSON_FILE = "scores.json"
 REPORT_FILE = "scores.html"
 
 
-@ends_well
+@handles_errors
 def evaluate(
     design: DesignArgument,
     *,
@@ -111,7 +111,7 @@ def evaluate(
             if report:
                 output.print(f"report: {out / REPORT_FILE}", markup=False)
     if interrupted:
-        messages.print("interrupted: these are the scores finished until then")
+        messages.print("interrupted: only these scores are finished")
         raise typer.Exit(EXIT_INTERRUPTED)
     if scored.failed():
         raise typer.Exit(EXIT_FAILURE)

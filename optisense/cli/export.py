@@ -7,14 +7,14 @@ from typing import Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.options import DesignArgument
 from optisense.cli.output_folder import take_folder
 from optisense.robots.formats import ROBOT_FORMATS
 from optisense.workshop import FORMATS
 
 
-@ends_well
+@handles_errors
 def export(
     design: DesignArgument,
     out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")],
@@ -67,13 +67,13 @@ def export(
     if robots:
         if formats or moulds:
             raise typer.BadParameter(
-                "--format and --moulds are for the workshop", param_hint="--for"
+                "it can't be combined with --format or --moulds", param_hint="--for"
             )
         _export_robot(design, out, robots, mass, density or [])
         return
     if mass is not None or density:
         raise typer.BadParameter(
-            "it is for robot simulators: add --for",
+            "it needs --for, as it describes models for robot simulators",
             param_hint="--mass" if mass is not None else "--density",
         )
     wanted = [name.lower() for name in formats or ["stl"]]

@@ -26,11 +26,11 @@ class Interrupt:
         if self.requested:
             raise KeyboardInterrupt
         self.requested = True
-        stopping.say()
+        stopping.print_wait()
 
 
 @contextmanager
-def held_interrupt() -> Iterator[Interrupt]:
+def deferred_interrupt() -> Iterator[Interrupt]:
     """Hold the first Ctrl-C back until a safe point; the second one acts at once.
 
     Nothing changes outside the main thread, where signals can't be handled, and where Ctrl-C is

@@ -27,7 +27,7 @@ def run_and_leave(command: Callable[[], object]) -> NoReturn:
         if stop.code is not None and not isinstance(stop.code, int):
             raise
         code = stopping.exit_code(stop.code or 0)
-    stopping.over(code)
+    stopping.finish(code)
     for each in threading.enumerate():  # as Python waits for them at its end
         if not each.daemon and each is not threading.main_thread():
             each.join()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, output, table_of
+from optisense.cli.console import handles_errors, output, table_of
 from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
@@ -31,7 +31,7 @@ cent.
 """
 
 
-@ends_well
+@handles_errors
 def ledger(
     design: DesignArgument,
     *,
@@ -120,7 +120,7 @@ def _print(found: LightLedger, seen: CameraLight) -> None:
 def _print_place(place: PlaceLight) -> None:
     title = "light at ({}) mm".format(", ".join(f"{part:g}" for part in place.at))
     if not place.groups:
-        output.print(f"\n{title}: no light group shines")
+        output.print(f"\n{title}: no light group emits light")
         return
     output.print()
     groups = list(place.groups.values())

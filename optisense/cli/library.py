@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from optisense.cli.console import PlainConsole, ends_well, messages, output
+from optisense.cli.console import PlainConsole, handles_errors, messages, output
 from optisense.cli.library_add import add_entry
 from optisense.errors import LibraryError
 
@@ -30,7 +30,7 @@ library_app = typer.Typer(
 
 
 @library_app.command("list")
-@ends_well
+@handles_errors
 def list_entries(
     kind: Annotated[
         str | None,
@@ -42,7 +42,7 @@ def list_entries(
     from optisense.library.facts import summary
 
     table = Table(box=None, pad_edge=False)
-    for title in ("kind", "name", "in short", ""):
+    for title in ("kind", "name", "summary", ""):
         table.add_column(title, no_wrap=True)
     table.add_column("description")
     broken: list[LibraryError] = []
@@ -57,11 +57,11 @@ def list_entries(
             table.add_row(each, name, *row, entry.description)
     _print_table(table)
     for problem in broken:
-        messages.print(f"left out: {problem}", markup=False, style="yellow")
+        messages.print(f"warning: an entry is left out: {problem}", markup=False, style="yellow")
 
 
 @library_app.command("show")
-@ends_well
+@handles_errors
 def show_entry(
     name: Annotated[
         str,
@@ -140,7 +140,7 @@ def _describe(title: str, entry: AnyEntry, own: bool) -> None:
     table = Table(box=None, pad_edge=False)
     for title in ("", "value", "status"):
         table.add_column(title, no_wrap=True)
-    table.add_column("where it comes from")
+    table.add_column("source")
     for fact in facts(entry):
         status = date = text = ""
         if fact.source is not None:

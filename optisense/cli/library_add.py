@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import handles_errors, messages, output
 from optisense.commands.adding import IesOptions, TuningOptions, above_0
 
 if TYPE_CHECKING:
     from optisense.library import Added
 
 
-@ends_well
+@handles_errors
 def add_entry(
     file: Annotated[
         Path,
@@ -62,19 +62,21 @@ def add_entry(
     from optisense import library
 
     if tuning is not None:
-        _refuse(ies, "--tuning has none")
+        _refuse(ies, "it can't be combined with --tuning")
         _say_added(_from_tuning(file, tuning, camera, name, description))
         return
     if str(file) == "camera" and not file.exists():
         raise typer.BadParameter(
-            "name the tuning file: library add camera --tuning FILE.json --like CAMERA",
+            "name the tuning file: optisense library add camera --tuning FILE.json --like CAMERA",
             param_hint="--tuning",
         )
-    _refuse(camera, "is for --tuning only")
+    _refuse(camera, "it needs --tuning")
     if file.suffix.lower() != ".ies":
-        _refuse(ies, "is for .ies files only")
+        _refuse(ies, "it needs an .ies file")
         if description is not None:
-            raise typer.BadParameter("is for .ies files only", param_hint="--description")
+            raise typer.BadParameter(
+                "it needs an .ies file or --tuning", param_hint="--description"
+            )
         _say_added(library.add_file(file, kind, name))
         return
     if kind not in (None, "light", "lights"):
@@ -110,9 +112,11 @@ def _from_ies(file: Path, given: IesOptions, name: str | None, description: str 
         if not sys.stdin.isatty():
             missing = "--colour" if given.colour is None else "--flux"
             raise typer.BadParameter(
-                "the IES file does not tell it; give it here", param_hint=missing
+                "the IES file does not contain it; give this option", param_hint=missing
             )
-        messages.print(f"{file.name} gives {profile.lumens:.4g} lm into {own_folder()}")
+        messages.print(
+            f"{file.name} states {profile.lumens:.4g} lm; the light is stored in {own_folder()}"
+        )
     colour = given.colour or typer.prompt("Colour (red, green, blue, white or R,G,B)", err=True)
     colour_name, rgb = library.parse_colour(str(colour))
     flux = given.flux
@@ -165,13 +169,13 @@ def _from_tuning(
 
     if str(what) not in ("camera", "cameras"):
         raise typer.BadParameter(
-            f"a tuning file is of a camera: optisense library add camera --tuning {tuning}",
+            f"a tuning file describes a camera: optisense library add camera --tuning {tuning}",
             param_hint="FILE",
         )
     if given.like is None:
         raise typer.BadParameter(
-            "a tuning file does not tell the field of view; name a camera of the library that has "
-            "the same, such as --like pi-v2",
+            "a tuning file does not contain the field of view; name a camera of the library with "
+            "the same one, such as --like pi-v2",
             param_hint="--like",
         )
     return library.add_tuning(
@@ -188,6 +192,6 @@ def _say_added(added: Added) -> None:
     unsourced = added.entry.unsourced()
     if unsourced:
         output.print(
-            f"no source is given for: {', '.join(unsourced)}", markup=False, style="yellow"
+            f"warning: no source is given for: {', '.join(unsourced)}", markup=False, style="yellow"
         )
     output.print(f"Look at it:  optisense library show {added.name}", markup=False, style="dim")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.output_folder import take_folder
 from optisense.errors import DesignError, OptiSenseError, OutputError
 from optisense.folders import is_empty
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 UNITS = ("mm", "cm", "m", "inch", "um")
 
 
-@ends_well
+@handles_errors
 def new(
     name: Annotated[
         str,
@@ -64,7 +64,7 @@ def new(
             "--yes",
             "-y",
             help="With --from-meshes: ask nothing, and guess from the names and sizes of the "
-            "files; look the recipe over afterwards.",
+            "files; check the recipe afterwards.",
         ),
     ] = False,
     overwrite: Annotated[
@@ -78,17 +78,17 @@ def new(
     """Make a design of your own from a built-in sensor, or from CAD files."""
     if from_meshes is None:
         if units is not None or yes:
-            raise typer.BadParameter("goes with --from-meshes", param_hint="--units, --yes")
+            raise typer.BadParameter("they need --from-meshes", param_hint="--units, --yes")
         if folder is None:
             raise typer.BadParameter(
-                "give the name of a built-in sensor and the folder to make, or --from-meshes",
+                "name a built-in sensor and the folder to write, or use --from-meshes",
                 param_hint="NAME DIR",
             )
         _from_built_in(name, folder, overwrite)
         return
     if folder is not None:
         raise typer.BadParameter(
-            "with --from-meshes, give only the folder to make", param_hint="DIR"
+            "with --from-meshes, name only the folder to write", param_hint="DIR"
         )
     if units is not None and units not in UNITS:
         raise typer.BadParameter(f"'{units}' is none of {', '.join(UNITS)}", param_hint="--units")
@@ -132,7 +132,8 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
         recipe, asked = ask_recipe(source, _units(units)), True
     else:
         raise typer.BadParameter(
-            f"nobody can be asked what is in '{source}': give a recipe (.yaml), or --yes to guess",
+            f"the questions about '{source}' need a terminal: name a recipe (.yaml), or accept all "
+            "suggestions with --yes",
             param_hint="--from-meshes",
         )
     if units is not None:
@@ -142,12 +143,12 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
             made = design_from_meshes(recipe)
             problems = check(made.design)
     except OptiSenseError:
-        if asked or guessed:  # nobody likes to answer twice, and a wrong guess can be mended
+        if asked or guessed:  # answers need not be given again; wrong guesses can be corrected
             save_recipe(recipe, folder / RECIPE_FILE)
             _say_guesses(recipe, guessed)
             what = "Your answers are" if asked else "The guessed recipe is"
             messages.print(
-                f"{what} kept in {folder / RECIPE_FILE}. When it or the CAD files are mended:\n"
+                f"{what} saved in {folder / RECIPE_FILE}. Correct it or the CAD files, then:\n"
                 f"  optisense new --from-meshes {folder / RECIPE_FILE} {folder} --overwrite",
                 markup=False,
             )
@@ -157,7 +158,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
     for note in made.notes:
         messages.print(f"note: {note}", markup=False, style="yellow")
     for problem in problems:
-        messages.print(f"odd: {problem}", markup=False, style="yellow")
+        messages.print(f"warning: {problem}", markup=False, style="yellow")
     _say_guesses(recipe, guessed)
     _say_what_next(folder, folder / RECIPE_FILE)
 
@@ -180,8 +181,7 @@ def _take_folder(folder: Path, overwrite: bool) -> bool:
         raise OutputError(
             "the folder is not empty",
             where=str(folder),
-            hint="Name a folder that doesn't exist, or write the design in it anew with "
-            "--overwrite",
+            hint="Name a folder that doesn't exist, or overwrite the design in it with --overwrite",
         )
     if not any((folder / name).is_file() for name in ("design.yaml", "recipe.yaml")):
         raise OutputError(
@@ -197,7 +197,7 @@ def _say_guesses(recipe: Recipe, guessed: bool) -> None:
     if not guessed:
         return
     for name, part in recipe.parts.items():
-        faces = f"faces of {part.faces_of} that look to {part.towards}"
+        faces = f"faces of {part.faces_of} towards {part.towards}"
         faces += ", and those that continue them smoothly" if part.tangent else ""
         source = part.file or faces
         source += f", body {part.solid}" if part.solid else ""

@@ -70,7 +70,7 @@ def ask_recipe(source: Path, units: Units | None) -> Recipe:
     """
     found = guessing.find_bodies(source)
     folder = source if source.is_dir() else source.parent
-    say(f"{len(found)} bodies in {source}. Enter takes the answer in brackets.")
+    say(f"{len(found)} bodies in {source}. Enter accepts the answer in brackets.")
     name = ask("Name of the sensor", _not_empty, guessing.usual_name(source))
     units = units or _ask_units(found)
     meshes = {each.name: each.mesh(units) for each in found}
@@ -117,7 +117,7 @@ def _ask_units(found: list[CadBody]) -> Units | None:
 
 def _ask_uses(found: list[CadBody], meshes: Meshes) -> dict[str, Use]:
 
-    say("\nWhat is each? The beginning of a word is enough:")
+    say("\nWhat is each body? The first letters of a word are enough:")
     for word, meaning in USES.items():
         say(f"  {word:16} {meaning}")
     uses: dict[str, Use] = {}
@@ -171,12 +171,12 @@ def _ask_skin(parts: Parts, meshes: Meshes, gel: str, outward: str) -> tuple[Par
             raise ValueError(error.message) from None
         return answer
 
-    towards = ask("They look to", side, outward)
+    towards = ask("They face", side, outward)
     few, many = faces(towards, False), faces(towards, True)
     tangent = False
     if many > 1.01 * few:
-        say(f"{few:.4g} mm2 look there within 30 degrees; with the faces that go on from them "
-            f"without a sharp edge it is {many:.4g} mm2.")  # fmt: skip
+        say(f"{few:.4g} mm2 face it within 30 degrees; with the faces that continue them without "
+            f"a sharp edge it is {many:.4g} mm2.")  # fmt: skip
         tangent = ask_yes("Are those coated too", True)
     else:
         say(f"These are {few:.4g} mm2.")
@@ -203,14 +203,14 @@ def _ask_lights(
         group = _ask_group(each.name, str(guess.colour))
         over = guess.over.model_dump(exclude_none=True)
         over["towards"] = ask_word(
-            f"{each.name}: on the faces that look to", SIDES, str(guess.over.towards)
+            f"{each.name}: on the faces towards", SIDES, str(guess.over.towards)
         )
         count = ask_number_or_none(
-            "  number in a row there (- puts one on each face)", 1, whole=True
+            "  number of lights in a row there (- puts one on each face)", 1, whole=True
         )
         if count is not None:
             over |= {"count": int(count), "patches": "largest"}
-            pitch = ask_number_or_none("  mm from one to the next (- spreads them)", 1e-6)
+            pitch = ask_number_or_none("  mm from one to the next (- is even)", 1e-6)
             over |= {} if pitch is None else {"pitch": pitch}
         groups[each.name] = {**group, "over": over | _ask_way("square to the surface")}
     window = next((n for n, part in parts.items() if part.role is Role.SUPPORT), gel)
@@ -226,15 +226,15 @@ def _ask_lights(
         usual = {}
     while True:
         default = next((name for name in usual if name not in groups), "-")
-        name = ask_name("Name of a light group, or - for no more", default, groups)
+        name = ask_name("Name of a light group (- for no more)", default, groups)
         if not name:
             return groups
         guess_row = usual[name].row if name in usual else None
         group = _ask_group(name, name if name in ("red", "green", "blue") else "white")
         way = ask_word(f"{name}: in a row, a ring, or one at a place", ("row", "ring", "at"), "row")
         if way == "at":
-            place = ask("  at x, y, z (mm)", three_numbers)
-            aim = ask("  shines along x, y, z", three_numbers)
+            place = ask("  position x, y, z (mm)", three_numbers)
+            aim = ask("  direction x, y, z", three_numbers)
             groups[name] = {**group, "at": [{"position": place, "direction": aim}]}
             continue
         part = ask_word(f"  {way} beside the part", parts, window)
@@ -242,7 +242,7 @@ def _ask_lights(
         chosen: dict[str, Any] = {"part": part, "count": count}
         if way == "row":
             chosen["side"] = ask_word("  at its side", SIDES, guess_row.side if guess_row else "+x")
-            chosen["pitch"] = ask_number_or_none("  mm from one to the next (- spreads them)", 1e-6)
+            chosen["pitch"] = ask_number_or_none("  mm from one to the next (- is even)", 1e-6)
         else:
             chosen["axis"] = ask_word("  axis of the ring", SIDES, outward)
         chosen |= _ask_way("into the side" if way == "row" else "inward")
@@ -256,7 +256,7 @@ def _ask_lights(
 
 
 def _ask_way(usual: str) -> dict[str, Any]:
-    way = ask_word(f"  they shine to (- is {usual})", (*SIDES, "-"), "-")
+    way = ask_word(f"  direction of the light (- is {usual})", (*SIDES, "-"), "-")
     return {} if way == "-" else {"direction": way}
 
 
@@ -264,7 +264,7 @@ def _ask_group(name: str, colour: str) -> dict[str, Any]:
     return {
         "model": _ask_known("light", f"{name}: model", guessing.LIGHT),
         "colour": ask_word(f"{name}: colour", NAMED_COLOURS, colour),
-        "flux": ask_number(f"{name}: mW of each light", 10.0, least=0.0),
+        "flux": ask_number(f"{name}: flux of each light, mW", 10.0, least=0.0),
     }
 
 
@@ -288,8 +288,8 @@ def _ask_camera(
         except ValueError:
             raise ValueError("x, y, z in mm, or one of: " + ", ".join(words)) from None
 
-    say("Its pupil is in the middle of a body, at a place x, y, z, or behind the sensing surface, "
-        "where that fills the picture.")  # fmt: skip
+    say("Its pupil is in the middle of a body, at x, y, z, or behind the sensing surface, where "
+        "the surface fills the picture.")  # fmt: skip
     at = ask("Pupil", place, next(iter(references), inside))
     if not isinstance(at, str):
         camera["at"] = at if isinstance(at, tuple) else at.model_dump(exclude_none=True)
@@ -298,10 +298,10 @@ def _ask_camera(
         return answer if answer in parts else three_numbers(answer)
 
     skin = next(name for name, part in parts.items() if part.role is Role.SENSING_SURFACE)
-    aim = ask("It looks at a part, or x, y, z", target, skin)
+    aim = ask("It looks at (a part, or x, y, z)", target, skin)
     if aim != skin:
         camera["look_at"] = aim
-    up = ask_word("Upward in the picture (- for +y, or +z where that is ahead)", (*SIDES, "-"), "-")
+    up = ask_word("Up in the picture (- for +y, or +z if it looks along y)", (*SIDES, "-"), "-")
     if up != "-":
         camera["up"] = up
     return camera

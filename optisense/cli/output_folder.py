@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from pathlib import Path
 
-from optisense.cli.console import at_end
+from optisense.cli.console import on_exit
 from optisense.errors import OutputError
 from optisense.folders import hold
 
@@ -18,7 +18,7 @@ def take_folder(folder: Path) -> None:
         FolderInUseError: another process is writing to the folder.
         OutputError: the folder can't be written; raised before the work begins.
     """
-    at_end(hold(folder))
+    on_exit(hold(folder))
 
 
 def ensure_writable(folder: Path) -> None:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
-from optisense.cli.interrupt import Interrupt, held_interrupt
+from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
+from optisense.cli.interrupt import Interrupt, deferred_interrupt
 from optisense.cli.options import (
     ContactOption,
     DesignArgument,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 PICTURE = "image.png"
 
 
-@ends_well
+@handles_errors
 def render(
     design: DesignArgument,
     out: Annotated[
@@ -53,7 +53,7 @@ def render(
 
     with (
         progress_line(*_steps(UsualTimes.here(), options), waits=_waits) as line,
-        held_interrupt() as interrupt,
+        deferred_interrupt() as interrupt,
     ):
         line.begin(LOADING)
         from optisense.sensors import load
@@ -113,9 +113,9 @@ def render(
             real=real,
             light=light,
         )
-    _say_what_came(image, out)
+    _print_summary(image, out)
     if image.interrupted:
-        messages.print("interrupted: the files hold what was finished until then")
+        messages.print("interrupted: the files contain what was finished")
     if interrupt.requested:
         raise typer.Exit(EXIT_INTERRUPTED)
 
@@ -208,7 +208,8 @@ class RenderStages:
         self._line.say(what, None, None, *notes)
 
 
-def _say_what_came(image: TactileImage, folder: Path) -> None:
+def _print_summary(image: TactileImage, folder: Path) -> None:
+    """Print size, photons, noise and time of an image, its warnings, and the files."""
     from optisense.optics.imaging.tactile_image import REPORT_FILE
 
     height, width = image.contact_mask.shape
@@ -221,6 +222,6 @@ def _say_what_came(image: TactileImage, folder: Path) -> None:
     facts.append(f"{settings['seconds']['total']:.2g} s")
     output.print(", ".join(facts), style="dim")
     for warning in image.pressed.warnings if image.pressed is not None else ():
-        output.print(f"odd: {warning}", markup=False, style="yellow")
+        output.print(f"warning: {warning}", markup=False, style="yellow")
     output.print(f"picture: {folder / PICTURE}", markup=False)
     output.print(f"report:  {folder / REPORT_FILE}", markup=False)

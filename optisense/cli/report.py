@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, output
+from optisense.cli.console import handles_errors, output
 from optisense.cli.progress import ProgressLine, progress_line
 from optisense.commands.rendering import BeforeAndAfterOptions
 from optisense.time_left import TimedStep
@@ -27,7 +27,7 @@ with the largest number the page has about 10 MB.
 """
 
 
-@ends_well
+@handles_errors
 def report(
     study: Annotated[
         Path,

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from optisense.report.before_after import DesignView
     from optisense.search import Study
 
-LOOK_EVERY = 1.0
+POLL_INTERVAL = 1.0
 """Interval between checks of the study's files, s; trials that end within one are shown
 together.
 """
@@ -74,12 +74,12 @@ class _Watched:
         self._version = version
 
     def answer(self) -> None:
-        """Wait up to `LOOK_EVERY` seconds for a browser that asks for a trial's picture, and render
-        it.
+        """Wait up to `POLL_INTERVAL` seconds for a browser's request for a trial's picture, and
+        answer it.
         """
         from optisense.report.pictures import png
 
-        asked = self._server.wait(LOOK_EVERY)
+        asked = self._server.wait(POLL_INTERVAL)
         if asked is None:
             return
         number, answer = asked

@@ -13,7 +13,7 @@ import typer
 
 from optisense.cli import stopping
 from optisense.cli.asking import ask_yes
-from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output
+from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
 from optisense.cli.options import (
     VariantOption,
     WorkersOption,
@@ -36,7 +36,7 @@ VERIFY_FOLDER = "verify"
 """Name of the folder for the results of the verification, in that of the study."""
 
 
-@ends_well
+@handles_errors
 def search(
     design: Annotated[
         str | None,
@@ -112,7 +112,7 @@ def search(
                 limit=options.budget,
                 variant=variant,
                 progress=show,
-                on_wait=stopping.say,
+                on_wait=stopping.print_wait,
                 time_left=line.time_left,
             )
         best = result.study.best
@@ -123,7 +123,8 @@ def search(
             print_result(result, out)
     if result.interrupted:
         messages.print(
-            f"interrupted: everything is kept; go on with: optisense search --resume --out {out}",
+            f"interrupted: all trials are kept; continue with "
+            f"optisense search --resume --out {out}",
             markup=False,
         )
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -143,7 +144,7 @@ def _verify(study: Path, variant: str) -> None:
     from optisense.errors import OptiSenseError
 
     folder = study / VERIFY_FOLDER
-    output.print(f"Does it read better? A quick look; in full: optisense verify {study}")
+    output.print(f"Quick verification of the best design (in full: optisense verify {study}):")
     try:
         print_comparison(
             compare(
@@ -157,7 +158,7 @@ def _verify(study: Path, variant: str) -> None:
             folder,
         )
     except OptiSenseError as error:
-        messages.print(f"it can't be verified: {error}", style="yellow", markup=False)
+        messages.print(f"the best design can't be verified: {error}", style="yellow", markup=False)
 
 
 def _begun(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:
@@ -177,7 +178,7 @@ def _begun(out: Path, design: str | None, options: SearchOptions, line: Progress
     plan = options.plan()
     hint = advice(plan.space.parameters, options.objectives)
     if hint is not None:
-        messages.print(f"Hint: {hint}.", style="yellow", markup=False)
+        messages.print(f"hint: {hint}", style="yellow", markup=False)
     return Study.create(out, sensor, plan)
 
 
@@ -202,7 +203,7 @@ def _may_run(strange: list[str]) -> bool:
     """Ask whether Python code that the user has not named may be run; False without a terminal."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
-    messages.print("This study runs Python code that you have not named:", style="yellow")
+    messages.print("This study runs Python code that you did not name:", style="yellow")
     for each in strange:
         messages.print(f"  {each}", markup=False)
     return ask_yes("Do you trust it", default=False)

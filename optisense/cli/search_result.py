@@ -59,7 +59,7 @@ def _several(result: SearchResult) -> bool:
 
 def print_result(result: SearchResult, out: Path) -> None:
     """Print the best trial, the numbers beside its score, and the next commands."""
-    from optisense.search.study.conditions import kept
+    from optisense.search.study.conditions import condition_lines
 
     study = result.study
     for note in result.notes:
@@ -76,8 +76,11 @@ def print_result(result: SearchResult, out: Path) -> None:
     output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}", markup=False)
     if best.unbiased_score != best.score:
         by = "its coarse score" if study.settings.coarse_first else "the search's own seed"
-        output.print(f"  by {by}, by which it was chosen: {best.score:.4g}")
-    for line in [*_beside(study, best, start), *(f"  {each}" for each in kept(best, start))]:
+        output.print(f"  {best.score:.4g} by {by}, which selected it")
+    for line in [
+        *_beside(study, best, start),
+        *(f"  {each}" for each in condition_lines(best, start)),
+    ]:
         output.print(line, markup=False)
     values = list(best.values.items())
     for path, value in values[:MOST_VALUES]:
@@ -90,21 +93,21 @@ def print_result(result: SearchResult, out: Path) -> None:
     if best.is_start:
         output.print("no trial is better than the start")
     elif not result.interrupted:
-        output.print(f"Take it:    optisense apply {out} --trial best --out better", style="dim")
+        output.print(f"Apply it:   optisense apply {out} --trial best --out better", style="dim")
         output.print(f"Verify it:  optisense verify {out}", style="dim")
 
 
 def _print_nearest(trials: Sequence[Trial]) -> None:
     """Print the trial that comes nearest to the conditions, if no trial is the best."""
     from optisense.search.study.best import nearest
-    from optisense.search.study.conditions import kept
+    from optisense.search.study.conditions import condition_lines
 
     close = nearest(trials)
     if close is None:
         output.print("no trial has a score yet")
         return
-    output.print(f"no best trial; nearest to the conditions: trial {close.number}")
-    for line in kept(close, None):
+    output.print(f"no trial meets the conditions; nearest: trial {close.number}")
+    for line in condition_lines(close, None):
         output.print(f"  {line}", markup=False)
 
 
@@ -149,5 +152,5 @@ def _print_front(result: SearchResult) -> None:
     table = table_of("trial", *names, texts=0)
     for trial in result.front:
         table.add_row(str(trial.number), *(f"{trial.scores[name]:.4g}" for name in names))
-    output.print("none of these is beaten in all objectives:")
+    output.print("Pareto front (no trial is better in all objectives):")
     output.print(table)

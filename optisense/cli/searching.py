@@ -27,7 +27,7 @@ for plots and statistics.
 """
 
 
-RELIT = ("light-colours",)
+RELIT_METHODS = ("light-colours",)
 """Methods whose trials take next to no time, since they render nothing."""
 
 USUAL_FRESH, FRESH_SEEDS = 9, 3
@@ -73,7 +73,7 @@ def expect_search(line: ProgressLine, design: SensorDesign, options: SearchOptio
     expect = line.time_left.expect
     if options.method in (None, "cma-es"):
         expect(LOADING, seconds=(LOADING_TIME + CMA_LIBRARIES) * UsualTimes.here().thread_pace)
-    budget = 0 if options.method in RELIT else options.budget
+    budget = 0 if options.method in RELIT_METHODS else options.budget
     if budget is None or not options.objectives:
         return
     full = usual_trials(design, options.objectives, options.settings)
@@ -87,7 +87,7 @@ def expect_search(line: ProgressLine, design: SensorDesign, options: SearchOptio
         trials = usual_trials(design, options.objectives, coarse) or full
     expect("start", seconds=trials.first)
     expect("trials", count=budget, seconds=trials.trial)
-    fresh = FRESH_SEEDS if options.method in RELIT else USUAL_FRESH
+    fresh = FRESH_SEEDS if options.method in RELIT_METHODS else USUAL_FRESH
     expect("fresh seeds", count=fresh, seconds=full.fresh)
 
 
@@ -126,8 +126,8 @@ def notes(progress: SearchProgress) -> list[str]:
     parts = []
     if math.isfinite(progress.best):
         parts.append(f"best {_score(progress.best)} (start {_score(progress.start)})")
-        if progress.lost:
-            parts.append(f"but {', '.join(progress.lost)}")
+        if progress.worsened:
+            parts.append(f"but {', '.join(progress.worsened)}")
     elif progress.nearest:
         parts.append(f"no trial meets the conditions yet, nearest: {progress.nearest}")
     if progress.broken:
@@ -146,7 +146,7 @@ def _waits(last: list[SearchProgress]) -> str:
     if not last or last[0].stage == "start":
         return "finishing the score of the start"
     if last[0].stage != "trials":
-        return "finishing the score at hand"
+        return "finishing the current score"
     hourly = last[0].trials_per_hour
     took = about(3600.0 / hourly) if hourly > 0.0 else ""
     return f"finishing trial {last[0].done + 1}{took}"

@@ -37,7 +37,9 @@ GRACE = 1.5
 
 
 AGAIN = 0.02
-"""Interval until a signal that came amid an import is delivered again, s."""
+"""Interval until a signal that came during an import is delivered again, s; short enough not to be
+noticed, and most imports are finished by then.
+"""
 
 _IMPORTS = ("<frozen importlib._bootstrap>", "<frozen importlib._bootstrap_external>")
 """Files of Python's import functions."""
@@ -70,12 +72,12 @@ def waiting(waits: Callable[[], str] | None) -> Iterator[None]:
         _state.waits = before
 
 
-def say() -> None:
+def print_wait() -> None:
     """Print once what a first Ctrl-C waits for."""
     if _state.said:
         return
     _state.said = True
-    what = "stopping after the step at hand" if _state.waits is None else _state.waits()
+    what = "stopping after the current step" if _state.waits is None else _state.waits()
     if _state.terminated:
         said = f"SIGTERM: {what}; another one stops at once"
     else:
@@ -95,7 +97,7 @@ def requested() -> bool:
     return _state.signals > 0
 
 
-def watch() -> None:
+def install_handlers() -> None:
     """Handle signals in this process from here on; called once, at the start of the command line.
 
     SIGTERM then stops a command as Ctrl-C does. A SIGINT that is ignored, as in programs that a
@@ -113,7 +115,7 @@ def watch() -> None:
     threading.Thread(target=_answer, args=(reader,), name="signals", daemon=True).start()
 
 
-def over(code: int) -> None:
+def finish(code: int) -> None:
     """Let a signal end the process at once from here on, with the code of the finished command."""
     for number in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(number) in (_interrupt, _terminate):
@@ -177,7 +179,7 @@ def _answer(reader: int) -> None:
                 timer.daemon = True
                 timer.start()
             elif _state.waits is not None or not select.select([reader], [], [], SILENCE)[0]:
-                say()
+                print_wait()
 
 
 def _leave() -> NoReturn:

@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.studio_extension import (
     find_blender,
     install,
@@ -26,7 +26,7 @@ ENGINE = "OPTISENSE_ENGINE"
 OPEN = "OPTISENSE_OPEN"
 
 
-@ends_well
+@handles_errors
 def studio(
     design: Annotated[
         str | None,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optisense import tasks
-from optisense.cli.console import ends_well, messages, output
+from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.options import DesignArgument, VariantOption, out_option, parse_contacts
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
@@ -71,7 +71,7 @@ fit them, s.
 
 
 @task_app.command()
-@ends_well
+@handles_errors
 def misalignment(
     design: DesignArgument,
     angle: Annotated[
@@ -107,7 +107,7 @@ def misalignment(
 
 
 @task_app.command("cylinder-radius")
-@ends_well
+@handles_errors
 def cylinder_radius(
     design: DesignArgument,
     depth: Annotated[
@@ -129,7 +129,7 @@ def cylinder_radius(
 
 
 @task_app.command()
-@ends_well
+@handles_errors
 def force(
     design: DesignArgument,
     ball: Annotated[
@@ -156,7 +156,7 @@ def force(
 
 
 @task_app.command()
-@ends_well
+@handles_errors
 def shear(
     design: DesignArgument,
     ball: Annotated[
@@ -189,7 +189,7 @@ def shear(
 
 
 @task_app.command()
-@ends_well
+@handles_errors
 def snr(
     design: DesignArgument,
     *,
@@ -207,7 +207,7 @@ def snr(
 
 
 @task_app.command()
-@ends_well
+@handles_errors
 def reconstruction(
     design: DesignArgument,
     thing: Annotated[

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def print_perception(results: Iterable[PerceptionResult]) -> None:
     """Print a row for each task."""
-    heads = ("mean error", "among folds", "of guessing", "signal to noise", "samples")
+    heads = ("mean error", "of folds", "baseline error", "signal to noise", "samples")
     table = table_of("task", *heads)
     for result in results:
         reading = result.reading
@@ -31,7 +31,7 @@ def print_perception(results: Iterable[PerceptionResult]) -> None:
 
 def print_reconstruction(result: ReconstructionResult) -> None:
     """Print a row for each object, and their mean: degrees of normals, and mm of depths."""
-    heads = ("normals off (°)", "if flat (°)", "ring (°)", "depth off (mm)", "ring (mm)")
+    heads = ("normals (°)", "if flat (°)", "ring (°)", "depth (mm)", "ring (mm)")
     table = table_of("object", *heads, "deepest (mm)", "read (mm)")
     table.columns[0].overflow = "fold"  # long names go on in the next line
     table.columns[0].no_wrap = False

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli import stopping
-from optisense.cli.console import EXIT_INTERRUPTED, ends_well, messages, output, table_of
+from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output, table_of
 from optisense.cli.options import (
     DesignArgument,
     VariantOption,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
     from optisense.search.tolerance.sensitivity import Estimate
 
-LOADING, FIRST, SENSORS = "loading", "the design itself", "sensors"
+LOADING, FIRST, SENSORS = "loading", "the nominal design", "sensors"
 """Steps of the progress; the last two are those of `optisense.search.tolerance.analysis`, which
 loads slowly.
 """
@@ -39,7 +39,7 @@ JSON_FILE = "tolerance.json"
 REPORT_FILE = "tolerance.html"
 
 
-@ends_well
+@handles_errors
 def tolerance(
     design: DesignArgument,
     *,
@@ -98,7 +98,7 @@ def tolerance(
             settings=settings,
             variant=variant,
             progress=show,
-            on_wait=stopping.say,
+            on_wait=stopping.print_wait,
             time_left=line.time_left,
         )
     text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
@@ -112,9 +112,9 @@ def tolerance(
             for name in [JSON_FILE, *([REPORT_FILE] if report else [])]:
                 output.print(f"written: {out / name}", markup=False)
     if found.interrupted:
-        kept = "" if out is not None else "; with --out DIR it is kept"
+        kept = "" if out is not None else "; use --out DIR to keep it"
         messages.print(
-            f"interrupted: this rests on the {found.sensors} sensors until then{kept}",
+            f"interrupted: the result is from the {found.sensors} sensors scored so far{kept}",
             markup=False,
         )
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -128,14 +128,14 @@ def what(done: int, count: int) -> tuple[str, int, int]:
     from optisense.search.tolerance.analysis import OWN_SCORES
 
     if done < OWN_SCORES:
-        return "scoring the design itself", done, OWN_SCORES
+        return "scoring the nominal design", done, OWN_SCORES
     return "scoring sensors", done - OWN_SCORES, count - OWN_SCORES
 
 
 def _waits(last: list[tuple[int, float]]) -> str:
     """Return what a first Ctrl-C waits for: the current score."""
     if not last:
-        return "finishing the score at hand"
+        return "finishing the current score"
     done, each = last[0]
     return f"finishing score {done + 1}{about(each)}"
 
@@ -152,7 +152,7 @@ def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
 
 def _print(found: Tolerance) -> None:
     """Print one table of percentiles, and one of shares for each objective."""
-    table = table_of("objective", "as designed", "P10", "P50", "P90", "spread", "noise")
+    table = table_of("objective", "nominal", "P10", "P50", "P90", "spread", "noise")
     for name, each in found.results.items():
         table.add_row(
             name,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from optisense.cli.console import ends_well, output
+from optisense.cli.console import handles_errors, output
 from optisense.cli.options import VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
@@ -37,7 +37,7 @@ FITTING_TIME = 5.0
 """Time of the fits of the readers, s."""
 
 
-@ends_well
+@handles_errors
 def verify(
     first: Annotated[
         str,
@@ -189,7 +189,7 @@ def _designs(
 
     if second is not None:
         if trial != "best":
-            raise typer.BadParameter("is for a study", param_hint="--trial")
+            raise typer.BadParameter("it needs a study", param_hint="--trial")
         one, other = load(first), load(second)
         names = (first, second) if one.name == other.name else (one.name, other.name)
         return names, (one, other)

@@ -15,8 +15,8 @@ def print_verification(found: Verification) -> None:
     first, second = found.names
     table = table_of("", first, second, "change", "95 % interval")
     for label, change, digits, unit in (
-        ("normals off by", found.normal_change, 1, "degrees"),
-        ("depth off by", found.depth_change, 3, "mm"),
+        ("error of normals", found.normal_change, 1, "degrees"),
+        ("error of depth", found.depth_change, 3, "mm"),
     ):
         table.add_row(
             label,
@@ -33,8 +33,8 @@ def print_verification(found: Verification) -> None:
     count, places = len(found.settings.objects), found.settings.places
     each = "one place" if places == 1 else f"{places} places"
     output.print(
-        f"{count} objects, each at {each}; reading nothing is off by {found.flat[0]:.1f} degrees "
-        f"and {found.flat[1]:.3f} mm",
+        f"{count} objects, each at {each}; the errors of a flat reading are "
+        f"{found.flat[0]:.1f} degrees and {found.flat[1]:.3f} mm",
         style="dim",
     )
     for note in found.notes():

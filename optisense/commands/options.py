@@ -20,7 +20,7 @@ MOST_PIXELS = 20_000_000
 LONGEST_RENDER = 7 * 24 * 3600.0
 """Longest time that a picture may be asked to take, s: a week; more is a typing error."""
 
-MOST_THINGS = 10_000_000
+MOST_ITEMS = 10_000_000
 """Largest number of samples, trials or sensors that may be asked for; more would take years."""
 
 EXPOSURES = (1e-9, 1e9)

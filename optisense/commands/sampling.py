@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import (
-    MOST_THINGS,
+    MOST_ITEMS,
     SKIN_HELP,
     CommandOptions,
     Exposure,
@@ -66,10 +66,10 @@ class EstimatorOptions(PictureOptions):
 class SampleOptions(EstimatorOptions):
     """Options of the samples of a perception task."""
 
-    samples: Annotated[int, Ge(10), Le(MOST_THINGS), OptionNotation("N", ("--samples", "-n"))] = (
+    samples: Annotated[int, Ge(10), Le(MOST_ITEMS), OptionNotation("N", ("--samples", "-n"))] = (
         Field(200, description="Number of random contacts.")
     )
-    neighbours: Annotated[int, Ge(2), Le(MOST_THINGS), OptionNotation("K")] = Field(
+    neighbours: Annotated[int, Ge(2), Le(MOST_ITEMS), OptionNotation("K")] = Field(
         5,
         description="Number of nearest neighbours from which the signal-to-noise ratio is "
         "computed.",
@@ -151,7 +151,7 @@ class ReconstructionOptions(PictureOptions):
         "network",
         description="What estimates normals from colours: a neural network or a lookup table.",
     )
-    presses: Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N")] = Field(
+    presses: Annotated[int, Ge(1), Le(MOST_ITEMS), OptionNotation("N")] = Field(
         40, description="Number of ball presses that calibrate the reader of normals."
     )
     radius: Annotated[float, Ge(0.01), OptionNotation("MM")] = Field(
@@ -198,10 +198,10 @@ class VerifyOptions(CommandOptions):
         description="An object to press: screw-head, coin, nut, ... May be given several times.",
     )
     places: (
-        Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N", usual="3, quick 2")] | None
+        Annotated[int, Ge(1), Le(MOST_ITEMS), OptionNotation("N", usual="3, quick 2")] | None
     ) = Field(None, description="Number of presses of each object.")
     presses: (
-        Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N", usual="40, quick 20")] | None
+        Annotated[int, Ge(1), Le(MOST_ITEMS), OptionNotation("N", usual="40, quick 20")] | None
     ) = Field(None, description="Number of ball presses that calibrate the reader of each sensor.")
     seed: Seed = Field(0, description="Seed of the random places, presses and noise.")
     camera_noise: CameraNoise = Field(NOISE, description=NOISE_HELP)

@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import AfterValidator, Field
 
 from optisense.commands.options import (
-    MOST_THINGS,
+    MOST_ITEMS,
     CommandOptions,
     NamedValues,
     OptionNotation,
@@ -70,7 +70,7 @@ class EvaluateOptions(ScoreOptions):
         )
     )
     seed: Seed = Field(0, description="The same seed gives the same scores.")
-    seeds: Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N")] = Field(
+    seeds: Annotated[int, Ge(1), Le(MOST_ITEMS), OptionNotation("N")] = Field(
         1, description="Number of seeds to score with; from 2 on the standard deviation is printed."
     )
 
@@ -90,7 +90,7 @@ class ToleranceOptions(ScoreOptions):
         "distributed up to a limit. lights.position and lights.angle mean each light "
         "by itself. May be given several times.",
     )
-    sensors: Annotated[int, Ge(8), Le(MOST_THINGS), OptionNotation("N")] = Field(
+    sensors: Annotated[int, Ge(8), Le(MOST_ITEMS), OptionNotation("N")] = Field(
         120, description="Approximate number of manufactured sensors to simulate."
     )
     seed: Seed = Field(0, description="The same seed gives the same sensors.")

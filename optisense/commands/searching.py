@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from pydantic import Field
 
 from optisense.commands.options import (
-    MOST_THINGS,
+    MOST_ITEMS,
     CommandOptions,
     NamedValues,
     OptionNotation,
@@ -49,7 +49,7 @@ class SearchOptions(CommandOptions):
     method: Annotated[str, OptionNotation("NAME", usual="cma-es")] | None = Field(
         None, description="The search method; --methods lists all."
     )
-    budget: Annotated[int, Ge(1), Le(MOST_THINGS), OptionNotation("N")] | None = Field(
+    budget: Annotated[int, Ge(1), Le(MOST_ITEMS), OptionNotation("N")] | None = Field(
         None,
         description="Total number of trials, including the finished ones with --resume; if left "
         "out, the method chooses it.",
@@ -84,7 +84,7 @@ class SearchOptions(CommandOptions):
         "deviation of its error. The search then maximises the score that nine of ten "
         "manufactured sensors reach. May be given several times.",
     )
-    samples: Annotated[int, Ge(2), Le(MOST_THINGS), OptionNotation("N", usual="8")] | None = Field(
+    samples: Annotated[int, Ge(2), Le(MOST_ITEMS), OptionNotation("N", usual="8")] | None = Field(
         None, description="With --error: number of manufactured sensors simulated for each trial."
     )
 

@@ -116,14 +116,14 @@ def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
             if key < len(value):
                 return value[key]
             raise DesignError(
-                f"'{path}' leads nowhere: {here} has {len(value)} entries",
+                f"'{path}' does not exist: {here} has {len(value)} entries",
                 hint=f"Indices run from 0 to {len(value) - 1}",
             )
         known = ["x", "y", "z"] if len(value) == 3 else []
     else:
-        raise DesignError(f"'{path}' leads nowhere: {here} has nothing inside it")
+        raise DesignError(f"'{path}' does not exist: {here} has nothing inside it")
     raise DesignError(
-        f"'{path}' leads nowhere: {here} has no '{step}'",
+        f"'{path}' does not exist: {here} has no '{step}'",
         hint=suggestion(str(step), known, limit=20),
     )
 

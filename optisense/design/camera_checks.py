@@ -171,7 +171,7 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     if picture == 0.0 and not any(in_picture(camera, skin.vertices).any() for skin in skins):
         return [
             Diagnostic(
-                "the sensing surface is not where the camera looks",
+                "the sensing surface is not in the camera's field of view",
                 where,
                 "Point the camera's direction at it, or move the camera, unless the parts bend the "
                 "light that far",
@@ -216,7 +216,7 @@ def view_shares(
 
 def _small(message: str, where: str) -> Diagnostic:
     return Diagnostic(
-        f"{message}, seen straight",
+        f"{message}, if refraction is neglected",
         where,
         "Move the camera or change its field of view, unless the parts bend the light that far; "
         f"scores need {100 * LEAST_PICTURE:g} % of the picture and {100 * LEAST_SKIN:g} % of the "

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from optisense.search import Study
     from optisense.search.study.store import Row
 
-LOOK_EVERY = 0.25
+POLL_INTERVAL = 0.25
 """Interval between two looks at the study, s; it is longer if a look takes long."""
 
 LOOKING_SHARE = 0.05
@@ -109,7 +109,7 @@ class Following:
             if not running:
                 return
             took = time.monotonic() - began
-            self._left.wait(max(LOOK_EVERY, took / LOOKING_SHARE))
+            self._left.wait(max(POLL_INTERVAL, took / LOOKING_SHARE))
 
     def _runs(self) -> bool:
         return is_running(self._folder) if self._child is None else self._child.running

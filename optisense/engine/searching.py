@@ -109,7 +109,7 @@ def advise(session: Session, fields: Advise, job: Job) -> dict[str, Any]:
     design = design_of(session, fields, job)
     space = parse_space(fields.vary)
     bound = SearchSpace(space).bind(design)
-    budget = fields.budget or find(fields.method).usual_budget(bound)
+    budget = fields.budget or find(fields.method).default_budget(bound)
     usual = usual_score(design, fields.objectives, Settings())
     trials = UsualTrials.of(usual, usual.building + usual.whole, usual.whole)
     against = advice(space, fields.objectives)

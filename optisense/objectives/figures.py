@@ -269,7 +269,7 @@ def draw_reading(score: Score) -> Figure:
         axes.set_yticks([])
     for axes in grid[len(maps) :]:
         axes.set_axis_off()
-    figure.colorbar(shown, ax=list(grid), label="normal off by (°)", shrink=0.8)
+    figure.colorbar(shown, ax=list(grid), label="error of the normal (°)", shrink=0.8)
     figure.suptitle("place and the mean over its contact", fontsize=11)
     return figure
 

@@ -92,7 +92,7 @@ def conditions(study: Study, start: Trial | None, best: Trial | None) -> Table |
             for trial in (start, best)
         ]
         margin = wanted.margin(values[1])
-        shown = "broken" if margin < 0.0 and wanted.breach(values[1]) else number(margin)
+        shown = "broken" if margin < 0.0 and wanted.violation(values[1]) else number(margin)
         rows.append([str(wanted), *map(number, values), shown])
     return Table(["", "before", "after", "margin"], rows) if rows else None
 

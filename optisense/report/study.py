@@ -97,7 +97,7 @@ def render_study(
     several = len(names) > 1
     front = front_among([t for t in trials if not t.is_start], names) if several else []
     strongest = [each.number for each in study_figures.influences(trials, names[0])]
-    weighed = names if find(study.settings.method).several else names[:1]
+    weighed = names if find(study.settings.method).multi_objective else names[:1]
     known = selectable(trials)
     figures_of = _Figures({trial.number for trial in known})
     if scored:

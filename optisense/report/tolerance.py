@@ -59,9 +59,7 @@ def spread_figure(name: str, found: ScoreDistribution) -> Figure:
     scores = found.scores[np.isfinite(found.scores)]
     if len(scores):
         left.hist(scores, bins=min(40, max(8, len(scores) // 6)), color=BLUE, alpha=0.55)
-    left.axvline(
-        found.nominal, color=GREY, lw=1.4, ls="--", label=f"as designed {found.nominal:.4g}"
-    )
+    left.axvline(found.nominal, color=GREY, lw=1.4, ls="--", label=f"nominal {found.nominal:.4g}")
     for key, each in found.percentiles.items():
         if math.isfinite(each.value):
             colour = RED if key == "p10" else AMBER

@@ -98,8 +98,8 @@ def _rows(found: Verification) -> list[list[str]]:
     """Return label, first sensor, second sensor, change and interval."""
     one, other = found.views
     return [
-        _change("normals off by (degrees)", found.normal_change, 1),
-        _change("depth off by (mm)", found.depth_change, 3),
+        _change("error of normals (degrees)", found.normal_change, 1),
+        _change("error of depth (mm)", found.depth_change, 3),
         ["skin in view", f"{100 * one.coverage:.1f} %", f"{100 * other.coverage:.1f} %", "", ""],
         ["a pixel shows, longer side (mm)", f"{one.detail:.3f}", f"{other.detail:.3f}", "", ""],
         ["stretched, length by width", f"{one.stretching:.2f}", f"{other.stretching:.2f}", "", ""],

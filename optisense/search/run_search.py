@@ -10,7 +10,7 @@ from optisense.design import SensorDesign
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import FolderInUseError, OptiSenseError, SearchError
 from optisense.search.evaluation.evaluator import Evaluator, Goal
-from optisense.search.executors import Runner, Workers, runner_of
+from optisense.search.executors import Runner, Workers, create_runner
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors, ToleranceDistribution
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.loop import StudyRun
@@ -83,9 +83,8 @@ def search(
     refuse_no_design(design)
     goals = as_goals(objective)
     named = space if isinstance(space, SearchSpace) else SearchSpace(space)
-    making = errors
-    if making is not None and not isinstance(making, ManufacturingErrors):
-        making = ManufacturingErrors(making)
+    if errors is not None and not isinstance(errors, ManufacturingErrors):
+        errors = ManufacturingErrors(errors)
     plan = Plan(
         space=named,
         goals=goals,
@@ -95,14 +94,14 @@ def search(
         seed=seed,
         settings=settings,
         apart=apart,
-        errors=making,
+        errors=errors,
         samples=samples,
         requirements=[require] if isinstance(require, str) else list(require),
         coarse_first=coarse_first,
     )
     if resume:
         if out is None:
-            raise SearchError("a study to go on with needs its folder", hint="Give out=FOLDER")
+            raise SearchError("resume=True needs the folder of the study", hint="Give out=FOLDER")
         study = Study.open(out, design, goals, named.constraints)
         study.expect(plan.settings_for(design).comparable())
         study.trust()  # the caller names the same files
@@ -144,10 +143,10 @@ def run_study(
     """
 
     def make_runner(evaluator: Evaluator) -> Runner:
-        return runner_of(evaluator, workers, on_wait)
+        return create_runner(evaluator, workers, on_wait)
 
     try:
-        return StudyRun(study, make_runner, progress, limit, variant, time_left).go()
+        return StudyRun(study, make_runner, progress, limit, variant, time_left).run()
     except FolderInUseError:
         raise
     except OptiSenseError as error:
@@ -168,10 +167,10 @@ def _hint_after(error: OptiSenseError, study: Study) -> str | None:
     trials = study.trials
     if trials or not study.is_new:
         kept = f"{len(trials)} finished trial{'' if len(trials) == 1 else 's'}"
-        advice = f"The study keeps its {kept}: go on with --resume --out {study.folder}"
+        advice = f"The study keeps its {kept}: continue with --resume --out {study.folder}"
     else:
         study.discard()
-        advice = "No trial was finished and no study is left: give the same command again"
+        advice = "No trial was finished, so the study was removed: run the same command again"
     return f"{error.hint}. {advice}" if error.hint else advice
 
 

@@ -46,9 +46,11 @@ LANDSCAPES: dict[str, Landscape] = {
     "a quarter of it is infinite": lambda share: float(share[0]) if share[0] < 0.75 else math.inf,
     "very large numbers": lambda share: 1e300 * float(share.sum()),
 }
-"""Scores with shapes that are difficult for search methods."""
+"""Scores with shapes that are difficult for search methods: a maximum inside the space or at a
+bound, ties, missing and infinite scores, and numbers near the largest float64.
+"""
 
-MANY = 50
+MOST_PARAMETERS = 50
 """Largest number of parameters of spaces that are searched by all scores; larger ones are searched
 by one score only, since the others would test nothing new.
 """
@@ -111,19 +113,19 @@ class MethodContract:
         method: name of the method.
         options: options of the method for the tests.
         budget: number of trials of each study.
-        goals: number of objectives that the method needs.
-        reaches: largest distance of the best trial from the optimum of one or two numbers, as a
-            share of the range; None if the method promises nothing.
-        rounding: largest difference between two runs of one study, as a share of the ranges and
-            scores; above 0 only if trials themselves differ in their last digits.
+        objectives: number of objectives that the method needs.
+        optimum_tolerance: largest distance of the best trial from the optimum of one or two
+            numbers, as a share of the range; None if the method promises nothing.
+        rerun_tolerance: largest difference between two runs of one study, as a share of the ranges
+            and scores; above 0 only if trials themselves differ in their last digits.
     """
 
     method: str
     options: Mapping[str, Any] = {}
     budget: int = 18
-    goals: int = 1
-    reaches: float | None = None
-    rounding: float = 0.0
+    objectives: int = 1
+    optimum_tolerance: float | None = None
+    rerun_tolerance: float = 0.0
 
     def design(self) -> SensorDesign:
         """Return the design that the studies start from."""
@@ -164,7 +166,7 @@ class MethodContract:
         """
         design = self.design()
         goals: list[Goal] = []
-        for number in range(self.goals):
+        for number in range(self.objectives):
             goals.append(goal if isinstance(goal, str) else self._function(space, goal, number))
         plan = Plan(
             space=SearchSpace(space),
@@ -181,7 +183,7 @@ class MethodContract:
         """Yield each space with each landscape, and a name for messages."""
         for space_name, space in self.spaces().items():
             for number, (name, goal) in enumerate(self.landscapes().items()):
-                if number and len(space) > MANY:
+                if number and len(space) > MOST_PARAMETERS:
                     break
                 yield f"{space_name}, {name}", space, goal
 
@@ -191,15 +193,18 @@ class MethodContract:
         """Return the result of a whole study."""
         return run_study(self.study(space, goal, budget or self.budget))
 
-    def whole(self, case: str) -> SearchResult:
+    def result_of(self, case: str) -> SearchResult:
         """Return the result of a case of `cases`, which is run once for all tests that only read
         it.
         """
         return _whole(type(self), case)  # type: ignore[arg-type]  # classes can be hashed
 
     def test_it_searches_every_space_by_every_score(self) -> None:
+        """Every study ends normally, with valid points, and names the trial with the highest
+        score.
+        """
         for case, _, _ in self.cases():
-            result = self.whole(case)
+            result = self.result_of(case)
             assert result.ended in ("the budget is spent", "the method has finished"), case
             new = [trial for trial in result.trials if not trial.is_start]
             assert 1 <= len(new) <= self.budget, case
@@ -209,25 +214,28 @@ class MethodContract:
             assert result.best.score == max(scores), case
 
     def test_a_budget_of_one_is_one_trial(self) -> None:
+        """A budget of one scores the start and one more point."""
         goal = next(iter(self.landscapes().values()))
         for name, space in self.spaces().items():
             result = self.run(space, goal, 1)
             assert len(result.trials) == 2, name  # the start is not counted
 
     def test_a_study_that_was_stopped_goes_on_as_if_it_had_not_been(self) -> None:
+        """A study that is stopped twice and resumed has the trials of an uninterrupted one."""
         for case, space, goal in self.cases():
             if case.endswith(("bounds", "large numbers", "infinite")):
-                continue  # other landscapes test the same memory
-            whole = self.whole(case)
+                continue  # the other landscapes test the same property
+            whole = self.result_of(case)
             study = self.study(space, goal, self.budget)
             for limit in (self.budget // 8 + 1, self.budget // 2, self.budget):
                 parts = run_study(study, limit=limit)
-            _same(parts, whole, self.rounding, case)
+            _same(parts, whole, self.rerun_tolerance, case)
             assert parts.notes == whole.notes, case
 
     def test_ties_are_told_and_the_start_wins_those_that_it_shares(self) -> None:
-        if self.goals > 1 or "flat" not in self.landscapes():
-            return  # several goals have a front and no best one
+        """Where all scores are equal, the start is the best, and a note reports the tie."""
+        if self.objectives > 1 or "flat" not in self.landscapes():
+            return  # several objectives have a front and no best trial
         for name, space in self.spaces().items():
             result = self.run(space, self.landscapes()["flat"])
             assert result.best.is_start, name
@@ -237,6 +245,7 @@ class MethodContract:
                 assert any("have the same score" in note for note in result.notes), name
 
     def test_where_all_trials_fail_the_reason_is_told(self) -> None:
+        """A search in which every trial fails raises an error with the reason."""
         if not all(callable(goal) for goal in self.landscapes().values()):
             return  # objectives of the package fail where their own tests say
 
@@ -248,7 +257,7 @@ class MethodContract:
                 self.run(space, broken)
 
     def test_failed_trials_cost_nothing_else(self) -> None:
-        """Only the design as it is has a score: the start is the best."""
+        """If all trials but the start fail, the start is the best trial."""
         if not all(callable(goal) for goal in self.landscapes().values()):
             return
 
@@ -258,11 +267,12 @@ class MethodContract:
         for name, space in self.spaces().items():
             bound = SearchSpace(space).bind(self.design())
             start = (bound.start - bound.lower) / (bound.upper - bound.lower)
-            if self.goals == 1:
+            if self.objectives == 1:
                 assert self.run(space, only_start).best.is_start, name
 
     def test_it_finds_the_best_of_one_and_two_numbers(self) -> None:
-        if self.reaches is None:
+        """The best trial is within `optimum_tolerance` of an optimum at the bounds."""
+        if self.optimum_tolerance is None:
             return
         for case, space, goal in self.cases():
             if not case.startswith(("one number", "two numbers")) or "best at" not in case:
@@ -270,7 +280,7 @@ class MethodContract:
             best = self.run(space, goal, 4 * self.budget).best
             share = best.space.to_unit(best.vector)
             wanted = 1.0 if "upper" in case else 0.0
-            assert np.abs(share - wanted).max() <= self.reaches, case
+            assert np.abs(share - wanted).max() <= self.optimum_tolerance, case
 
     def _function(
         self, space: Mapping[str, object], landscape: Landscape, number: int

@@ -52,7 +52,7 @@ class BallShear(BallPress):
         super().__post_init__()
         if not (math.isfinite(self.farthest) and self.farthest > 0):
             raise TaskError(
-                f"a drag of up to {self.farthest:g} mm makes no sense",
+                f"a drag of up to {self.farthest:g} mm is impossible",
                 hint="Give a distance above 0 mm",
             )
 

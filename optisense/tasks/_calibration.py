@@ -96,7 +96,7 @@ class ReconstructionSettings:
         if not (self.presses >= 1 and self.radius > 0 and 0 < low <= high <= self.radius):
             raise TaskError(
                 f"{self.presses} presses of a ball of {self.radius:g} mm, {low:g} to {high:g} mm "
-                "deep, make no sense",
+                "deep, are impossible",
                 hint="Press at least one ball, above 0 mm and not deeper than its radius",
             )
         if not 0 <= self.camera_noise < 256:

@@ -56,7 +56,7 @@ class CylinderRadius:
     def __post_init__(self) -> None:
         if not (0 < self.least < self.most and self.depth > 0 and self.aside >= 0):
             raise TaskError(
-                f"radii {self.least:g} to {self.most:g} and depth {self.depth:g} make no sense",
+                f"radii {self.least:g} to {self.most:g} and depth {self.depth:g} are impossible",
                 hint="Give radii above 0 mm, the smaller first, and a depth above 0 mm",
             )
 

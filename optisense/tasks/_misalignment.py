@@ -86,7 +86,7 @@ class Misalignment:
     def __post_init__(self) -> None:
         if not (0 < self.range < 45 and self.depth > 0 and 0 < self.crop <= 1):
             raise TaskError(
-                f"range {self.range:g}, depth {self.depth:g} and crop {self.crop:g} make no sense",
+                f"range {self.range:g}, depth {self.depth:g} and crop {self.crop:g} are impossible",
                 hint="Give a range below 45 degrees, a depth above 0 mm and a crop up to 1",
             )
 

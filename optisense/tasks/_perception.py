@@ -207,7 +207,7 @@ def perceive(
     least = max(2 * FOLDS, neighbours + 1)
     if settings.count < least or neighbours < 2:
         raise TaskError(
-            f"{settings.count} samples and {neighbours} neighbours make no sense",
+            f"{settings.count} samples and {neighbours} neighbours are impossible",
             hint=f"Use 2 neighbours or more, and at least {least} samples",
         )
     samples = collect(task, model, settings, folder, progress)

@@ -39,7 +39,7 @@ def draw_perception(result: PerceptionResult) -> Figure:
         axes.plot(targets[:, number], read[:, number], "o", ms=3, color=DOT, alpha=0.7)
         error = np.abs(read - targets)[:, number].mean()
         name = result.targets[number].replace("_", " ")
-        axes.set_title(f"{name}: off by {error:.2g} {result.unit} on average", fontsize=10)
+        axes.set_title(f"{name}: mean error {error:.2g} {result.unit}", fontsize=10)
         axes.set_xlabel(f"true ({result.unit})")
         axes.set_ylabel(f"read ({result.unit})")
         axes.set_aspect("equal")
@@ -81,7 +81,7 @@ def draw_reconstruction(result: ReconstructionResult, axes: FloatArray) -> Figur
         line[0].set_ylabel(name)
         ring = "" if np.isnan(each.ring_normal_error) else f", {each.ring_normal_error:.1f}° beside"
         line[3].set_xlabel(f"{each.normal_error:.1f}° in the contact{ring}")
-        line[5].set_xlabel(f"off by {each.depth_error:.3f} mm in the contact")
+        line[5].set_xlabel(f"error {each.depth_error:.3f} mm in the contact")
     for cell, title in zip(grid[0], (*titles, "true depth (mm)", "read depth (mm)"), strict=True):
         cell.set_title(title, fontsize=10)
     figure.suptitle(

@@ -79,7 +79,7 @@ class VerificationSettings:
             raise TaskError("an object is named twice, or none is", hint="Name each object once")
         if self.places < 1 or self.readers < 1:
             raise TaskError(
-                f"{self.places} places and {self.readers} readers make no sense",
+                f"{self.places} places and {self.readers} readers are impossible",
                 hint="Give at least one of each",
             )
 
@@ -156,18 +156,19 @@ class Verification:
         normals, depth = self.normal_change, self.depth_change
         second = self.names[1]
         numbers = (
-            f"normals off by {normals.after:.1f} degrees instead of {normals.before:.1f} (95 % "
-            f"interval of the change {normals.low:+.1f} to {normals.high:+.1f})"
+            f"the error of normals is {normals.after:.1f} degrees instead of "
+            f"{normals.before:.1f} (95 % interval of the change {normals.low:+.1f} to "
+            f"{normals.high:+.1f})"
         )
         if self.verdict != UNKNOWN:
             beside = {
-                UNKNOWN: "no telling difference in depth",
-                self.verdict: f"depth off by {depth.after:.3f} mm instead of {depth.before:.3f}",
+                UNKNOWN: "the errors of depth do not differ measurably",
+                self.verdict: f"that of depth {depth.after:.3f} mm instead of {depth.before:.3f}",
             }[depth.verdict]
             return f"{second} reads {self.verdict}: {numbers}, {beside}"
         if normals.verdict != UNKNOWN:
             return (
-                f"Whether {second} reads better cannot be told: {numbers}, but depth off by "
+                f"Whether {second} reads better cannot be told: {numbers}, but that of depth "
                 f"{depth.after:.3f} mm instead of {depth.before:.3f}"
             )
         return f"Whether {second} reads better cannot be told: {numbers}"
@@ -181,14 +182,12 @@ class Verification:
             )
         if not self.same_places:
             found.append(
-                "the sensors have other skins, so each was pressed at places of its own and what "
-                "its camera does not see does not count"
+                "the sensing surfaces differ, so each sensor was pressed at places of its own, and "
+                "what its camera does not see does not count"
             )
         count = len(self.settings.objects)
         if count < LEAST_OBJECTS:
-            found.append(
-                f"{count} objects are too few to tell a difference; {LEAST_OBJECTS} will do"
-            )
+            found.append(f"a verdict needs {LEAST_OBJECTS} or more objects, and there were {count}")
         return found
 
     def to_dict(self) -> dict[str, Any]:

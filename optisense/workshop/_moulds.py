@@ -169,7 +169,7 @@ def _outward(skins: list[TriangleMesh]) -> FloatArray:
     total, area = -twice.sum(axis=0), np.linalg.norm(twice, axis=1).sum()
     if np.linalg.norm(total) < LEAST_FACING * area:
         raise DesignError(
-            "the skin looks to all sides, so that no half of a mould could be pulled off it",
+            "the skin faces all sides, so that no half of a mould could be pulled off it",
             hint="Leave --moulds out: a belt or a tube is cast around a core",
         )
     return np.asarray(total / np.linalg.norm(total), dtype=np.float64)

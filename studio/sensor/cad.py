@@ -22,7 +22,7 @@ FORMATS = "*.obj;*.stl;*.ply;*.step;*.stp"
 
 USES = [
     *ROLES,
-    ("lights", "Lights", "A light on each of its faces that look to the gel"),
+    ("lights", "Lights", "A light on each of its faces that point to the gel"),
     ("camera", "Camera", "The camera's pupil is in its middle"),
     ("nothing", "Left out", "No part of the sensor"),
 ]

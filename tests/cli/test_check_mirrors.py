@@ -20,7 +20,7 @@ def checked(design: str) -> tuple[str, list[str]]:
     result = CliRunner().invoke(app, ["check", design])
     assert result.exit_code == 0, result.output
     text = " ".join(result.output.split())
-    return text, text.split("odd: ")[1:]
+    return text, text.split("warning: ")[1:]
 
 
 @pytest.mark.parametrize(

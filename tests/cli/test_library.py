@@ -156,10 +156,13 @@ class TestTuning:
         ("arguments", "says"),
         [
             (["camera", "--tuning", "FILE"], "name a camera of the library"),
-            (["lamp", "--tuning", "FILE", "--like", "pi-v2"], "a tuning file is of a camera"),
-            (["camera", "--tuning", "FILE", "--like", "pi-v2", "--flux", "3"], "has none"),
+            (["lamp", "--tuning", "FILE", "--like", "pi-v2"], "a tuning file describes a camera"),
+            (
+                ["camera", "--tuning", "FILE", "--like", "pi-v2", "--flux", "3"],
+                "combined with --tuning",
+            ),
             (["camera", "--tuning", "FILE", "--like", "pi-v2", "--temperature", "5"], "5 K is no"),
-            (["a.yaml", "--like", "pi-v2"], "is for --tuning only"),
+            (["a.yaml", "--like", "pi-v2"], "it needs --tuning"),
             (["camera", "--tuning", "no.json", "--like", "pi-v2"], "can't read the tuning file"),
         ],
     )

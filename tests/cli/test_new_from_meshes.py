@@ -78,7 +78,7 @@ def test_guesses_that_do_not_fit_are_kept_to_be_mended(tmp_path: Path) -> None:
     folder = tmp_path / "pad"
     code, text = new("--from-meshes", cad, folder, "--yes")
     assert code == 2 and "not closed" in text
-    assert "guessed: housing is blocker" in text and "recipe is kept" in text
+    assert "guessed: housing is blocker" in text and "recipe is saved" in text
     assert not (folder / "design.yaml").exists()
     gel.save_obj(cad / "gel.obj")
     assert new("--from-meshes", folder / "recipe.yaml", folder, "--overwrite")[0] == 0
@@ -156,7 +156,7 @@ class TestQuestions:
         optisense.load("gelsight-mini-ideal").meshes["skin"].save_obj(cad / "gel.obj")  # not closed
         code, text = new("--from-meshes", cad, tmp_path / "pad", answers="\n" * 60)
         assert code == 2 and "not closed" in text and "part gel" in text
-        assert "Your answers are kept" in text
+        assert "Your answers are saved" in text
         assert read_recipe(tmp_path / "pad" / "recipe.yaml").parts["gel"].file
         assert not (tmp_path / "pad" / "design.yaml").exists()
 

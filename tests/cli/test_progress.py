@@ -162,5 +162,5 @@ def test_the_bar_of_a_tolerance_counts_the_sensors_that_its_page_tells_of() -> N
         sensors=30,
         progress=lambda done, count, left, doing: told.append(what(done, count)),
     )
-    assert told[0] == ("scoring the design itself", 0, 4)
+    assert told[0] == ("scoring the nominal design", 0, 4)
     assert told[-1] == ("scoring sensors", found.sensors, found.sensors)

@@ -193,7 +193,7 @@ def test_a_study_that_was_edited_is_refused_with_the_difference(
           "--option", "sigmas=1"], "Did you mean 'sigma'"),
         (["gelsight-mini-ideal", "--out", "x", "-b", "aoap", "--vary", "coating.specularity=0:1",
           "--cluster", "here"], "is not the address"),
-        (["--resume", "--out", "x"], "no study here"),
+        (["--resume", "--out", "x"], "no study in this folder"),
     ],
 )  # fmt: skip
 def test_bad_input_is_told_and_leaves_nothing(

@@ -16,7 +16,7 @@ BUSY = """
 import hashlib, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored where tests run
 from optisense.cli import stopping
-stopping.watch()
+stopping.install_handlers()
 signal.signal(signal.SIGINT, lambda number, frame: None)  # held back, as during a trial
 with stopping.waiting({waits}):
     print("ready", flush=True)
@@ -28,20 +28,20 @@ COMMAND = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from optisense.cli import stopping
-from optisense.cli.console import ends_well
+from optisense.cli.console import handles_errors
 from optisense.cli.leaving import run_and_leave
 import typer
 
 app = typer.Typer(add_completion=False)
 
 @app.command()
-@ends_well
+@handles_errors
 def wait():
     print("ready", flush=True)
     while True:
         signal.pause()
 
-stopping.watch()
+stopping.install_handlers()
 run_and_leave(app)
 """
 
@@ -64,18 +64,18 @@ EXECUTING = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from optisense.cli import stopping
-from optisense.cli.console import ends_well
+from optisense.cli.console import handles_errors
 from optisense.cli.leaving import run_and_leave
 import typer
 
 app = typer.Typer(add_completion=False)
 
 @app.command()
-@ends_well
+@handles_errors
 def make_a_class():
     exec("import signal; signal.raise_signal(signal.SIGINT)\\nfor _ in range(9): pass")
 
-stopping.watch()
+stopping.install_handlers()
 run_and_leave(app)
 """
 
@@ -87,7 +87,7 @@ from optisense.cli.leaving import run_and_leave
 atexit.register(signal.raise_signal, {number})
 def command():
     raise SystemExit(7)
-stopping.watch()
+stopping.install_handlers()
 run_and_leave(command)
 """
 
@@ -134,7 +134,7 @@ def test_without_a_wait_silence_is_broken() -> None:
     with ready(BUSY.format(waits="None")) as child:
         assert child.stderr is not None
         child.send_signal(signal.SIGINT)
-        assert "stopping after the step at hand" in child.stderr.readline()
+        assert "stopping after the current step" in child.stderr.readline()
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])

@@ -185,7 +185,7 @@ class TestView:
             assert problems == []
         else:
             problem = only(problems, "warning")
-            assert "not where the camera looks" in problem.message
+            assert "not in the camera's field of view" in problem.message
             assert problem.where == "camera.direction"
 
     def test_a_surface_whose_corners_are_all_out_of_the_picture_is_seen(
@@ -199,7 +199,7 @@ class TestView:
         wide = set_value(set_value(wide, "camera.fov", 240.0), "camera.direction", [1, 0, 0])
         assert "fills 0 % of the picture" in only(check_design(wide), "warning").message
         narrow = set_value(wide, "camera.fov", 100.0)
-        assert "not where" in only(check_design(narrow), "warning").message
+        assert "not in the camera" in only(check_design(narrow), "warning").message
 
     def test_a_surface_that_is_a_spot_in_the_picture(self, plain: SensorDesign) -> None:
         far = set_value(plain, "camera.position", [0, 0, -300])

@@ -94,5 +94,5 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.Monke
     command = ["gelbelt-lights", "--quick", "--seeds", "1", "--workers", "1"]
     result = runner.invoke(app, [*command, "--out", str(tmp_path)])
     assert result.exit_code == 130
-    assert "the same command goes on" in result.stderr
+    assert "the same command continues" in result.stderr
     assert [path.stem for path in (tmp_path / "units").glob("*.json")] == done

@@ -174,7 +174,7 @@ def test_the_command_writes_the_page(tmp_path: Path) -> None:
     assert "search for opposite" in (folder / "report.html").read_text(encoding="utf-8")
     missing = CliRunner().invoke(app, ["report", str(tmp_path / "nothing")])
     assert missing.exit_code == 2
-    assert "no study here" in missing.output
+    assert "no study in this folder" in missing.output
 
 
 def test_a_page_is_written_whole_or_not_at_all(result: SearchResult, tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def test_the_start_wins_ties(space: BoundSpace) -> None:
     best = best_of(trials[::-1])
     assert best is not None and best.is_start
     assert "4 trials share the best score; the start" in str(tie_note(trials))
-    assert "does not depend on what was varied" in str(tie_note(trials[:4]))
+    assert "does not depend on the parameters" in str(tie_note(trials[:4]))
 
 
 def test_one_best_trial_is_no_tie(space: BoundSpace) -> None:

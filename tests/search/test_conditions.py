@@ -22,7 +22,12 @@ from optisense.search.evaluation.requirements import Requirement, requirements_o
 from optisense.search.methods.base import values_to_maximise
 from optisense.search.methods.dominance import dominates, ranks
 from optisense.search.study.best import best_of, nearest
-from optisense.search.study.conditions import condition_note, kept, lost, worsened_note
+from optisense.search.study.conditions import (
+    condition_lines,
+    condition_note,
+    worsened,
+    worsened_note,
+)
 from optisense.search.study.progress import SearchProgress
 from optisense.search.study.settings import LATER, StudySettings
 from optisense.search.study.trial import Trial
@@ -72,23 +77,23 @@ def test_what_is_no_condition_is_refused(text: str, says: str) -> None:
 
 
 def test_conditions_that_contradict_each_other_are_refused() -> None:
-    with pytest.raises(SearchError, match="nothing can meet both"):
+    with pytest.raises(SearchError, match="no design can meet both"):
         requirements_of(["coverage>=0.6", "coverage<=0.5"])
     for text in ("coverage>=2", "distortion <= 0.9"):
-        with pytest.raises(SearchError, match="nothing can meet"):
+        with pytest.raises(SearchError, match="no design can meet"):
             requirements_of([text])
     assert len(requirements_of(["coverage>=0.5", "coverage >= 0.50"])) == 1
 
 
-def test_a_breach_is_a_part_of_the_limit() -> None:
+def test_a_violation_is_a_share_of_the_limit() -> None:
     low, high = Requirement.parse("coverage>=0.5"), Requirement.parse("distortion<=2")
-    assert low.breach(0.4) == pytest.approx(0.2)
-    assert low.breach(0.5 - 1e-12) == 0.0
-    assert high.breach(2.5) == pytest.approx(0.25)
-    assert high.breach(1.0) == 0.0
+    assert low.violation(0.4) == pytest.approx(0.2)
+    assert low.violation(0.5 - 1e-12) == 0.0
+    assert high.violation(2.5) == pytest.approx(0.25)
+    assert high.violation(1.0) == 0.0
     assert high.margin(1.5) == 0.5
-    assert low.breach(math.nan) == math.inf
-    assert Requirement.parse("aoap>=0").breach(-0.25) == 0.25
+    assert low.violation(math.nan) == math.inf
+    assert Requirement.parse("aoap>=0").violation(-0.25) == 0.25
 
 
 def test_outcomes_are_ranked_by_conditions_before_scores() -> None:
@@ -101,7 +106,7 @@ def test_outcomes_are_ranked_by_conditions_before_scores() -> None:
     assert rank[0] == FAILED
     assert list(np.argsort(values_to_maximise(order, "s"))) == [0, 1, 2, 3, 4]
     values = np.array([[9.0], [10.0], [1.0], [2.0]])
-    broken = [each.breach for each in (near, far, good, better)]
+    broken = [each.violation for each in (near, far, good, better)]
     assert list(ranks(values, broken)) == [2, 3, 1, 0]
     assert dominates(values, broken)[2, 0]
     assert not dominates(values, broken)[0, 2]
@@ -131,7 +136,7 @@ def test_a_trial_that_breaks_a_condition_is_never_the_best(mini: SensorDesign) -
     assert condition_note(trials) == (
         "the start breaks conditions, which is allowed: coverage >= 0.5 (is 0.4)"
     )
-    assert kept(trials[2], trials[0]) == ["coverage >= 0.5: 0.6 (margin 0.1, start 0.4)"]
+    assert condition_lines(trials[2], trials[0]) == ["coverage >= 0.5: 0.6 (margin 0.1, start 0.4)"]
     assert best_of(trials[:2]) is None
     close = nearest(trials[:2])
     assert close is not None and close.number == 1
@@ -208,7 +213,7 @@ def test_a_study_with_conditions_goes_on_and_old_ones_do_too(
         out=out, resume=True,
     )  # fmt: skip
     assert [t.score for t in again.trials] == [t.score for t in first.trials]
-    with pytest.raises(SearchError, match="begun otherwise"):
+    with pytest.raises(SearchError, match="begun with other settings"):
         search(mini, FOV, "aoap", method="random", budget=3, settings=RAYS, out=out, resume=True,
                require="coverage>=0.5")  # fmt: skip
 
@@ -306,7 +311,7 @@ def test_a_score_won_by_reading_worse_is_told(mini: SensorDesign) -> None:
     evaluator = DesignEvaluator(space, ["normdiff"], few)
     start, shiny = (evaluator(np.array([each]), 0) for each in (0.0, 0.8))
     assert shiny.scores["normdiff"] > start.scores["normdiff"]
-    now, before = lost(shiny, start)["reading"]
+    now, before = worsened(shiny, start)["reading"]
     assert now > 2.0 * before
 
 

@@ -137,7 +137,7 @@ class TestPool:
         with pytest.raises(SearchError, match="workers can't be given") as told:
             search(mini, LINE, local, method="grid", workers=2)
         assert "FILE.py:FUNCTION" in str(told.value.hint)
-        with pytest.raises(SearchError, match="0 workers"):
+        with pytest.raises(SearchError, match="number of workers is 0"):
             search(mini, LINE, local, method="grid", workers=0)
 
 

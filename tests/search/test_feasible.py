@@ -42,7 +42,7 @@ def test_a_mirror_that_is_wanted_inside_a_part_is_moved_beside_it(svelte: Sensor
             continue
         found += 1
         moved = placed.point - wanted
-        back = region._way_back(wanted, start).point - wanted
+        back = region._bisect(wanted, start).point - wanted
         slid += np.linalg.norm(moved) < 0.9 * np.linalg.norm(back)
         assert placed.normals @ placed.normals.T == pytest.approx(np.eye(len(placed.normals)))
         assert placed.along(moved) == pytest.approx(np.zeros(space.size), abs=1e-6)

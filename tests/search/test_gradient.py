@@ -13,7 +13,7 @@ from optisense.errors import NoDerivativeError, SearchError
 from optisense.search import Around, CagePoints, SearchSpace, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.methods.base import Problem
-from optisense.search.methods.checked_slopes import (
+from optisense.search.methods.checked_gradients import (
     DIFFERENCES,
     FEW,
     GRADIENT_BY,
@@ -21,7 +21,7 @@ from optisense.search.methods.checked_slopes import (
     LAYERS,
     RAYS,
     Agreement,
-    SlopeEvaluator,
+    GradientEvaluator,
 )
 from optisense.search.methods.gradient import Gradient
 from optisense.sensors import gelsight_svelte
@@ -47,10 +47,10 @@ def method(design: SensorDesign, objective: str = "aoap", **space: object) -> Gr
 
 def slopes_of(
     found: Gradient, objective: str = "aoap", settings: dict[str, object] = SETTINGS
-) -> SlopeEvaluator:
+) -> GradientEvaluator:
     usual = DesignEvaluator(found.space, [objective], settings, apart=False)
     evaluator = found.evaluator(usual)
-    assert isinstance(evaluator, SlopeEvaluator)
+    assert isinstance(evaluator, GradientEvaluator)
     return evaluator
 
 
@@ -75,8 +75,8 @@ def test_slopes_of_svelte_are_the_changes_of_the_smoothed_score(
     path = "camera.fov" if name == "fov" else f"cages.M1.{name}"
     bound = SearchSpace({path: Around(1.0)}).bind(freed(svelte, "M1"))
     evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10)))
-    _, gradient = evaluator.slope(bound.start)
-    values = [evaluator.slope(bound.start + way)[0] for way in (step, -step)]
+    _, gradient = evaluator.gradient(bound.start)
+    values = [evaluator.gradient(bound.start + way)[0] for way in (step, -step)]
     differences = (values[0] - values[1]) / (2 * step)
     assert gradient[0] == pytest.approx(differences, rel=0.05, abs=2e-5)
 
@@ -89,7 +89,7 @@ def test_a_camera_that_blockers_hem_in_has_the_slope_of_the_true_score() -> None
     )
     evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10)), settings=TRUE)
     point = np.array([8.0, 118.0])
-    _, gradient = evaluator.slope(point)
+    _, gradient = evaluator.gradient(point)
     for number, step in enumerate((0.2, 2.0)):
         way = np.zeros(2)
         way[number] = 1.0
@@ -105,7 +105,7 @@ def test_rays_that_leave_the_picture_count_for_nothing_where_the_score_is_flat()
         load("gelbelt")
     )
     evaluator = slopes_of(Gradient(Problem(bound, ("aoap",), 10), resolution=RESOLUTION))
-    _, gradient = evaluator.slope(bound.start)
+    _, gradient = evaluator.gradient(bound.start)
     assert np.abs(gradient).max() < 4e-3
 
 
@@ -148,7 +148,7 @@ def test_a_gradient_that_is_said_to_hold_is_within_five_per_cent() -> None:
     found = Gradient(Problem(bound, ("2to3pw",), 10))
     usual = DesignEvaluator(bound, ["2to3pw"], TRUE, apart=False)
     evaluator = found.evaluator(usual)
-    assert isinstance(evaluator, SlopeEvaluator)
+    assert isinstance(evaluator, GradientEvaluator)
     outcome = evaluator(bound.start, 0)
     assert outcome.parts["2to3pw"][GRADIENT_HOLDS]
     assert outcome.gradient is not None
@@ -171,10 +171,10 @@ def test_a_transparent_part_that_moves_is_climbed_by_differences() -> None:
     found = Gradient(Problem(bound, ("2to3pw",), 10), resolution=32)
     usual = DesignEvaluator(bound, ["2to3pw"], {"ray_resolution": (32, 24)}, apart=False)
     evaluator = found.evaluator(usual)
-    assert isinstance(evaluator, SlopeEvaluator)
+    assert isinstance(evaluator, GradientEvaluator)
     assert bound.size > FEW
     with pytest.raises(NoDerivativeError, match="gel"):
-        evaluator.slope(bound.start)
+        evaluator.gradient(bound.start)
     outcome = evaluator(bound.start, 0)
     assert outcome.parts["2to3pw"][GRADIENT_BY] == DIFFERENCES
     assert outcome.gradient is not None
@@ -250,7 +250,7 @@ def test_what_conditions_limit_has_slopes(svelte: SensorDesign) -> None:
     problem = Problem(bound, ("aoap",), 10, requirements=tuple(wanted))
     made = Gradient(problem, resolution=RESOLUTION).evaluator(usual)
     evaluator = pickle.loads(pickle.dumps(made))  # as it is sent to workers
-    assert isinstance(evaluator, SlopeEvaluator)
+    assert isinstance(evaluator, GradientEvaluator)
     _, gradients = evaluator._slopes(bound.start)
     sides = [evaluator._slopes(bound.start + way)[0] for way in (0.1, -0.1)]
     assert gradients[:, 0] == pytest.approx((sides[0] - sides[1]) / 0.2, rel=0.08, abs=2e-5)

@@ -85,8 +85,8 @@ def test_a_small_space_is_tried_whole(mini: SensorDesign) -> None:
 
 
 def test_the_usual_budget_is_within_reason(space: BoundSpace) -> None:
-    assert find("types").usual_budget(space) == max(2 * 27, 4 * space.size)
-    assert LightTypes.usual_budget(space) < 1000
+    assert find("types").default_budget(space) == max(2 * 27, 4 * space.size)
+    assert LightTypes.default_budget(space) < 1000
 
 
 def test_a_trial_is_a_design_with_these_types(space: BoundSpace) -> None:

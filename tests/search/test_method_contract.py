@@ -22,17 +22,17 @@ COLOURS = ["red", "green", "blue"]
 
 class TestCmaEs(MethodContract):
     method = "cma-es"
-    reaches = 0.02
+    optimum_tolerance = 0.02
 
 
 class TestRandom(MethodContract):
     method = "random"
-    reaches = 0.2
+    optimum_tolerance = 0.2
 
 
 class TestGrid(MethodContract):
     method = "grid"
-    reaches = 0.0
+    optimum_tolerance = 0.0
     budget = 45
 
     def spaces(self) -> dict[str, dict[str, object]]:
@@ -55,7 +55,7 @@ class TestGrid(MethodContract):
 
 class TestPareto(MethodContract):
     method = "pareto"
-    goals = 2
+    objectives = 2
 
 
 class TestLightColours(MethodContract):
@@ -106,7 +106,7 @@ class TestGradient(MethodContract):
 
     method = "gradient"
     budget = 4
-    rounding = 1e-4  # slopes are added up by several threads at once, in whatever order
+    rerun_tolerance = 1e-4  # slopes are added up by several threads at once, in whatever order
     options: Mapping[str, Any] = {"resolution": 48}
 
     def design(self) -> SensorDesign:

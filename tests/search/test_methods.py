@@ -96,7 +96,7 @@ class TestContract:
 
 def test_grid_has_every_combination_once(mixed: BoundSpace) -> None:
     kind = find("grid")
-    budget = kind.usual_budget(mixed)
+    budget = kind.default_budget(mixed)
     assert budget == 3 * 3 * 5
     asked = drive(make("grid", Problem(mixed, ("score",), budget)), bowl(mixed), 10)
     points = {tuple(point) for points in asked for point in points}
@@ -105,7 +105,7 @@ def test_grid_has_every_combination_once(mixed: BoundSpace) -> None:
 
 def test_grid_needs_steps_and_budget(mini_free: BoundSpace, two_numbers: BoundSpace) -> None:
     with pytest.raises(SearchError, match="number of steps") as told:
-        find("grid").usual_budget(mini_free)
+        find("grid").default_budget(mini_free)
     assert told.value.where == "coating.specularity"
     with pytest.raises(SearchError, match="15 designs, the budget is 3"):
         make("grid", Problem(two_numbers, ("score",), 3))
@@ -228,7 +228,7 @@ def hypervolume(values: ArrayLike, reference: ArrayLike) -> float:
 
 
 def test_pareto_needs_two_goals(two_numbers: BoundSpace) -> None:
-    with pytest.raises(SearchError, match="several objectives"):
+    with pytest.raises(SearchError, match="two or more objectives"):
         make("pareto", Problem(two_numbers, ("a",), 100))
 
 

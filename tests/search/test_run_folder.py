@@ -76,7 +76,7 @@ class TestFolder:
             Study.open(folder)
 
     def test_broken_files_are_told(self, folder: Path, tmp_path: Path) -> None:
-        with pytest.raises(SearchError, match="no study here"):
+        with pytest.raises(SearchError, match="no study in this folder"):
             Study.open(tmp_path)
         (folder / "trials.sqlite").write_bytes(b"not a database, certainly not one" * 100)
         with pytest.raises(SearchError, match="not a study's store"):

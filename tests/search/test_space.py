@@ -80,7 +80,7 @@ class TestCages:
         spec = CagePoints(Around(1.0), points=(4, 13), axes="xz")
         space = SearchSpace({"cages.M1.points": spec}).bind(svelte)
         assert space.names == [f"cages.M1.points[{k}].{axis}" for k in (4, 13) for axis in "xz"]
-        with pytest.raises(SearchError, match="no point 27"):
+        with pytest.raises(SearchError, match="no control point 27"):
             SearchSpace({"cages.M1.points": CagePoints(Around(1.0), points=(27,))}).bind(svelte)
 
     def test_each_axis_may_have_a_reach_of_its_own(self, svelte: SensorDesign) -> None:
@@ -288,9 +288,9 @@ class TestBadInput:
             ((1.0, 1.0), "empty"),
             ((0.0, float("inf")), "not finite"),
             ((float("nan"), 1.0), "not finite"),
-            ((0.0, 1.0, 1), "1 steps"),
+            ((0.0, 1.0, 1), "steps from 0 to 1 is 1"),
             (["diffuse-grey"], "two options"),
-            ("0:1", "does not say what may change"),
+            ("0:1", "is not a specification of a parameter"),
         ],
     )
     def test_bad_bounds_name_the_path(self, bounds: object, said: str) -> None:
@@ -311,10 +311,10 @@ class TestBadInput:
             ({"camera.model": (0.0, 1.0)}, "names to choose from"),
             ({"lights.red.shift.x": ["a", "b"]}, "range of numbers"),
             ({"camera": (0.0, 1.0)}, "a section"),
-            ({"camera.projection": (0.0, 1.0)}, "no number"),
-            ({"camera.shift.x": (0.0, 1.0)}, "position to move"),
+            ({"camera.projection": (0.0, 1.0)}, "not a number"),
+            ({"camera.shift.x": (0.0, 1.0)}, "the camera has no shift"),
             ({"lights.red.colour": ["R", "mauve"]}, "no colour 'mauve'"),
-            ({}, "nothing may change"),
+            ({}, "the space has no parameter"),
         ],
     )
     def test_what_can_not_be_varied(

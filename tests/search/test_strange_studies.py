@@ -88,7 +88,7 @@ class TestCode:
         code, said = optisense("search", "--resume", "--out", study, "--budget", 3)
         assert code == 2
         assert f"{mine}:score" in said and f"{mine}:fine" in said and "--trust" in said
-        with closing(Study.open(study)) as opened, pytest.raises(SearchError, match="not named"):
+        with closing(Study.open(study)) as opened, pytest.raises(SearchError, match="did not name"):
             run_study(opened, limit=3)
         assert not was_run(mine)
         half = optisense("search", "--resume", "--out", study, "-b", f"{mine}:score")

@@ -34,8 +34,8 @@ def test_reads(text: str, meaning: object) -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("a.b", "does not say"),
-        ("=0:1", "does not say"),
+        ("a.b", "is not a parameter"),
+        ("=0:1", "is not a parameter"),
         ("a.b=1", "neither a range nor a list"),
         ("a.b=1:0", "reversed"),
         ("a.b=1:1", "empty"),
@@ -43,7 +43,7 @@ def test_reads(text: str, meaning: object) -> None:
         ("a.b=0:1:2:3", "too many colons"),
         ("a.b=0:1:many", "number of steps"),
         ("a.b=a,", "an option is empty"),
-        ("a.b=a,a", "there twice"),
+        ("a.b=a,a", "given twice"),
         ("a.b=0:1/symetry=x", "not known"),
         ("a.b=0:1/symmetry=w", "no symmetry"),
         ("a.b=0:1/points=a-b", "not indices"),
@@ -69,5 +69,5 @@ def test_errors_of_making() -> None:
     for text in ("a", "a=", "a=x", "a=-1", "a=+-0"):
         with pytest.raises(SearchError):
             parse_errors([text])
-    with pytest.raises(SearchError, match="twice"):
+    with pytest.raises(SearchError, match="two manufacturing errors"):
         parse_errors(["a=1", "a=2"])

@@ -50,7 +50,7 @@ def test_a_camera_that_looks_past_its_mirrors(
     svelte: SensorDesign, path: str, value: float
 ) -> None:
     said = evaluator(svelte, path)(np.array([value]), 0).failure
-    assert "straight instead of by 'M1' and 'M2'" in str(said)
+    assert "directly instead of by 'M1' and 'M2'" in str(said)
 
 
 @pytest.mark.parametrize(

@@ -142,7 +142,7 @@ def test_a_turned_sensor_has_the_same_mould(of_digit: Mould, digit: SensorDesign
 def test_what_has_no_mould_says_why() -> None:
     ball = trimesh.creation.icosphere(subdivisions=2)
     skin = Shape("skin", Role.SENSING_SURFACE, None, gel(ball).mesh)
-    with pytest.raises(DesignError, match="looks to all sides"):
+    with pytest.raises(DesignError, match="faces all sides"):
         moulds([skin, gel(ball)])
     sheet = TriangleMesh(np.eye(3), np.array([[0, 1, 2]], dtype=np.int32))
     with pytest.raises(DesignError, match="encloses no volume"):

@@ -1,5 +1,5 @@
 // Interactive figures: point at a trial to read its numbers, click it for its picture and the command
-// that takes it. A page that is served (`live`) asks for new versions of itself, and for pictures.
+// that writes its design into a folder. A page that is served (`live`) asks for new versions of itself, and for pictures.
 (function () {
   "use strict";
   const data = JSON.parse(document.getElementById("study-data").textContent);
@@ -56,7 +56,7 @@
       [...trial.scores, ...trial.values]));
     scroll.className = "scroll";
     const command = element("code", `${data.command} ${number} --out trial-${number}`);
-    parts.push(scroll, element("p", "Take it: ", command));
+    parts.push(scroll, element("p", "Apply it: ", command));
     panel.replaceChildren(...parts);
     panel.hidden = false;
     history.replaceState(null, "", `#trial-${number}`);

@@ -88,10 +88,10 @@ class CoarseEvaluator(DesignEvaluator):
             SetupError: the renderer can't run on this machine.
         """
         design = self.space.design
-        shared, _ = split_settings(self._full, self._ready)
+        shared, _ = split_settings(self._full, self._all_objectives)
         settings = Settings(**{**shared, "resolution": _full_size(design, self._full)})
         try:
-            pixels = _smallest_contact(Evaluation(self.keeper.model(design), settings))
+            pixels = _smallest_contact(Evaluation(self.models.model(design), settings))
         except SetupError:
             raise
         except OptiSenseError:  # the start has no score either, and says why

@@ -24,7 +24,7 @@ from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
 from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_score
-from optisense.search.evaluation.models import ModelKeeper
+from optisense.search.evaluation.models import ModelCache
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
 from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
@@ -50,16 +50,16 @@ Goal = str | Objective | DesignFunction
 """A goal of a search."""
 
 
-RELIT = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
+RELIGHTS = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
 """Pattern of the names of parameters that only rescale the light of a group, so that no ray has to
 be traced anew.
 """
 
 
-PLACED = re.compile(r"^lights\..*\b(shift|turn|position)\b")
-"""Pattern of the names of parameters that move lights."""
+MOVES_LIGHTS = re.compile(r"^lights\..*\b(shift|turn|position)\b")
+"""Pattern of the names of parameters that move lights: their shift, turn and position."""
 
-WATCHES = ("coverage", "distortion")
+WATCHED_OBJECTIVES = ("coverage", "distortion")
 """Objectives by chief rays that are scored with every trial where the view may change, so that a
 report can say that a design gains its score by seeing less of the skin, or by seeing it distorted.
 They take a tenth of the time of AOAP.
@@ -98,8 +98,8 @@ class DesignEvaluator(PickledWithoutCaches):
         settings: settings of the objectives (see `optisense.evaluate`).
         requirements: conditions whose quantities are measured beside the goals.
         constraints: constraints on designs; a design that breaks one is not scored.
-        kept: constraints on points of the space, taken from the starting design; manufacturing
-            errors may break them.
+        kept: constraints on points of the space that preserve properties of the starting design;
+            manufacturing errors may break them.
         renders: whether any goal needs the renderer.
         apart: the argument of this name.
         variant: variant of the renderer.
@@ -141,7 +141,7 @@ class DesignEvaluator(PickledWithoutCaches):
         self.settings = dict(settings or {})
         self.names = [goal_name(goal) for goal in self.goals]
         if not self.goals:
-            raise SearchError("there is nothing to search for", hint="Name an objective")
+            raise SearchError("the search has no objective", hint="Name one or more")
         if len(set(self.names)) < len(self.names):
             raise SearchError(f"an objective is named twice: {', '.join(self.names)}")
         self.requirements = requirements_of(requirements)
@@ -158,11 +158,11 @@ class DesignEvaluator(PickledWithoutCaches):
         if any(name.startswith("cages.") for name in space.names):
             self.constraints.append(NoFolds(space.design))
         self.apart = apart
-        self.keeper = ModelKeeper(variant, coarse=self.coarse)
+        self.models = ModelCache(variant, coarse=self.coarse)
         self.renders = bool(self._objectives or self.requirements)
         self.kept: list[Constraint] = []
         if keeps:
-            self._keep(apart is None or apart)
+            self._add_preserving(apart is None or apart)
         self._asks_view = keeps and self.renders and may_change_view(space.names)
         self._least_skin: float | None = None
         self._watched = self._names_to_watch() if keeps and self.renders else ()
@@ -176,13 +176,15 @@ class DesignEvaluator(PickledWithoutCaches):
             design = self.space.apply(vector)
         except OptiSenseError as error:
             return self.failed(str(error), began)
-        return self.judge(design, seed, self.kept)
+        return self.evaluate(design, seed, self.kept)
 
-    def lost(self, design: SensorDesign) -> str | None:
-        """The reason why a point's design departs too far from the starting design, or None."""
+    def why_excluded(self, design: SensorDesign) -> str | None:
+        """Return the reason why a design breaks a constraint in `kept`, or None."""
         return why_forbidden(design, self.kept)
 
-    def judge(self, design: SensorDesign, seed: int, further: Sequence[Constraint] = ()) -> Outcome:
+    def evaluate(
+        self, design: SensorDesign, seed: int, further: Sequence[Constraint] = ()
+    ) -> Outcome:
         """Score any design: one of a point of the space, or one with manufacturing errors.
 
         Args:
@@ -225,8 +227,8 @@ class DesignEvaluator(PickledWithoutCaches):
         """
         if not self.renders:
             return None
-        shared, _ = split_settings(self.settings, self._ready)
-        names = [each.name for each in self._ready]
+        shared, _ = split_settings(self.settings, self._all_objectives)
+        names = [each.name for each in self._all_objectives]
         return usual_score(self.space.design, names, Settings(**shared))
 
     def usual_trials(self) -> UsualTrials | None:
@@ -237,7 +239,7 @@ class DesignEvaluator(PickledWithoutCaches):
         usual = self.usual_score()
         if usual is None:
             return None
-        relit = all(RELIT.search(name) for name in self.space.names)
+        relit = all(RELIGHTS.search(name) for name in self.space.names)
         trial = usual.relit if relit else usual.building + usual.whole
         return UsualTrials.of(usual, trial, usual.whole)
 
@@ -259,13 +261,13 @@ class DesignEvaluator(PickledWithoutCaches):
         settings = dict(self.used_settings)
         if self._asks_view and "least_skin" not in settings:
             if self._least_skin is None:
-                self._least_skin = least_skin(self.space.design, self.keeper)
+                self._least_skin = least_skin(self.space.design, self.models)
             settings["least_skin"] = self._least_skin
-        model = self.keeper.model(design)
-        wanted = self._ready
+        model = self.models.model(design)
+        wanted = self._all_objectives
         if only is not None:
             wanted = [each for each in wanted if each.name in only]
-            shared, own = split_settings(settings, self._ready)
+            shared, own = split_settings(settings, self._all_objectives)
             settings = {**shared, **{k: v for each in wanted for k, v in own[each.name].items()}}
         return evaluate(model, wanted, progress=self._progress, seed=seed, **settings)
 
@@ -278,12 +280,12 @@ class DesignEvaluator(PickledWithoutCaches):
         for name, function in self._functions.items():
             value = float(function(design))
             if not math.isfinite(value):
-                failures.append(f"{name} returned {value}, which is no score")
+                failures.append(f"{name} returned {value}, which is not a finite score")
                 value = math.nan
             scores[name] = value
         if self.renders:
             found = self.objective_scores(design, seed)
-            needed = {each.name for each in self._wanted}
+            needed = {each.name for each in self._goal_objectives}
             for name, score in found.items():
                 if name in scores:
                     scores[name], parts[name] = score.value, score.to_dict()["parts"]
@@ -299,7 +301,7 @@ class DesignEvaluator(PickledWithoutCaches):
                 }
         return scores, parts, failures
 
-    def _keep(self, apart: bool) -> None:
+    def _add_preserving(self, apart: bool) -> None:
         """Add the constraints that keep properties of the starting design which the space may
         change.
         """
@@ -311,18 +313,18 @@ class DesignEvaluator(PickledWithoutCaches):
             self.kept.append(DeformedPartsInContact(design))
         if apart and (moved or bends):
             self.kept.append(SizeLimit(design))
-        if apart and (moved or bends or any(PLACED.search(name) for name in names)):
+        if apart and (moved or bends or any(MOVES_LIGHTS.search(name) for name in names)):
             self.kept.append(LightsOutsideParts(design))
         if any(name.startswith("materials.") for name in names):
             self.kept.append(SolidsStaySolid(design))
         if self.renders and may_change_view(names) and design.parts_of(Role.MIRROR):
-            self.kept.append(SameMirrors(design, self.keeper))
+            self.kept.append(SameMirrors(design, self.models))
 
     def _names_to_watch(self) -> tuple[str, ...]:
         """Return the names of the objectives that are scored beside those of goals and conditions,
-        for the early warning.
+        so that a report can say what a higher score costs.
         """
-        watched = WATCHES if may_change_view(self.space.names) else ()
+        watched = WATCHED_OBJECTIVES if may_change_view(self.space.names) else ()
         texts = [each for each in self._objectives if isinstance(each, str)]
         quantities = [each.quantity for each in self.requirements]
         wanted = {name.strip().lower() for name in named_in([*texts, *quantities])}
@@ -330,17 +332,17 @@ class DesignEvaluator(PickledWithoutCaches):
         return (*watched, READING) if shared else watched
 
     @cached_property
-    def _ready(self) -> list[Objective]:
-        """Return the objectives of goals and conditions, and those that are watched, each once.
+    def _all_objectives(self) -> list[Objective]:
+        """Objectives of goals and conditions, and those that are watched, each once.
 
         A user's file is run once per process and not once per trial.
         """
         watched = [find(name) for name in self._watched]
-        return list({each.name: each for each in [*self._wanted, *watched]}.values())
+        return list({each.name: each for each in [*self._goal_objectives, *watched]}.values())
 
     @cached_property
-    def _wanted(self) -> list[Objective]:
-        """Return the objectives of goals and conditions."""
+    def _goal_objectives(self) -> list[Objective]:
+        """Objectives of goals and conditions."""
         goals = [goal_of(each) for each in self._objectives]
         return [*goals, *(each.objective() for each in self.requirements)]
 
@@ -352,11 +354,15 @@ class DesignEvaluator(PickledWithoutCaches):
     def _check_settings(self) -> None:
         if not self.renders:
             if self.settings:
-                raise SearchError("a function of the design takes no settings")
+                raise SearchError(
+                    "settings are given, but functions of the design, the objectives, take none"
+                )
             return
         if "seed" in self.settings:
-            raise SearchError("the seed belongs to the study", hint="Give it as --seed")
-        shared, _ = split_settings(self.settings, self._ready)
+            raise SearchError(
+                "the seed is an argument of the study and not a setting", hint="Give it as --seed"
+            )
+        shared, _ = split_settings(self.settings, self._all_objectives)
         Settings(**shared)
 
 

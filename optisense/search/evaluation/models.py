@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 
-class ModelKeeper(PickledWithoutCaches):
-    """Keeper of the optical model for designs that are variations of one design."""
+class ModelCache(PickledWithoutCaches):
+    """Cache of one optical model, for designs that are variations of one design."""
 
     def __init__(self, variant: str = "auto", *, coarse: bool = False) -> None:
         """Store the variant; the model is built on first use.

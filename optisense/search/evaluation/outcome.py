@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.objectives.registry import CONDITIONS
-from optisense.search.evaluation.requirements import breach_of
+from optisense.search.evaluation.requirements import total_violation
 
 Rank = tuple[int, float]
 """Rank of an outcome, for comparison: of two outcomes the one with the larger rank is better."""
@@ -46,7 +46,7 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """True if a score is missing."""
+        """Whether a score is missing."""
         return self.failure is not None
 
     @property
@@ -55,14 +55,14 @@ class Outcome:
         return self.parts.get(CONDITIONS, {})
 
     @cached_property
-    def breach(self) -> float:
-        """Sum of the violations of all conditions (see `breach_of`); 0 if all are met."""
-        return breach_of(self.conditions)
+    def violation(self) -> float:
+        """Sum of the violations of all conditions (see `total_violation`); 0 if all are met."""
+        return total_violation(self.conditions)
 
     @property
     def is_feasible(self) -> bool:
-        """True if no condition is broken."""
-        return self.breach == 0.0
+        """Whether no condition is broken."""
+        return self.violation == 0.0
 
     @staticmethod
     def of_failure(objectives: list[str], reason: str, seconds: float = 0.0) -> Outcome:
@@ -75,4 +75,4 @@ def rank_of(outcome: Outcome, objective: str) -> Rank:
     score = outcome.scores.get(objective, math.nan)
     if not math.isfinite(score):
         return FAILED
-    return (0, score) if outcome.is_feasible else (-1, -outcome.breach)
+    return (0, score) if outcome.is_feasible else (-1, -outcome.violation)

@@ -21,7 +21,7 @@ from optisense.objectives.relighting import Relighting
 from optisense.objectives.run import split_settings
 from optisense.objectives.scoring import run_objective
 from optisense.objectives.usual_score import UsualTrials
-from optisense.search.evaluation.evaluator import RELIT, DesignEvaluator
+from optisense.search.evaluation.evaluator import RELIGHTS, DesignEvaluator
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -67,13 +67,15 @@ class RelitEvaluator(DesignEvaluator):
         self, design: SensorDesign, seed: int, only: Collection[str] | None = None
     ) -> Mapping[str, Score]:
         """See `DesignEvaluator.objective_scores`."""
-        if seed not in self._lit:
-            while len(self._lit) >= KEPT_SEEDS:
-                self._lit.popitem(last=False)
-            model = self.keeper.model(self.space.prepared)
-            self._lit[seed] = _Lit(model, self._ready, self.settings, seed, self._progress)
-        self._lit.move_to_end(seed)
-        found = self._lit[seed].scores(design, only)
+        if seed not in self._images:
+            while len(self._images) >= KEPT_SEEDS:
+                self._images.popitem(last=False)
+            model = self.models.model(self.space.prepared)
+            self._images[seed] = _SeedImages(
+                model, self._all_objectives, self.settings, seed, self._progress
+            )
+        self._images.move_to_end(seed)
+        found = self._images[seed].scores(design, only)
         if not self.brief:
             return found
         return {name: _without_details(score) for name, score in found.items()}
@@ -89,31 +91,31 @@ class RelitEvaluator(DesignEvaluator):
         return UsualTrials.of(usual, trial, trial)
 
     @cached_property
-    def _lit(self) -> OrderedDict[int, _Lit]:
+    def _images(self) -> OrderedDict[int, _SeedImages]:
         """Images and objectives of the last seeds, by the seed."""
         return OrderedDict()
 
 
-FROM_LAYERS = frozenset({"rgb2normal", "normdiff", "reading", "depth"})
+RELIGHTABLE = frozenset({"rgb2normal", "normdiff", "reading", "depth"})
 """Objectives by pictures that need no image besides those of the presses, so that layers suffice.
 """
 
-BESIDE = frozenset({"aoap", "2to3pw", "coverage", "distortion", "power"})
+LIGHT_INDEPENDENT = frozenset({"aoap", "2to3pw", "coverage", "distortion", "power"})
 """Objectives that need no light."""
 
 
-def is_relit(usual: DesignEvaluator) -> bool:
+def can_relight(usual: DesignEvaluator) -> bool:
     """Return whether layers suffice for the scores of an evaluator: nothing varies but colours and
-    powers of lights, and the goals and conditions are of `FROM_LAYERS` and `BESIDE`.
+    powers of lights, and the goals and conditions are of `RELIGHTABLE` and `LIGHT_INDEPENDENT`.
     """
     texts = [goal for goal in usual.goals if isinstance(goal, str)]
-    if len(texts) < len(usual.goals) or not all(map(RELIT.search, usual.space.names)):
+    if len(texts) < len(usual.goals) or not all(map(RELIGHTS.search, usual.space.names)):
         return False
     wanted = set(named_in([*texts, *(each.quantity for each in usual.requirements)]))
-    return wanted <= FROM_LAYERS | BESIDE and not wanted <= BESIDE
+    return wanted <= RELIGHTABLE | LIGHT_INDEPENDENT and not wanted <= LIGHT_INDEPENDENT
 
 
-class _Lit:
+class _SeedImages:
     """Images of one seed, and the objectives prepared for them."""
 
     def __init__(

@@ -73,8 +73,8 @@ class Requirement:
             raise SearchError(error.message, hint=error.hint) from None
         return Requirement(quantity, found["sign"] == ">=", limit)
 
-    def breach(self, value: float) -> float:
-        """Return by how much a value misses the limit, as a share of the limit; 0 if it meets it.
+    def violation(self, value: float) -> float:
+        """Return the violation of the limit by a value, as a share of the limit; 0 if it meets it.
 
         A limit of 0 counts as 1. NaN gives infinity.
         """
@@ -119,7 +119,7 @@ def requirements_of(texts: Iterable[str]) -> list[Requirement]:
     for low in (each for each in found if each.at_least):
         for high in (each for each in found if not each.at_least):
             if low.quantity == high.quantity and low.limit > high.limit:
-                raise SearchError(f"nothing can meet both '{low}' and '{high}'")
+                raise SearchError(f"no design can meet both '{low}' and '{high}'")
     return found
 
 
@@ -135,7 +135,7 @@ def _refuse_impossible(wanted: Requirement) -> None:
     low, high = measured.bounds()
     if (wanted.limit > high) if wanted.at_least else (wanted.limit < low):
         raise SearchError(
-            f"nothing can meet '{wanted}': {wanted.quantity} is {low:g} to {high:g}",
+            f"no design can meet '{wanted}': {wanted.quantity} is from {low:g} to {high:g}",
             hint="Give a limit within this range",
         )
 
@@ -148,7 +148,7 @@ def _requirement(text: str) -> Requirement:
     return Requirement.parse(text)
 
 
-def breach_of(conditions: Mapping[str, float | None]) -> float:
+def total_violation(conditions: Mapping[str, float | None]) -> float:
     """Return the sum of the violations of all conditions of a design.
 
     Args:
@@ -159,6 +159,6 @@ def breach_of(conditions: Mapping[str, float | None]) -> float:
         SearchError: a text is no condition.
     """
     return sum(
-        _requirement(text).breach(math.nan if value is None else value)
+        _requirement(text).violation(math.nan if value is None else value)
         for text, value in conditions.items()
     )

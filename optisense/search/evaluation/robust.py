@@ -26,7 +26,9 @@ from optisense.search.space.manufacturing import (
 FloatArray = NDArray[np.float64]
 
 LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
-"""Quantiles of the scores of manufactured sensors that a robust score can be taken from."""
+"""Quantiles of the scores of manufactured sensors: P10, which is the robust score, as nine of ten
+sensors reach it, and P50 and P90, which are reported beside it.
+"""
 
 
 class RobustEvaluator:
@@ -72,7 +74,7 @@ class RobustEvaluator:
         began = time.perf_counter()
         try:
             design = self.usual.space.apply(vector)
-            reason = self.usual.lost(design)
+            reason = self.usual.why_excluded(design)
             bound = self.errors.bind(design)
         except OptiSenseError as error:
             return self.usual.failed(str(error), began)
@@ -81,7 +83,7 @@ class RobustEvaluator:
         found = []
         for errors in self._errors(bound):
             try:
-                found.append(self.usual.judge(bound.apply(errors), seed))
+                found.append(self.usual.evaluate(bound.apply(errors), seed))
             except UnknownPartError:
                 raise
             except OptiSenseError as error:
@@ -128,10 +130,14 @@ def _reached(wanted: Requirement, found: Sequence[Outcome]) -> float:
 
 
 def percentile(values: ArrayLike, share: float) -> float:
-    """Return a percentile of the values, with linear interpolation between neighbours.
+    """Return a percentile of values (k,), with linear interpolation between neighbours.
 
     Failed values (NaN) count as lower than any other; the result is NaN if the percentile falls
     among them.
+
+    Args:
+        values: values (k,) in any order.
+        share: percentile as a share, 0 (lowest) to 1 (highest).
     """
     ordered = np.sort(np.nan_to_num(np.asarray(values, dtype=np.float64), nan=-np.inf))
     place = share * (len(ordered) - 1)

@@ -8,7 +8,7 @@ from optisense.design import SensorDesign
 from optisense.design.camera_checks import LEAST_SKIN
 from optisense.errors import OptiSenseError, SetupError
 from optisense.objectives.evaluation import Evaluation
-from optisense.search.evaluation.models import ModelKeeper
+from optisense.search.evaluation.models import ModelCache
 
 LEAST_OF_START = 0.5
 """Share of the sensing surface seen at the start that a trial must see. Scores grow as the camera
@@ -19,19 +19,19 @@ design, is useless, and cameras that see 0.56 of the start or more
 """
 
 VIEW_RAYS = (48, 36)
-"""Width and height, in rays, of the grid of chief rays that tells by which mirrors the camera
-looks. Of GelSight Svelte's, 500 arrive; shares are off by at most one column of the picture, 0.03,
-and a trial by AOAP takes at most a twentieth longer.
+"""Width and height, in rays, of the grid of chief rays that shows by which mirrors the camera sees
+the skin. Of GelSight Svelte's, 500 arrive; shares are off by at most one column of the picture,
+0.03, and a trial by AOAP takes at most a twentieth longer.
 """
 
-MOST_BY_OTHER_WAYS = 0.1
+MOST_BY_OTHER_MIRRORS = 0.1
 """Share of the chief rays that may reach the sensing surface by other mirrors than in the design
 that the search starts from, or by none. All rays of GelSight Svelte go by both of its mirrors. With
 AOAP as the goal and a camera that may turn, the best designs had 31 to 99 % of the rays miss them;
 a strip of 6 % beside the edge of a mirror turned by a degree does no harm.
 """
 
-SIGHTLESS = ("lights.", "coating.")
+RAY_INDEPENDENT = ("lights.", "coating.")
 """Prefixes of the names of parameters on which no chief ray depends."""
 
 
@@ -42,15 +42,15 @@ class SameMirrors:
     A mirror that the camera looks past is a part that nobody would build.
     """
 
-    def __init__(self, design: SensorDesign, keeper: ModelKeeper) -> None:
+    def __init__(self, design: SensorDesign, models: ModelCache) -> None:
         """Store the design; nothing is traced yet.
 
         Args:
             design: design that the search starts from.
-            keeper: keeper of the optical model.
+            models: models of the optical model.
         """
         self._design = design
-        self._keeper = keeper
+        self._models = models
         self._ways: frozenset[frozenset[str]] | None = None
 
     def __call__(self, design: SensorDesign) -> str | None:
@@ -61,32 +61,32 @@ class SameMirrors:
             self._ways = frozenset(self._seen(self._design))
         seen = self._seen(design)
         other = {way: share for way, share in seen.items() if way not in self._ways}
-        if not self._ways or sum(other.values()) <= MOST_BY_OTHER_WAYS:
+        if not self._ways or sum(other.values()) <= MOST_BY_OTHER_MIRRORS:
             return None
         now = _way_in_words(max(other, key=lambda way: other[way]))
         before = " or ".join(sorted(_way_in_words(way) for way in self._ways))
         return (
-            f"{100 * sum(other.values()):.0f} % of the rays that reach the sensing surface do not "
-            "go by the mirrors that they go by in the design that the search starts from: "
+            f"{100 * sum(other.values()):.0f} % of the rays that reach the sensing surface are not "
+            "reflected by the same mirrors as in the design that the search starts from: "
             f"{now} instead of {before}"
         )
 
     def _seen(self, design: SensorDesign) -> dict[frozenset[str], float]:
-        return self._keeper.model(design).views_by_mirrors(VIEW_RAYS)
+        return self._models.model(design).views_by_mirrors(VIEW_RAYS)
 
 
-def least_skin(design: SensorDesign, keeper: ModelKeeper) -> float:
+def least_skin(design: SensorDesign, models: ModelCache) -> float:
     """Return the share of the sensing surface that trials must see if no setting says otherwise.
 
     Args:
         design: design that the search starts from.
-        keeper: keeper of the optical model.
+        models: models of the optical model.
 
     Raises:
         SetupError: the renderer can't run on this machine.
     """
     try:
-        seen = Evaluation(keeper.model(design)).view.skin
+        seen = Evaluation(models.model(design)).view.skin
     except SetupError:
         raise
     except OptiSenseError:  # the start has no score either, and says why
@@ -96,9 +96,9 @@ def least_skin(design: SensorDesign, keeper: ModelKeeper) -> float:
 
 def may_change_view(names: Iterable[str]) -> bool:
     """Return whether parameters with these names may change what the camera sees."""
-    return any(not name.startswith(SIGHTLESS) for name in names)
+    return any(not name.startswith(RAY_INDEPENDENT) for name in names)
 
 
 def _way_in_words(way: frozenset[str]) -> str:
     names = [f"'{name}'" for name in sorted(way)]
-    return "by " + " and ".join(names) if names else "straight"
+    return "by " + " and ".join(names) if names else "directly"

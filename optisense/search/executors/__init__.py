@@ -1,7 +1,7 @@
 """Executors of trials: this process, a pool of processes, any executor, or a Dask cluster."""
 
 from optisense.search.executors.base import Runner
-from optisense.search.executors.choice import Workers, runner_of
+from optisense.search.executors.choice import Workers, create_runner
 from optisense.search.executors.pool import ProcessPool
 from optisense.search.executors.remote import DaskRunner, ExecutorRunner
 from optisense.search.executors.serial import SerialRunner
@@ -14,6 +14,6 @@ __all__ = [
     "Runner",
     "SerialRunner",
     "Workers",
+    "create_runner",
     "processors",
-    "runner_of",
 ]

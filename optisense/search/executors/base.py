@@ -16,7 +16,7 @@ from optisense.search.evaluation.outcome import Outcome
 
 
 class Runner(ABC):
-    """Base class of executors, which are context managers. Every submitted trial ends in one
+    """Base class of executors, which are context managers. Every submitted trial gets exactly one
     outcome.
 
     Attributes:
@@ -29,7 +29,14 @@ class Runner(ABC):
 
     @abstractmethod
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Score a trial. The future has an exception only for errors that concern all trials."""
+        """Submit a trial, and return the future of its outcome.
+
+        The future has an exception only for errors that concern all trials.
+
+        Args:
+            vector: point (n,) of the search space.
+            seed: seed of the objectives.
+        """
 
     @abstractmethod
     def close(self) -> None:
@@ -59,10 +66,10 @@ def outcome_of(done: Future[Outcome]) -> Outcome:
     if isinstance(error, OptiSenseError):
         raise error
     why = str(error) or type(error).__name__
-    raise SearchError(f"a trial could not be worked out: {why}") from error
+    raise SearchError(f"a trial could not be scored: {why}") from error
 
 
-def packed(evaluator: Evaluator) -> bytes:
+def pickled(evaluator: Evaluator) -> bytes:
     """Return an evaluator as bytes for other processes.
 
     Raises:
@@ -72,11 +79,13 @@ def packed(evaluator: Evaluator) -> bytes:
         blob = pickle.dumps(evaluator, protocol=pickle.HIGHEST_PROTOCOL)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise SearchError(
-            f"workers can't be given an objective or a rule: {error}", hint=HOW
+            f"workers can't be given an objective or a rule: {error}", hint=PICKLING_HINT
         ) from None
     if b"__main__" in blob:
-        raise SearchError("workers can't find functions of the program that starts them", hint=HOW)
+        raise SearchError(
+            "workers can't find functions of the program that starts them", hint=PICKLING_HINT
+        )
     return blob
 
 
-HOW = "Put the function into a file and name it as FILE.py:FUNCTION, or use one worker"
+PICKLING_HINT = "Put the function into a file and name it as FILE.py:FUNCTION, or use one worker"

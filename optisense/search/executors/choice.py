@@ -18,7 +18,7 @@ Workers = int | str | Executor
 executor with the protocol of `concurrent.futures`."""
 
 
-def runner_of(
+def create_runner(
     evaluator: Evaluator, workers: Workers, on_wait: Callable[[], None] | None = None
 ) -> Runner:
     """Return the executor that scores trials with an evaluator.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from distributed import WorkerPlugin
 
-from optisense.search.executors.remote_worker import forget, store_evaluator
+from optisense.search.executors.remote_worker import drop_evaluator, store_evaluator
 
 if TYPE_CHECKING:
     from distributed import Worker
@@ -29,4 +29,4 @@ class EvaluatorPlugin(WorkerPlugin):
         """Forget the evaluator; Dask calls this when the worker ends or the study unregisters the
         plugin.
         """
-        forget(self.key)
+        drop_evaluator(self.key)

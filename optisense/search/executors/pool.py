@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.executors.base import Runner, packed
+from optisense.search.executors.base import Runner, pickled
 from optisense.search.executors.wire import receive, send
 from optisense.usual_times import processors
 
 MOST_DEATHS = 2
-"""Number of workers that may die during one trial; a trial that reaches it is taken to be the
-cause, and fails.
+"""Number of workers that may die during one trial; a trial at which so many died fails, as it is
+probably the cause. One death can have another cause, such as the system's out-of-memory killer.
 """
 
 ONE_THREAD = dict.fromkeys(
@@ -41,14 +41,16 @@ ONE_THREAD = dict.fromkeys(
 small, and the threads of many workers would wait for each other.
 """
 
-LAST_WORDS = 2000
-"""Characters at the end of a dead worker's output that are searched for its last line, which names
-the reason.
+STDERR_TAIL = 2000
+"""Number of bytes at the end of a dead worker's output that are searched for its last line, which
+names the reason; error messages are shorter.
 """
 
 
 @dataclass
 class _Task:
+    """Trial: its point (n,), its seed, its future, and the number of workers that it has killed."""
+
     vector: NDArray[np.float64]
     seed: int
     future: Future[Outcome]
@@ -90,25 +92,25 @@ class ProcessPool(Runner):
             SearchError: `workers` is below 1, or the evaluator can't be pickled.
         """
         if workers < 1:
-            raise SearchError(f"{workers} workers can't do anything", hint="Give 1 or more")
+            raise SearchError(f"the number of workers is {workers}", hint="Give 1 or more")
         self.workers = workers
         self.window = 4 * workers
-        self._blob = packed(evaluator)
+        self._blob = pickled(evaluator)
         self._threads = threads or max(1, processors() // workers)
         self._waiting: deque[_Task] = deque()
         self._changed = threading.Condition()
         self._closed = False
-        self._unfit: Exception | None = None
+        self._error: Exception | None = None
         self._processes: dict[int, subprocess.Popen[bytes]] = {}
         for place in range(workers):
-            threading.Thread(target=self._keep, args=(place,), daemon=True).start()
+            threading.Thread(target=self._supervise, args=(place,), daemon=True).start()
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """See `Runner`."""
+        """Submit a trial to the next free worker; see `Runner.submit`."""
         task = _Task(vector, seed, Future())
         with self._changed:
-            if self._unfit is not None:
-                task.future.set_exception(self._unfit)
+            if self._error is not None:
+                task.future.set_exception(self._error)
             else:
                 self._waiting.append(task)
                 self._changed.notify()
@@ -125,37 +127,37 @@ class ProcessPool(Runner):
         for process in processes:
             process.wait()
 
-    def _keep(self, place: int) -> None:
+    def _supervise(self, place: int) -> None:
         """Keep one place of the pool filled: start a new worker when the one there dies."""
-        stillborn = 0
+        failed_starts = 0
         try:
-            while stillborn < MOST_DEATHS:
-                with tempfile.TemporaryFile() as words:
-                    process = self._start(place, words)
+            while failed_starts < MOST_DEATHS:
+                with tempfile.TemporaryFile() as stderr:
+                    process = self._start(place, stderr)
                     if process is None:
                         return
                     worker = _Worker(process)
                     try:
-                        self._attend(worker)
+                        self._serve(worker)
                         return
                     except (EOFError, OSError):
                         code = process.wait()
                         if self._closed:
                             return
-                        if not worker.ready and code >= 0:  # it exited itself: so will others
-                            raise _never_ready(code, _tail(words)) from None
-                        stillborn = 0 if worker.ready else stillborn + 1
+                        if not worker.ready and code >= 0:  # it exited by itself, as others would
+                            raise _never_ready(code, _tail(stderr)) from None
+                        failed_starts = 0 if worker.ready else failed_starts + 1
                         if worker.task is not None:
-                            self._mourn(worker.task, code, _tail(words))
+                            self._on_death(worker.task, code, _tail(stderr))
                     finally:
-                        self._end(place, process)
+                        self._stop(place, process)
             raise _never_ready(code, "")
         except OptiSenseError as error:
             self._give_up(error)
         except OSError as error:
             self._give_up(SetupError(f"a worker could not be started: {error}"))
 
-    def _attend(self, worker: _Worker) -> None:
+    def _serve(self, worker: _Worker) -> None:
         """Prepare a worker and give it tasks until the pool is closed.
 
         Raises:
@@ -163,7 +165,7 @@ class ProcessPool(Runner):
             OptiSenseError: the worker reports that it can't score any trial.
         """
         kind, content = worker.ask((self._blob, self._threads))
-        if kind == "unfit":
+        if kind == "setup-error":
             raise content
         worker.ready = True
         while (task := self._next()) is not None:
@@ -175,20 +177,20 @@ class ProcessPool(Runner):
             else:
                 task.future.set_exception(content)
 
-    def _start(self, place: int, words: IO[bytes]) -> subprocess.Popen[bytes] | None:
+    def _start(self, place: int, stderr: IO[bytes]) -> subprocess.Popen[bytes] | None:
         environment = {**os.environ, **ONE_THREAD}
         environment["PYTHONPATH"] = os.pathsep.join(path or str(Path.cwd()) for path in sys.path)
-        session: dict[str, Any] = {"start_new_session": True}  # Ctrl-C is the pool's business
+        session: dict[str, Any] = {"start_new_session": True}  # Ctrl-C is handled by the pool
         if sys.platform == "win32":
             session = {"creationflags": subprocess.CREATE_NEW_PROCESS_GROUP}
         with self._changed:
-            if self._closed or self._unfit is not None:
+            if self._closed or self._error is not None:
                 return None
             process = subprocess.Popen(
                 [sys.executable, "-m", "optisense.search.executors.worker"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                stderr=words,
+                stderr=stderr,
                 env=environment,
                 **session,
             )
@@ -198,13 +200,13 @@ class ProcessPool(Runner):
     def _next(self) -> _Task | None:
         """Return the next task, or None if the pool is closed."""
         with self._changed:
-            while not self._waiting and not self._closed and self._unfit is None:
+            while not self._waiting and not self._closed and self._error is None:
                 self._changed.wait()
-            if self._closed or self._unfit is not None:
+            if self._closed or self._error is not None:
                 return None
             return self._waiting.popleft()
 
-    def _mourn(self, task: _Task, code: int, words: str) -> None:
+    def _on_death(self, task: _Task, code: int, stderr: str) -> None:
         """Give the task of a dead worker to another one, or fail it if it has killed too many."""
         task.deaths += 1
         if task.deaths < MOST_DEATHS:
@@ -212,20 +214,20 @@ class ProcessPool(Runner):
                 self._waiting.appendleft(task)
                 self._changed.notify()
             return
-        reason = f"its worker died {task.deaths} times ({_exit(code)}{words and ': ' + words})"
+        reason = f"its worker died {task.deaths} times ({_exit(code)}{stderr and ': ' + stderr})"
         task.future.set_result(Outcome({}, reason))
 
     def _give_up(self, error: Exception) -> None:
         """Fail all tasks with this error, because no worker can work."""
         with self._changed:
-            self._unfit = error
+            self._error = error
             tasks = list(self._waiting)
             self._waiting.clear()
             self._changed.notify_all()
         for task in tasks:
             task.future.set_exception(error)
 
-    def _end(self, place: int, process: subprocess.Popen[bytes]) -> None:
+    def _stop(self, place: int, process: subprocess.Popen[bytes]) -> None:
         process.kill()
         process.wait()
         for stream in (process.stdin, process.stdout):
@@ -237,9 +239,9 @@ class ProcessPool(Runner):
                 del self._processes[place]
 
 
-def _never_ready(code: int, words: str) -> SetupError:
+def _never_ready(code: int, stderr: str) -> SetupError:
     return SetupError(
-        f"a worker could not be started ({_exit(code)}{words and ': ' + words})",
+        f"a worker could not be started ({_exit(code)}{stderr and ': ' + stderr})",
         hint="`optisense doctor` checks this machine",
     )
 
@@ -248,9 +250,9 @@ def _exit(code: int) -> str:
     return f"signal {-code}" if code < 0 else f"exit code {code}"
 
 
-def _tail(words: IO[bytes]) -> str:
+def _tail(stderr: IO[bytes]) -> str:
     """Return the last line of a worker's output."""
-    size = words.seek(0, os.SEEK_END)
-    words.seek(max(0, size - LAST_WORDS))
-    lines = words.read().decode("utf-8", "replace").strip().splitlines()
+    size = stderr.seek(0, os.SEEK_END)
+    stderr.seek(max(0, size - STDERR_TAIL))
+    lines = stderr.read().decode("utf-8", "replace").strip().splitlines()
     return lines[-1].strip() if lines else ""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from optisense.errors import SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.executors.base import Runner, packed
+from optisense.search.executors.base import Runner, pickled
 from optisense.search.executors.remote_worker import score_trial
 
 CONNECT_SECONDS = 10.0
@@ -25,7 +25,7 @@ WORKER_SECONDS = 60.0
 on demand.
 """
 
-MANY = 1000
+SUBMITTED_AHEAD = 1000
 """Number of trials that are submitted ahead to an executor, since its number of workers is not
 known; it exceeds the number of workers of most clusters.
 """
@@ -35,7 +35,7 @@ ADDRESS = re.compile(r"(?:[a-z]+://)?(?:\[[^\]\s]+\]|[^:/\s\[\]]+):\d{1,5}")
 
 HOW_TO_START = (
     "Start one with `dask scheduler` on one machine and `dask worker ADDRESS --nthreads 1` on each "
-    "that shall work"
+    "that scores trials"
 )
 
 
@@ -48,14 +48,14 @@ class ExecutorRunner(Runner):
         Raises:
             SearchError: the evaluator can't be pickled.
         """
-        self._blob = packed(evaluator)
+        self._blob = pickled(evaluator)
         self._key = hashlib.sha256(self._blob).hexdigest()
         self._executor = executor
         self.workers = workers
-        self.window = MANY
+        self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """See `Runner`."""
+        """Submit a trial to the executor; see `Runner.submit`."""
         return self._executor.submit(score_trial, self._key, self._blob, vector, seed)
 
     def close(self) -> None:
@@ -76,7 +76,7 @@ class DaskRunner(Runner):
             SetupError: Dask is not installed, no scheduler answers, or there is no worker.
             SearchError: the evaluator can't be pickled.
         """
-        blob = packed(evaluator)
+        blob = pickled(evaluator)
         self._key = hashlib.sha256(blob).hexdigest()
         self._plugin_name = f"optisense-{self._key[:16]}"
         self._client = _connect(address)
@@ -91,10 +91,10 @@ class DaskRunner(Runner):
             raise
         self._executor = self._client.get_executor(pure=False, retries=0)
         self.workers = sum(self._client.nthreads().values())
-        self.window = MANY
+        self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """See `Runner`."""
+        """Submit a trial to the cluster; see `Runner.submit`."""
         given = self._executor.submit(score_trial, self._key, None, vector, seed)
         future: Future[Outcome] = Future()
         given.add_done_callback(lambda done: _settle(done, future))
@@ -123,7 +123,9 @@ def _connect(address: str) -> Any:
         import distributed
     except ImportError:
         raise SetupError(
-            "Dask is not installed", where="--cluster", hint='Type: pip install "optisense[dask]"'
+            "Dask is not installed",
+            where="--cluster",
+            hint='Install it: pip install "optisense[dask]"',
         ) from None
     try:
         client: Any = distributed.Client
@@ -154,6 +156,6 @@ def _settle(done: Future[Outcome], future: Future[Outcome]) -> None:
     if error is None:
         future.set_result(done.result())
     elif type(error).__name__ == "KilledWorker":
-        future.set_result(Outcome({}, "its workers died again and again"))
+        future.set_result(Outcome({}, "the workers that scored it died repeatedly"))
     else:
         future.set_exception(error)

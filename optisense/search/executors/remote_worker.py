@@ -18,7 +18,8 @@ _evaluators: dict[str, Evaluator] = {}
 _blobs: dict[str, bytes] = {}
 MOST_EVALUATORS = 64
 """Largest number of pickled evaluators that a worker keeps. A search that ends removes its own; one
-whose process was killed does not."""
+whose process was killed does not.
+"""
 _one_at_a_time = threading.Lock()
 """Lock that serves one trial at a time, since an evaluator keeps one model, whatever threads a
 worker has.
@@ -37,7 +38,9 @@ def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed:
         if key not in _evaluators:
             known = blob if blob is not None else _blobs.get(key)
             if known is None:
-                raise SetupError("a worker has not been given what to work out")
+                raise SetupError(
+                    "a worker has no evaluator: the study has ended, or the worker has restarted"
+                )
             evaluator = pickle.loads(known)
             if getattr(evaluator, "renders", True):
                 from optisense.optics.backend.threads import use_threads
@@ -57,7 +60,7 @@ def store_evaluator(key: str, blob: bytes) -> None:
         del _blobs[next(iter(_blobs))]
 
 
-def forget(key: str) -> None:
+def drop_evaluator(key: str) -> None:
     """Drop the evaluator stored under a key."""
     _blobs.pop(key, None)
     _evaluators.pop(key, None)

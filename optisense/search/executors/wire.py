@@ -7,6 +7,7 @@ import struct
 from typing import IO, Any
 
 _LENGTH = struct.Struct("<Q")
+"""Header of a message: the length of its pickle in bytes, 64 bits, little-endian."""
 
 
 def send(stream: IO[bytes], message: Any) -> None:

@@ -22,7 +22,7 @@ def main() -> None:
     """Score trials until the pool closes the pipe."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever prints must not get between the answers
+    os.dup2(2, 1)  # printed text must not mix with the answers
     messages: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(sys.stdin.buffer, messages), daemon=True).start()
     evaluator = None
@@ -34,11 +34,11 @@ def main() -> None:
 
             use_threads(threads)
     except OptiSenseError as error:
-        send(answers, ("unfit", error))
+        send(answers, ("setup-error", error))
         return
     except Exception as error:
         failure = SetupError(f"a worker can't be set up: {type(error).__name__}: {error}")
-        send(answers, ("unfit", failure))
+        send(answers, ("setup-error", failure))
         return
     send(answers, ("ready", os.getpid()))
     name = str(os.getpid())
@@ -49,13 +49,15 @@ def main() -> None:
             object.__setattr__(outcome, "worker", name)
             send(answers, ("done", outcome))
         except OSError:
-            return  # nobody is waiting any more
+            return  # the pool has closed the pipe
         except Exception as error:
             send(answers, ("error", _sendable(error)))
 
 
 def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
-    """Pass messages on, and end this process, even amid a trial, when the pool closes the pipe."""
+    """Pass messages on, and end this process, even during a trial, when the pool closes the
+    pipe.
+    """
     try:
         while True:
             messages.put(receive(stream))
@@ -64,7 +66,7 @@ def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
 
 
 def _sendable(error: Exception) -> Exception:
-    """Return the error itself if it can be pickled, else an error with the same message."""
+    """Return an error of this package as it is, and any other as one that can be pickled."""
     if isinstance(error, OptiSenseError):
         return error
     return RuntimeError(f"{type(error).__name__}: {error}")

@@ -24,8 +24,8 @@ from optisense.search.evaluation.requirements import Requirement
 FloatArray = NDArray[np.float64]
 
 ROUNDS = 8
-"""Largest number of ascents with new multipliers; conditions are usually met to `KEPT` after
-three.
+"""Largest number of ascents with new multipliers; conditions are usually met to
+`CONDITION_TOLERANCE` after three.
 """
 
 WEIGHT = 100.0
@@ -33,17 +33,17 @@ WEIGHT = 100.0
 by a tenth costs half of the score.
 """
 
-HEAVIER = 5.0
+WEIGHT_FACTOR = 5.0
 """Factor on the weight after an ascent that has not halved the violation."""
 
-ASIDE = 0.004
+LIMIT_MARGIN = 0.004
 """Share of a limit by which an ascent stays on its allowed side. Scores are sums over pixels and
 triangles and change in steps of about this size.
 """
 
-KEPT = 0.002
-"""Tolerance of conditions at the end of an ascent, as a share of the limit; less than `ASIDE`, so
-that the steps of a score do not make the point infeasible.
+CONDITION_TOLERANCE = 0.002
+"""Tolerance of conditions at the end of an ascent, as a share of the limit; less than
+`LIMIT_MARGIN`, so that the steps of a score do not make the point infeasible.
 """
 
 
@@ -57,21 +57,21 @@ class AugmentedLagrangian:
         weight: weight of the violations, in units of the score.
         offsets: offsets (m,) that are added to the smooth value of each limited quantity to give
             its exact value.
-        missing: largest violation g at the end of the ascent before.
+        violation: largest violation g at the end of the ascent before.
     """
 
     requirements: tuple[Requirement, ...]
     multipliers: FloatArray
     weight: float
     offsets: FloatArray
-    missing: float = np.inf
+    violation: float = np.inf
 
     @staticmethod
-    def begin(
+    def initial(
         requirements: Sequence[Requirement], score: float, offsets: FloatArray
     ) -> AugmentedLagrangian:
         """Return the merit function of the first ascent; `score` is the score of the start."""
-        weight = WEIGHT * max(abs(score), KEPT)
+        weight = WEIGHT * max(abs(score), CONDITION_TOLERANCE)
         return AugmentedLagrangian(
             tuple(requirements), np.zeros(len(requirements)), weight, offsets
         )
@@ -83,28 +83,28 @@ class AugmentedLagrangian:
             values: score and limited quantity of each condition, (1 + m,).
             gradients: gradients of `values`, (1 + m, n).
         """
-        pull = np.maximum(0.0, self.multipliers + self.weight * self.missing_of(values))
+        pull = np.maximum(0.0, self.multipliers + self.weight * self.violations(values))
         cost = float((pull**2 - self.multipliers**2).sum()) / (2.0 * self.weight)
         return float(values[0]) - cost, gradients[0] - (pull * self._signs()) @ gradients[1:]
 
-    def missing_of(self, values: FloatArray) -> FloatArray:
+    def violations(self, values: FloatArray) -> FloatArray:
         """Return g of each condition, (m,): positive where it misses its limit, or comes too near
         to it.
         """
         limits = np.array([each.limit for each in self.requirements])
-        return self._signs() * (values[1:] + self.offsets - limits) + ASIDE
+        return self._signs() * (values[1:] + self.offsets - limits) + LIMIT_MARGIN
 
-    def after(self, values: FloatArray, offsets: FloatArray) -> AugmentedLagrangian:
+    def updated(self, values: FloatArray, offsets: FloatArray) -> AugmentedLagrangian:
         """Return the merit function of the next ascent, where the last one ended at these values (1
         + m,).
         """
-        missing = self.missing_of(values)
-        most = float(missing.max())
-        heavier = most > KEPT and most > 0.5 * self.missing
+        violation = self.violations(values)
+        most = float(violation.max())
+        increased = most > CONDITION_TOLERANCE and most > 0.5 * self.violation
         return AugmentedLagrangian(
             self.requirements,
-            np.maximum(0.0, self.multipliers + self.weight * missing),
-            self.weight * (HEAVIER if heavier else 1.0),
+            np.maximum(0.0, self.multipliers + self.weight * violation),
+            self.weight * (WEIGHT_FACTOR if increased else 1.0),
             offsets,
             most,
         )

@@ -1,9 +1,9 @@
 """The base class of search methods, which propose points and receive their scores, by generation.
 
-A method must be a function of its problem, its options and the outcomes that it was told, and of
-nothing else: a killed study is resumed by telling a new instance the outcomes of the old one. So no
-state has to be saved (and none from a stranger has to be unpickled), and a resumed study goes on
-with exactly the generation that the interrupted one would have had.
+The proposals of a method depend on its problem, its options and the outcomes that it was told, and
+on nothing else: a killed study is resumed by telling a new instance the outcomes of the old one. So
+no state has to be saved (and none from a stranger has to be unpickled), and a resumed study
+continues with exactly the generation that the interrupted one would have had.
 """
 
 from __future__ import annotations
@@ -55,29 +55,29 @@ class Method(ABC):
     Class attributes:
         name: name of the method on the command line.
         summary: description in one line.
-        several: whether the method looks for the best trade-offs between several goals.
+        multi_objective: whether the method looks for the best trade-offs between several goals.
         renders_once: whether all trials of a seed share their images.
-        may_be_coarse: whether it only compares the scores of trials, so that coarse scores can
-            guide it.
+        accepts_coarse_scores: whether it only compares the scores of trials, so that coarse scores
+            can guide it.
     """
 
     name: ClassVar[str]
     summary: ClassVar[str]
-    several: ClassVar[bool] = False
+    multi_objective: ClassVar[bool] = False
     renders_once: ClassVar[bool] = False
-    may_be_coarse: ClassVar[bool] = False
+    accepts_coarse_scores: ClassVar[bool] = False
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         self.space = problem.space
-        if self.several and len(problem.objectives) < 2:
+        if self.multi_objective and len(problem.objectives) < 2:
             raise SearchError(
-                f"{self.name} weighs several objectives against each other",
-                hint="Name two or more, or use a method for one",
+                f"the method {self.name} needs two or more objectives",
+                hint="Name more objectives, or use another method",
             )
 
     @classmethod
-    def usual_budget(cls, space: BoundSpace) -> int:
+    def default_budget(cls, space: BoundSpace) -> int:
         """Return the number of trials for a search without a given budget.
 
         Raises:
@@ -117,7 +117,7 @@ def values_to_maximise(outcomes: Sequence[Outcome], objective: str) -> FloatArra
     """
     values = np.array([outcome.scores.get(objective, np.nan) for outcome in outcomes])
     failed = ~np.isfinite(values)
-    broken = np.array([outcome.breach for outcome in outcomes])
+    broken = np.array([outcome.violation for outcome in outcomes])
     _put_below(values, ~failed & (broken > 0.0), ~failed & (broken == 0.0), broken)
     _put_below(values, failed, ~failed, np.zeros(len(values)))
     return values

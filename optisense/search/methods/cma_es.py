@@ -45,7 +45,7 @@ class CmaEs(Method):
 
     name = "cma-es"
     summary = "evolution that learns the shape of the problem; for numbers, up to hundreds"
-    may_be_coarse = True
+    accepts_coarse_scores = True
 
     def __init__(
         self,
@@ -71,11 +71,13 @@ class CmaEs(Method):
         """
         super().__init__(problem)
         if not 0.0 < sigma <= 1.0:
-            raise SearchError(f"sigma is {sigma}", hint="Give a part of the range: 0 < sigma <= 1")
+            raise SearchError(f"sigma is {sigma}", hint="Give a share of the range: 0 < sigma <= 1")
         if population is not None and not 2 <= population <= MOST_POPULATION:
-            raise SearchError(f"the population is {population}", hint="Give 4 or more")
+            raise SearchError(
+                f"the population is {population}", hint=f"Give 2 to {MOST_POPULATION:,}"
+            )
         if restarts is not None and restarts < 0:
-            raise SearchError(f"{restarts} restarts make no sense")
+            raise SearchError(f"the number of restarts is {restarts}", hint="Give 0 or more")
         self.sigma = float(sigma)
         size = problem.space.size
         natural = 4 + math.floor(3 * math.log(size))
@@ -85,7 +87,7 @@ class CmaEs(Method):
         self._random = problem.random(self.name)
         # pycma draws from NumPy's global generator, which gets a state of its own while pycma runs.
         self._state = np.random.RandomState(int(self._random.integers(2**32))).get_state()
-        whole = problem.space.whole
+        whole = problem.space.discrete
         self._unit = np.where(whole, 1.0, problem.space.upper - problem.space.lower)
         self._origin = np.where(whole, 0.0, problem.space.lower)
         self._idle = max(0, LEAST_DIMENSIONS - size)
@@ -109,7 +111,7 @@ class CmaEs(Method):
         return self._point(np.array(self._asked))
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Learn from a generation, unless all of its trials failed."""
+        """Update the distribution with a generation (k, n), unless all of its trials failed."""
         values = values_to_maximise(outcomes, self.problem.objectives[0])
         if np.isnan(values).any() or len(values) < len(self._asked):
             return
@@ -138,7 +140,7 @@ class CmaEs(Method):
 
         lower, upper = self._inner(self.space.lower), self._inner(self.space.upper)
         lower[self.space.size :], upper[self.space.size :] = 0.0, 1.0
-        whole = np.flatnonzero(self.space.whole)
+        whole = np.flatnonzero(self.space.discrete)
         # Bounds are half a step beyond the first and last integer, so that each has an equal share.
         lower[whole], upper[whole] = lower[whole] - 0.499, upper[whole] + 0.499
         spread = np.ones(self.space.size + self._idle)
@@ -177,7 +179,7 @@ class CmaEs(Method):
         dimensions.
         """
         point = self._origin + inner[:, : self.space.size] * self._unit
-        point = np.where(self.space.whole, np.round(point), point)
+        point = np.where(self.space.discrete, np.round(point), point)
         return np.clip(point, self.space.lower, self.space.upper)
 
     @contextmanager

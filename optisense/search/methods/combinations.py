@@ -74,7 +74,7 @@ class Combinations(Method):
         ).reshape(-1, self.space.size)
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Store the rank of each combination; failed ones rank last."""
+        """Store the rank of each combination of a generation (k, n); failed ones rank last."""
         for key, outcome in zip(self._asked, outcomes, strict=True):
             rank = rank_of(outcome, self.problem.objectives[0])
             self._known[key] = FAILED if outcome.failed else rank

@@ -45,7 +45,7 @@ HALVINGS = 8
 of the distance.
 """
 
-BINDING = 1e-7
+ACTIVE_TOLERANCE = 1e-7
 """Largest distance of a point from a bound or plane that counts as active, in units of the ranges;
 it covers the solver's rounding errors.
 """
@@ -136,15 +136,15 @@ class FeasibleRegion:
                 break
             point = found
             if self.allows(point):
-                return FeasiblePoint(point, _held_back(wanted, point, planes))
-        return self._way_back(wanted, allowed)
+                return FeasiblePoint(point, _active_normals(wanted, point, planes))
+        return self._bisect(wanted, allowed)
 
     def _design(self, unit: FloatArray) -> SensorDesign:
         space = self._space
         point = np.clip(space.lower + unit * self._span, space.lower, space.upper)
         return space.apply(point)
 
-    def _way_back(self, wanted: FloatArray, allowed: FloatArray) -> FeasiblePoint:
+    def _bisect(self, wanted: FloatArray, allowed: FloatArray) -> FeasiblePoint:
         """Return the last feasible point on the line from a feasible point to a wanted one, by
         bisection.
         """
@@ -169,14 +169,14 @@ class FeasibleRegion:
             if found is not None:
                 names = found.one, found.other
                 planes = [
-                    self._out_of(design, before, unit, one, other)
+                    self._separating_planes(design, before, unit, one, other)
                     for one, other in (names, names[::-1])
                     if one in self._parts
                 ]
                 return _Planes.of(planes)
         return None
 
-    def _out_of(
+    def _separating_planes(
         self, design: SensorDesign, before: SensorDesign, unit: FloatArray, one: str, other: str
     ) -> _Planes:
         """Return the inequalities for the corners of a part that have crossed planes of another
@@ -238,11 +238,11 @@ def _nearest(wanted: FloatArray, planes: _Planes) -> FloatArray | None:
     return np.clip(found.x, 0.0, 1.0) if found.success else None
 
 
-def _held_back(wanted: FloatArray, point: FloatArray, planes: _Planes) -> FloatArray:
+def _active_normals(wanted: FloatArray, point: FloatArray, planes: _Planes) -> FloatArray:
     """Return orthonormal directions (k, n) in which active constraints keep a point from the wanted
     one.
     """
-    binding = planes.normals[planes.limits - planes.normals @ point < BINDING]
+    binding = planes.normals[planes.limits - planes.normals @ point < ACTIVE_TOLERANCE]
     bounds = np.eye(len(point))[np.abs(point - wanted) > 0.0]
     bounds = bounds[((point <= 0.0) | (point >= 1.0))[np.abs(point - wanted) > 0.0]]
     rows = np.concatenate([binding, bounds])

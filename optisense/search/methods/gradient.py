@@ -15,16 +15,13 @@ The stored scores are the true ones. Conditions are met by an augmented Lagrangi
 (`optisense.search.methods.augmented_lagrangian`).
 
 A point that constraints on shapes forbid is replaced by the nearest feasible one
-    (`optisense.search.methods.feasible`), so that the ascent slides along the constraint and no
-    trial is spent. An ascent that treated the forbidden point as a bad one stopped at the first
-    wall.
 (`optisense.search.methods.feasible`), so that the ascent slides along the constraint and no trial
-is spent. An ascent that told the forbidden point as a bad one came to a stop at the first wall.
+is spent. An ascent that treated the forbidden point as a bad one stopped at the first wall.
 
 At the start the ray derivative is compared with central differences of the true score
-(`optisense.search.methods.checked_slopes`). If the two disagree, if rays have no derivative (by the
-shape of a transparent part), or if there are few parameters, the gradient consists of central
-differences by each parameter. The outcome tells which was used, and whether the score itself has
+(`optisense.search.methods.checked_gradients`). If the two disagree, if rays have no derivative (by
+the shape of a transparent part), or if there are few parameters, the gradient consists of central
+differences by each parameter. The outcome states which was used, and whether the score itself has
 jumps, so that no gradient is valid.
 """
 
@@ -36,23 +33,27 @@ from typing import Any
 import numpy as np
 
 from optisense.errors import SearchError
-from optisense.search.evaluation.evaluator import RELIT, DesignEvaluator, Evaluator
+from optisense.search.evaluation.evaluator import RELIGHTS, DesignEvaluator, Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.relit import RelitEvaluator
 from optisense.search.evaluation.requirements import Requirement
 from optisense.search.evaluation.views import SameMirrors, may_change_view
-from optisense.search.methods.augmented_lagrangian import KEPT, ROUNDS, AugmentedLagrangian
+from optisense.search.methods.augmented_lagrangian import (
+    CONDITION_TOLERANCE,
+    ROUNDS,
+    AugmentedLagrangian,
+)
 from optisense.search.methods.base import FloatArray, Method, Problem
-from optisense.search.methods.checked_slopes import (
+from optisense.search.methods.checked_gradients import (
     DIFFERENCES,
-    FEW,
+    FEW_PARAMETERS,
     GRADIENT_BY,
     GRADIENT_HOLDS,
     LIMITED,
     RAYS,
     SMOOTHED,
     TOLERANCE,
-    SlopeEvaluator,
+    GradientEvaluator,
 )
 from optisense.search.methods.feasible import FeasiblePoint, FeasibleRegion
 from optisense.search.methods.gradient_sources import (
@@ -66,10 +67,12 @@ from optisense.search.methods.jacobian import moving_parts
 from optisense.search.methods.score_differences import STEP
 from optisense.search.space.search_space import BoundSpace
 
-USUAL_STEPS = 12
-"""Number of steps of an ascent by differences of trials, where no budget is given."""
+DEFAULT_STEPS = 12
+"""Number of steps of an ascent by differences of trials, where no budget is given; a step over n
+parameters takes 2 n + 1 trials.
+"""
 
-USUAL_BUDGET = 40
+DEFAULT_BUDGET = 40
 """Number of trials where no budget is given. A trial gives the score and all its slopes, so an
 ascent needs tens of trials and not hundreds.
 """
@@ -85,7 +88,7 @@ class Gradient(Method):
     """L-BFGS-B from the design as it is, and then from other points of the space."""
 
     name = "gradient"
-    summary = "steepest way up by derivatives: of rays, of relit pictures, or of differences"
+    summary = "ascent by derivatives: of rays, of relit pictures, or finite differences"
 
     def __init__(
         self,
@@ -111,7 +114,10 @@ class Gradient(Method):
         self.objective = problem.objectives[0]
         self.requirements = tuple(Requirement.parse(text) for text in problem.requirements)
         if resolution < 16:
-            raise SearchError(f"a resolution of {resolution} is too coarse for gradients")
+            raise SearchError(
+                f"a resolution of {resolution} rays is too coarse for gradients",
+                hint="Give 16 or more",
+            )
         if starts < 1:
             raise SearchError(f"there are {starts} starts", hint="Give 1 or more")
         self.resolution, self.memory = int(resolution), int(memory)
@@ -127,16 +133,16 @@ class Gradient(Method):
         self._places: dict[bytes, FeasiblePoint] = {}
 
     @classmethod
-    def usual_budget(cls, space: BoundSpace) -> int:
+    def default_budget(cls, space: BoundSpace) -> int:
         """Return a budget that is usually enough to converge; for ray derivatives and relit
         pictures it does not depend on the number of parameters.
         """
-        turns_rays = not all(RELIT.search(name) for name in space.names) and may_change_view(
+        turns_rays = not all(RELIGHTS.search(name) for name in space.names) and may_change_view(
             space.names
         )
-        if turns_rays or all(RELIT.search(name) for name in space.names):
-            return USUAL_BUDGET
-        return USUAL_STEPS * (2 * space.size + 1)
+        if turns_rays or all(RELIGHTS.search(name) for name in space.names):
+            return DEFAULT_BUDGET
+        return DEFAULT_STEPS * (2 * space.size + 1)
 
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
         """Return an evaluator of scores and their slopes."""
@@ -149,7 +155,7 @@ class Gradient(Method):
         relit = self.source is GradientSource.LAYERS
         scored = RelitEvaluator(usual) if relit else usual
         seed = self.problem.seed
-        return SlopeEvaluator(
+        return GradientEvaluator(
             scored, self.parts, self.objective, self.resolution, seed, layers=relit
         )
 
@@ -178,7 +184,7 @@ class Gradient(Method):
         known = self._around(self._point(unit))
         if known is None:
             return
-        merit = AugmentedLagrangian.begin(
+        merit = AugmentedLagrangian.initial(
             self.requirements, float(known.values[0]), self._offsets(unit, known)
         )
         best = -np.inf
@@ -187,8 +193,10 @@ class Gradient(Method):
             known = self._around(self._point(unit))
             if known is None:
                 return
-            merit = merit.after(known.values, self._offsets(unit, known))
-            if merit.missing <= KEPT and not value - best > CONVERGED * max(1.0, abs(value)):
+            merit = merit.updated(known.values, self._offsets(unit, known))
+            if merit.violation <= CONDITION_TOLERANCE and not value - best > CONVERGED * max(
+                1.0, abs(value)
+            ):
                 return
             best = value
 
@@ -307,7 +315,7 @@ class Gradient(Method):
         return np.where(unit == self._start_unit, space.start, point)
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Store the outcomes, with their slopes, by their points."""
+        """Store the outcomes of a generation (k, n), with their gradients, by their points."""
         for vector, outcome in zip(vectors, outcomes, strict=True):
             self._known[np.asarray(vector, dtype=np.float64).tobytes()] = outcome
 
@@ -335,8 +343,8 @@ class Gradient(Method):
         notes = []
         if facts["by_differences"]:
             why = (
-                f"with at most {FEW} parameters they cost no more than derivatives of rays"
-                if self.space.size <= FEW
+                f"with at most {FEW_PARAMETERS} parameters they cost no more than ray derivatives"
+                if self.space.size <= FEW_PARAMETERS
                 else f"derivatives of rays are more than {TOLERANCE:.0%} off there, or there are "
                 "none"
             )
@@ -350,10 +358,10 @@ class Gradient(Method):
                 f"{facts['checked']} points where that was checked: its rate of change over "
                 f"{STEP / 2:.1%} of the ranges is more than {TOLERANCE:.0%} off that over "
                 f"{STEP:.0%}, because rows of pixels or triangles come into view at once, an edge "
-                "reaches the picture's border, or single rays go astray. The "
+                "reaches the picture's border, or single rays change their path. The "
                 f"gradients used there ({facts['unsteady_by_rays']} of the smoothed score, by "
                 f"rays; {facts['unsteady'] - facts['unsteady_by_rays']} by differences) show the "
-                "way up only roughly; --method cma-es needs none"
+                "direction of ascent only roughly; --method cma-es needs no gradient"
             )
         return notes
 

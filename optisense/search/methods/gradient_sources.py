@@ -10,7 +10,7 @@ import numpy as np
 
 from optisense.errors import ObjectiveError, SearchError
 from optisense.objectives.named import are_rays_only
-from optisense.search.evaluation.evaluator import RELIT
+from optisense.search.evaluation.evaluator import RELIGHTS
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import Requirement
 from optisense.search.methods.base import FloatArray, Problem
@@ -51,7 +51,7 @@ def source_of(problem: Problem) -> GradientSource:
         SearchError: a parameter is a choice or an integer, or no parameter changes the score.
     """
     space, objective = problem.space, problem.objectives[0]
-    for number in np.flatnonzero(space.whole):
+    for number in np.flatnonzero(space.discrete):
         raise SearchError(
             "a choice or a whole number has no gradient",
             where=space.names[number],
@@ -62,7 +62,7 @@ def source_of(problem: Problem) -> GradientSource:
     except ObjectiveError:  # a function of the caller's program
         return GradientSource.TRIALS
     if not rays_only:
-        relit = all(RELIT.search(name) for name in space.names)
+        relit = all(RELIGHTS.search(name) for name in space.names)
         return GradientSource.LAYERS if relit else GradientSource.TRIALS
     moving_parts(space)  # raises an error for a parameter that changes no ray
     return GradientSource.TRIALS if SmoothScore.of(objective) is None else GradientSource.RAYS

@@ -16,7 +16,7 @@ class Grid(Combinations):
 
     name = "grid"
     summary = "every combination of steps and options"
-    may_be_coarse = True
+    accepts_coarse_scores = True
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem, levels_of(problem.space))
@@ -27,7 +27,7 @@ class Grid(Combinations):
             )
 
     @classmethod
-    def usual_budget(cls, space: BoundSpace) -> int:
+    def default_budget(cls, space: BoundSpace) -> int:
         """Return the number of all combinations."""
         return math.prod(len(levels) for levels in levels_of(space))
 

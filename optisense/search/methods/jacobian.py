@@ -1,8 +1,7 @@
 """The Jacobian of shapes and camera by the coordinates of a search space.
 
 It is computed by finite differences: where shapes depend linearly on the coordinates, as they do in
-    a cage, these are exact, and one Jacobian serves all points.
-exact, and one set of them serves all points.
+a cage, these are exact, and one Jacobian serves all points.
 """
 
 from __future__ import annotations
@@ -57,7 +56,7 @@ def moving_parts(space: BoundSpace) -> list[str]:
     meshes = start.deformed_meshes()
     moving: set[str] = set()
     for number, parameter in enumerate(space.parameters):
-        if space.whole[number]:
+        if space.discrete[number]:
             raise SearchError(
                 "a choice or a whole number has no gradient",
                 where=parameter.name,
@@ -93,7 +92,7 @@ def jacobian(space: BoundSpace, point: FloatArray, parts: list[str]) -> Jacobian
     return Jacobian(point, {n: np.array(s) for n, s in slopes.items()}, np.array(camera))
 
 
-def holds(known: Jacobian, space: BoundSpace, design: SensorDesign, point: FloatArray) -> bool:
+def predicts(known: Jacobian, space: BoundSpace, design: SensorDesign, point: FloatArray) -> bool:
     """Return whether a Jacobian predicts the shapes and the camera at a point."""
     way = point - known.point
     if not way.any():

@@ -18,8 +18,10 @@ from optisense.search.methods.base import Problem
 from optisense.search.methods.combinations import Combinations, Stage, levels_of
 from optisense.search.space.search_space import BoundSpace
 
-MOST_USUAL = 20_000
-"""Largest number of colourings that are tried where no budget is given."""
+LARGEST_DEFAULT_BUDGET = 20_000
+"""Largest number of colourings that are tried where no budget is given: enough for all 6,561 ways
+to make eight groups red, green or blue.
+"""
 
 
 class LightColours(Combinations):
@@ -37,9 +39,9 @@ class LightColours(Combinations):
         super().__init__(problem, _levels(problem.space))
 
     @classmethod
-    def usual_budget(cls, space: BoundSpace) -> int:
+    def default_budget(cls, space: BoundSpace) -> int:
         """Return the number of all colourings, up to a limit."""
-        return min(math.prod(len(levels) for levels in _levels(space)), MOST_USUAL)
+        return min(math.prod(len(levels) for levels in _levels(space)), LARGEST_DEFAULT_BUDGET)
 
     def plan(self) -> Iterator[Stage]:
         """See `Combinations.plan`."""

@@ -25,7 +25,7 @@ GROUPWISE_SHARE = 0.5
 left for single lights.
 """
 
-MOST_USUAL = 400
+LARGEST_DEFAULT_BUDGET = 400
 """Largest number of trials where no budget is given: each one traces its light anew."""
 
 FOR_ALL, FOR_GROUPS, FOR_LIGHTS = "one type for all", "one type a group", "one type a light"
@@ -40,7 +40,7 @@ class LightTypes(Combinations):
 
     name = "types"
     summary = "types of lights: one for all, one a group, then one a light"
-    may_be_coarse = True
+    accepts_coarse_scores = True
 
     def __init__(self, problem: Problem) -> None:
         count = _options(problem.space)
@@ -49,13 +49,13 @@ class LightTypes(Combinations):
         super().__init__(problem, [range(count)] * problem.space.size)
 
     @classmethod
-    def usual_budget(cls, space: BoundSpace) -> int:
+    def default_budget(cls, space: BoundSpace) -> int:
         """Return the number of combinations by group, and as many trials again for single lights,
         within limits.
         """
         options = _options(space)
         wanted = max(2 * options ** len(_groups(space)), 4 * space.size)
-        return min(wanted, options**space.size, MOST_USUAL)
+        return min(wanted, options**space.size, LARGEST_DEFAULT_BUDGET)
 
     def plan(self) -> Iterator[Stage]:
         """See `Combinations.plan`."""

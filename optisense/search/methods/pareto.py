@@ -21,12 +21,14 @@ from optisense.search.methods.base import FloatArray, Method, Problem
 from optisense.search.methods.dominance import crowding, ranks
 
 CROSSOVER_SPREAD = 15.0
-"""Distribution index of the crossover; larger values keep children nearer to their parents; 15 is
-usual for NSGA-II.
+"""Distribution index of the crossover; larger values keep children nearer to their parents. 15 and
+20 are the usual values for NSGA-II, such as the defaults of pymoo.
 """
 
 MUTATION_SPREAD = 20.0
-"""Distribution index of the mutation; 20 is usual for NSGA-II."""
+"""Distribution index of the mutation; 20 is the value of Deb et al. (2002), and the default of
+pymoo.
+"""
 
 CROSSOVER_CHANCE = 0.9
 """Probability that two parents are crossed, as Deb et al. (2002) use it for NSGA-II."""
@@ -37,7 +39,7 @@ class Pareto(Method):
 
     name = "pareto"
     summary = "the best trade-offs between two or more objectives"
-    several = True
+    multi_objective = True
 
     def __init__(self, problem: Problem, *, population: int | None = None) -> None:
         """Set up the population and its size.
@@ -53,7 +55,9 @@ class Pareto(Method):
         usual = int(np.clip(problem.budget // 10, 20, 100))
         self.population = usual + usual % 2 if population is None else population
         if self.population < 4 or self.population % 2:
-            raise SearchError(f"the population is {population}", hint="Give 4 or more, even")
+            raise SearchError(
+                f"the population is {population}", hint="Give an even number, 4 or more"
+            )
         self._random = problem.random(self.name)
         self._genes = np.empty((0, self.space.size))
         self._values = np.empty((0, len(problem.objectives)))
@@ -71,7 +75,7 @@ class Pareto(Method):
         return self.space.from_unit(self._children)
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Keep the best of parents and children."""
+        """Keep the best of the parents and of the children (population, n)."""
         values = np.array(
             [
                 [outcome.scores.get(name, np.nan) for name in self.problem.objectives]
@@ -82,7 +86,7 @@ class Pareto(Method):
         genes = self._children if same else self.space.unit_of(vectors)
         everyone = np.concatenate([self._genes, genes])
         scores = np.concatenate([self._values, values])
-        broken = np.concatenate([self._broken, [outcome.breach for outcome in outcomes]])
+        broken = np.concatenate([self._broken, [outcome.violation for outcome in outcomes]])
         rank = ranks(scores, broken)
         best = np.lexsort((-crowding(scores, rank), rank))[: self.population]
         self._genes, self._values, self._broken = everyone[best], scores[best], broken[best]
@@ -119,8 +123,8 @@ class Pareto(Method):
         crossed = (self._random.random(shape) < 0.5) & (
             self._random.random((shape[0], 1)) < CROSSOVER_CHANCE
         )
-        smooth = crossed & ~self.space.whole
-        swapped = crossed & self.space.whole
+        smooth = crossed & ~self.space.discrete
+        swapped = crossed & self.space.discrete
         daughters = np.where(smooth, middle - spread * half, np.where(swapped, fathers, mothers))
         sons = np.where(smooth, middle + spread * half, np.where(swapped, mothers, fathers))
         return np.clip(np.concatenate([daughters, sons]), 0.0, 1.0)
@@ -134,4 +138,4 @@ class Pareto(Method):
         above = 1.0 - (2.0 * (1.0 - draw) + 2.0 * (draw - 0.5) * genes**exponent) ** power
         moved = np.clip(genes + np.where(draw < 0.5, below, above), 0.0, 1.0)
         anywhere = self._random.random(genes.shape)
-        return np.where(chosen, np.where(self.space.whole, anywhere, moved), genes)
+        return np.where(chosen, np.where(self.space.discrete, anywhere, moved), genes)

@@ -23,7 +23,7 @@ class Random(Method):
 
     name = "random"
     summary = "points spread evenly over the space"
-    may_be_coarse = True
+    accepts_coarse_scores = True
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
@@ -34,4 +34,4 @@ class Random(Method):
         return self.space.from_unit(self._points.random(GENERATION))
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
-        """Do nothing: random search does not learn."""
+        """Ignore the outcomes of a generation (k, n): random search does not learn."""

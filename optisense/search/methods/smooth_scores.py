@@ -14,8 +14,8 @@ from optisense.objectives.expressions import Expression, ScoreTerm
 from optisense.objectives.smooth import SMOOTH, Rays, Slopes
 
 STEP = 1e-6
-"""Step of central differences of arithmetic, absolute or, for values above 1, relative; it is a few
-hundred times the square root of double precision, so that rounding does not show.
+"""Step of central differences of arithmetic, absolute or, for values above 1, relative; it is near
+the cube root of double precision (6e-6), at which central differences are most accurate.
 """
 
 

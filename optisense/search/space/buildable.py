@@ -21,7 +21,7 @@ from optisense.geometry.overlaps import CONTACT, near_surface
 from optisense.geometry.surface import closest_points
 from optisense.search.space.constraints import same_shape
 
-STILL_RESTS = 0.99
+LEAST_KEPT_CONTACT = 0.99
 """Share of the contact area of two parts that a trial must keep. The remaining hundredth covers
 rounding at curved faces and displacements as small as manufacturing errors.
 """
@@ -31,23 +31,23 @@ SEAT_POINTS = 400
 hundredth.
 """
 
-FEW = 16
+LEAST_CONTACT_POINTS = 16
 """Smallest number of touching points that count as a contact area; fewer are an edge or a corner,
 on which no part rests.
 """
 
-PLASTIC = (0.7548776662466927, 0.5698402909980532)
+R2_STEPS = (0.7548776662466927, 0.5698402909980532)
 """The inverse of the plastic number and its square: steps of the R2 sequence, which spreads points
 evenly over a square (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018)."""
 
-LIGHT_SEAT = 0.1
+SEAT_DISTANCE = 0.1
 """Largest distance of a light from the opaque part that it sits on, mm, and largest depth in a part
 of a light that lies against its face. Lights of the built-in sensors are 0.01 mm off their boards,
 and 0.2 mm or more off the transparent parts into which they shine.
 """
 
 
-REACH_OUT = 0.25
+GROWTH_SHARE = 0.25
 """Share of the sensor's largest side by which a search may enlarge it on each side: the model of a
 GelSight Mini, 28 mm long, may grow by 7 mm. A larger sensor needs a larger starting design.
 """
@@ -85,12 +85,12 @@ class PartsInContact:
             if all(same_shape(meshes[name], self._meshes[name]) for name in (one, other)):
                 continue
             first, second = self._seat(one, other)
-            if len(first.faces) < FEW and len(second.faces) < FEW:
+            if len(first.faces) < LEAST_CONTACT_POINTS and len(second.faces) < LEAST_CONTACT_POINTS:
                 continue
             kept = first.kept(meshes[one], meshes[other])
-            if kept < STILL_RESTS:
+            if kept < LEAST_KEPT_CONTACT:
                 kept = max(kept, second.kept(meshes[other], meshes[one]))
-            if kept < STILL_RESTS:
+            if kept < LEAST_KEPT_CONTACT:
                 return (
                     f"parts '{one}' and '{other}' lie on one another in the design that the search "
                     f"starts from, and here over {100 * kept:.0f} % of that area"
@@ -121,13 +121,19 @@ class ContactPoints(NamedTuple):
 
     @staticmethod
     def of(mesh: TriangleMesh, faces: NDArray[np.int64], other: TriangleMesh) -> ContactPoints:
-        """Return points spread evenly over some faces of a mesh that touch another mesh."""
+        """Return points spread evenly over some faces of a mesh that touch another mesh.
+
+        Args:
+            mesh: mesh of the points.
+            faces: indices (k,) of its faces that lie on the other mesh.
+            other: the mesh that the points touch.
+        """
         reached = np.cumsum(mesh.face_areas[faces])
         if len(faces) == 0 or reached[-1] <= 0.0:
             return ContactPoints(np.zeros(0, dtype=np.int64), np.zeros((0, 3)))
         number = np.arange(SEAT_POINTS) + 0.5
         chosen = faces[np.searchsorted(reached, reached[-1] * number / SEAT_POINTS)]
-        u, v = np.outer(PLASTIC, number) % 1.0
+        u, v = np.outer(R2_STEPS, number) % 1.0
         u, v = np.where(u + v > 1.0, 1.0 - u, u), np.where(u + v > 1.0, 1.0 - v, v)
         seat = ContactPoints(chosen, np.stack([1.0 - u - v, u, v], axis=1))
         touch = np.isfinite(near_surface(seat.points(mesh), other))
@@ -144,7 +150,7 @@ class ContactPoints(NamedTuple):
         """Return the share of the points that still touch the other part; 0 if there are too few
         points.
         """
-        if len(self.faces) < FEW:
+        if len(self.faces) < LEAST_CONTACT_POINTS:
             return 0.0
         return float(np.isfinite(near_surface(self.points(mesh), other)).mean())
 
@@ -170,7 +176,7 @@ class LightsOnSupports:
                 (group, index)
                 for group, lights in design.lights.items()
                 for index in range(len(lights.lights))
-                if _off(design, group, index, meshes[part]) <= LIGHT_SEAT
+                if _off(design, group, index, meshes[part]) <= SEAT_DISTANCE
             ]
             for part in sorted(moved)
             if part in meshes and design.parts[part].role in opaque
@@ -184,7 +190,7 @@ class LightsOnSupports:
                 if part not in meshes or group not in design.lights:
                     continue
                 off = _off(design, group, index, meshes[part])
-                if off > 2.0 * LIGHT_SEAT:
+                if off > 2.0 * SEAT_DISTANCE:
                     return (
                         f"light {index} of group '{group}' sits on part '{part}' in the design "
                         f"that the search starts from, and here it is {off:.2g} mm off"
@@ -210,7 +216,7 @@ class LightsOutsideParts:
             place = np.array(design.lights[group].lights[index].position)
             mesh = design.deformed_meshes()[part]
             deep = float(np.linalg.norm(closest_points(mesh, place) - place, axis=1).min())
-            if deep > LIGHT_SEAT:
+            if deep > SEAT_DISTANCE:
                 return (
                     f"light {index} of group '{group}' is {deep:.2g} mm inside part '{part}', "
                     "where no light can be, and is outside of it in the design that the search "
@@ -269,7 +275,7 @@ class SizeLimit:
         bounds = self._bounds(design)
         lower = np.min([each[0] for each in bounds.values()], axis=0)
         upper = np.max([each[1] for each in bounds.values()], axis=0)
-        self._most = REACH_OUT * float((upper - lower).max())
+        self._most = GROWTH_SHARE * float((upper - lower).max())
         self._lower, self._upper = lower - self._most, upper + self._most
 
     def __call__(self, design: SensorDesign) -> str | None:
@@ -319,7 +325,7 @@ class SolidsStaySolid:
 
 
 def _off(design: SensorDesign, group: str, index: int, mesh: TriangleMesh) -> float:
-    """Return the distance from a light to a mesh, mm; 0 for a light that no longer exists."""
+    """Return the distance from a light to a mesh, mm; 0 for a light that does not exist."""
     lights = design.lights[group].lights
     if index >= len(lights):
         return 0.0

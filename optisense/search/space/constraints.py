@@ -115,7 +115,7 @@ class UserRule(PickledWithoutCaches):
         """
         file, colon, self.function = text.rpartition(":")
         if not colon or not file.endswith(".py") or not self.function:
-            raise SearchError(f"'{text}' names no rule", hint="Write FILE.py:FUNCTION")
+            raise SearchError(f"'{text}' is not a rule", hint="Write FILE.py:FUNCTION")
         self.path = Path(os.path.realpath(file))
 
     def __call__(self, design: SensorDesign) -> bool | str | None:

@@ -57,7 +57,9 @@ def point_parameters(
     chosen = range(count) if spec.points is None else spec.points
     for index in chosen:
         if not 0 <= index < count:
-            raise SearchError(f"there is no point {index}", hint=f"0 to {count - 1} are there")
+            raise SearchError(
+                f"there is no control point {index}", hint=f"The cage has points 0 to {count - 1}"
+            )
     free = np.ones((count, 3), dtype=bool) if free is None else free
     images = _images(cage, spec.symmetry)
     plane = "xyz".index(spec.symmetry) if spec.symmetry else -1
@@ -83,7 +85,9 @@ def point_parameters(
             start = within(value, bounds)
             found.append(Parameter(target, bounds, start, tuple(targets), asked=path))
     if not found:
-        raise SearchError("nothing is left to vary here", hint="Name other points or axes")
+        raise SearchError(
+            "none of these coordinates has an effect", hint="Name other points or axes"
+        )
     return found
 
 

@@ -11,8 +11,8 @@ from optisense.design import SensorDesign
 from optisense.design.camera import ImagingModel
 
 LONGEST_NAME = 64
-"""Largest number of letters of a name that is made from a path; longer ones do not fit into
-tables.
+"""Largest number of letters of the name of a light group that is made for lights of another type; a
+longer one does not fit into tables.
 """
 
 
@@ -50,9 +50,17 @@ class LibraryCoating(DesignVariable):
     """Replacement of the whole coating by one of the library."""
 
     def start(self, design: SensorDesign) -> str | None:
+        """Return the name of the coating in the library, or None for a coating of the design's
+        own.
+        """
         return design.coating.library
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the coating of the library that `value` names.
+
+        Raises:
+            LibraryError: the library has no such coating.
+        """
         if value == design.coating.library:
             return design
         return design.model_copy(update={"coating": library.coating(str(value))})
@@ -66,9 +74,15 @@ class LibraryCamera(DesignVariable):
     """
 
     def start(self, design: SensorDesign) -> str:
+        """Return the name of the camera's model."""
         return design.camera.model
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the camera of the library that `value` names, in the same pose.
+
+        Raises:
+            LibraryError: the library has no such camera.
+        """
         if value == design.camera.model:
             return design
         known = library.camera(str(value))
@@ -87,9 +101,15 @@ class PartMaterial(DesignVariable):
     name: str
 
     def start(self, design: SensorDesign) -> str | None:
+        """Return the name of the part's material, or None if it has none."""
         return design.parts[self.name].material
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the part of the material that `value` names.
+
+        Raises:
+            LibraryError: neither the design nor the library has such a material.
+        """
         materials = design.materials
         if value not in materials:
             materials = {**materials, str(value): library.material(str(value))}
@@ -105,10 +125,16 @@ class GroupType(DesignVariable):
     group: str | None
 
     def start(self, design: SensorDesign) -> str | None:
+        """Return the model of the groups' lights, or None if the groups have different ones."""
         models = {design.lights[name].model for name in self._groups(design)}
         return models.pop() if len(models) == 1 else None
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with lights of the model that `value` names.
+
+        Raises:
+            LibraryError: the library has no such light.
+        """
         lights = dict(design.lights)
         for name in self._groups(design):
             if lights[name].model != value:
@@ -130,9 +156,16 @@ class LightType(DesignVariable):
     stage: ClassVar[int] = 3
 
     def start(self, design: SensorDesign) -> str:
+        """Return the model of the light's group."""
         return design.lights[self.group].model
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with this light of the model that `value` names; see
+        `with_light_types`.
+
+        Raises:
+            LibraryError: the library has no such light.
+        """
         return with_light_types(design, {(self.group, self.index): str(value)})
 
 

@@ -77,7 +77,10 @@ def expand(
                 design, found = _of_cage(design, str(steps[1]), str(steps[2]), whole, chosen)
                 return design, [replace(each, asked=path) for each in found]
         if isinstance(spec, CagePoints):
-            raise SearchError("these are no control points", hint="Vary cages.NAME.points")
+            raise SearchError(
+                "the options of control points do not apply to this path",
+                hint="Vary cages.NAME.points",
+            )
         single = _of_value(path, get_value(design, path), spec)
         return design, [replace(each, asked=path) for each in single]
     except SearchError as error:
@@ -101,7 +104,7 @@ def starred(design: SensorDesign, path: str) -> list[str]:
     names = sections.get(section)
     if names is None or "*" in leaf or not leaf:
         raise SearchError(
-            "a star stands for names of lights, parts, materials or cages",
+            "a * stands for names of lights, parts, materials or cages",
             where=path,
             hint="Write it like lights.*.colour",
         )
@@ -123,11 +126,13 @@ def _of_variable(
         if isinstance(spec, Around):
             spec = spec.about(0.0)
         if not isinstance(spec, Continuous):
-            raise SearchError("this takes a range of numbers", hint="Give LOW:HIGH")
+            raise SearchError("this parameter takes a range of numbers", hint="Give LOW:HIGH")
         assert isinstance(now, float)
         return Parameter(variable.path, spec, within(now, spec), variable=variable, asked=asked)
     if not isinstance(spec, Choice):
-        raise SearchError("this takes names to choose from", hint="Give them as NAME,NAME,...")
+        raise SearchError(
+            "this parameter takes names to choose from", hint="Give them as NAME,NAME,..."
+        )
     return Parameter(variable.path, spec, _number_of(now, spec), variable=variable, asked=asked)
 
 
@@ -140,7 +145,7 @@ def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
         return [Parameter(path, spec, _number_of(value, spec), (Target(path),))]
     if isinstance(value, bool | str) or value is None:
         raise SearchError(
-            f"the value there, {value!r}, is no number", hint="Give options: NAME,NAME,..."
+            f"the value {value!r} is not a number", hint="Give options: NAME,NAME,..."
         )
     if isinstance(value, tuple):
         letters = _letters(path, len(value))
@@ -168,7 +173,8 @@ def _bounds(value: float, spec: Specification) -> Continuous | Integer:
     if isinstance(spec, Continuous) and whole:
         if spec.low != round(spec.low) or spec.high != round(spec.high):
             raise SearchError(
-                f"the value there is a whole number, {spec.low:g} and {spec.high:g} are not both"
+                f"the value is a whole number, and the bounds {spec.low:g} and {spec.high:g} "
+                "must be, too"
             )
         return Integer(round(spec.low), round(spec.high))
     return spec

@@ -19,13 +19,13 @@ from optisense.search.space.search_space import BoundSpace, SearchSpace
 FloatArray = NDArray[np.float64]
 
 TRUNCATION = 3.0
-"""Truncation of the normal distribution of errors, in standard deviations: parts with larger errors
-fail the maker's inspection.
+"""Truncation of the normal distribution of errors, in standard deviations. Parts with larger
+errors, 0.3 % of all, are assumed to fail the manufacturer's inspection.
 """
 
 SAMPLES = 8
-"""Number of sensors with random manufacturing errors per trial; the tenth percentile of eight lies
-between the two worst.
+"""Default number of sensors with random manufacturing errors per trial: few enough for a search,
+and enough for the tenth percentile, which lies between the two worst of eight.
 """
 
 ALL_LIGHTS = {"position": "shift", "angle": "turn"}
@@ -53,7 +53,7 @@ class ToleranceDistribution:
             raise SearchError(f"an error of {self.size} is not a number above 0")
         if self.kind not in ("normal", "uniform"):
             raise SearchError(
-                f"a distribution '{self.kind}' is not known", hint="Write normal or uniform"
+                f"there is no distribution '{self.kind}'", hint="Known: normal, uniform"
             )
 
     @property
@@ -62,7 +62,11 @@ class ToleranceDistribution:
         return self.size * (TRUNCATION if self.kind == "normal" else 1.0)
 
     def errors(self, share: FloatArray) -> FloatArray:
-        """Return the errors at which the distribution function has the values `share` (0 to 1)."""
+        """Return errors (...), in the value's unit: the quantile function of the distribution.
+
+        Args:
+            share: values (...) of the distribution function, 0 to 1.
+        """
         if self.kind == "uniform":
             return np.asarray((2.0 * share - 1.0) * self.size)
         from scipy.stats import truncnorm  # takes a second to load
@@ -170,7 +174,7 @@ class BoundManufacturingErrors:
         for number, (source, spread) in enumerate(errors.distributions.items()):
             for path in _paths(design, source):
                 if path in ranges:
-                    raise SearchError(f"'{path}' is off twice", where=source)
+                    raise SearchError(f"'{path}' has two manufacturing errors", where=source)
                 prepared, found = expand(prepared, path, _all_points(path, spread))
                 ranges |= {each.name: _limits(prepared, each, source) for each in found}
                 owner += [number] * len(found)
@@ -237,7 +241,7 @@ def _paths(design: SensorDesign, source: str) -> list[str]:
     group, what = match.groups()
     if group is not None and group not in design.lights:
         raise DesignError(
-            f"'{source}' leads nowhere: there is no light group '{group}'",
+            f"the path '{source}' does not exist: there is no light group '{group}'",
             hint="Known: " + ", ".join(design.lights),
         )
     return [
@@ -263,7 +267,9 @@ def _limits(design: SensorDesign, parameter: Parameter, source: str) -> Continuo
     low = _farthest(design, name, now, kind.low)
     high = _farthest(design, name, now, kind.high)
     if low >= high:
-        raise SearchError("this value can't be off", where=source)
+        raise SearchError(
+            "the design allows only one value here, so it can't have an error", where=source
+        )
     return Continuous(low, high)
 
 

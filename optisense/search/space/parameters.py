@@ -32,11 +32,13 @@ class Continuous:
         if self.steps is not None:
             if isinstance(self.steps, bool) or not isinstance(self.steps, int) or self.steps < 2:
                 raise SearchError(
-                    f"a grid can't have {self.steps} steps from {self.low:g} to {self.high:g}",
+                    f"the number of steps from {self.low:g} to {self.high:g} is {self.steps}",
                     hint="Give 2 or more; a value that does not change needs no parameter",
                 )
             if self.steps > MOST_STEPS:
-                raise SearchError(f"{self.steps:,} steps are more than {MOST_STEPS:,}")
+                raise SearchError(
+                    f"the number of steps is {self.steps:,}; at most {MOST_STEPS:,} are allowed"
+                )
 
     @property
     def levels(self) -> tuple[float, ...] | None:
@@ -95,7 +97,7 @@ class Choice:
             raise SearchError(f"{len(frozen)} options have {len(names)} labels")
         for number, name in enumerate(names):
             if name in names[:number]:
-                raise SearchError(f"the option '{name}' is there twice")
+                raise SearchError(f"the option '{name}' is given twice")
 
     @property
     def levels(self) -> tuple[float, ...]:
@@ -117,7 +119,7 @@ class Around:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.reach) and self.reach > 0.0):
-            raise SearchError(f"a reach of {self.reach} is not a number above 0")
+            raise SearchError(f"the reach is {self.reach}, which is not a number above 0")
 
     def about(self, value: float) -> Continuous:
         """Return the bounds around a value."""
@@ -173,7 +175,7 @@ def as_specification(value: object) -> Specification:
     if isinstance(value, list):
         return Choice(value)
     raise SearchError(
-        f"{value!r} does not say what may change",
+        f"{value!r} is not a specification of a parameter",
         hint="Give (low, high), Integer(low, high), Choice([...]), Around(reach) or CagePoints",
     )
 

@@ -25,6 +25,7 @@ class _Move(DesignVariable):
     numeric: ClassVar[bool] = True
 
     def start(self, design: SensorDesign) -> float:
+        """Return 0, the value of every move in the starting design."""
         return 0.0
 
 
@@ -32,6 +33,7 @@ class GroupShift(_Move):
     """Shift of all lights of a group along an axis of the design."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the group shifted by `value` mm."""
         return _with_poses(design, self.name, np.eye(3), _along(self.axis, value))
 
 
@@ -39,6 +41,7 @@ class GroupTurn(_Move):
     """Turn of all lights of a group about an axis of the design through their middle."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the group turned by `value` degrees."""
         lights = design.lights[self.name].lights
         middle = np.mean([light.position for light in lights], axis=0)
         turn = rotation(_along(self.axis, 1.0), value)
@@ -49,6 +52,7 @@ class GroupAim(_Move):
     """Turn of each light of a group about an axis of the design through its own position."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with each light of the group turned by `value` degrees."""
         for index in range(len(design.lights[self.name].lights)):
             design = LightTurn(self.path, self.name, self.axis, index).apply(design, value)
         return design
@@ -61,6 +65,7 @@ class LightShift(_Move):
     index: int
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the light shifted by `value` mm."""
         shift = _along(self.axis, value)
         return _with_poses(design, self.name, np.eye(3), shift, only=self.index)
 
@@ -72,6 +77,7 @@ class LightTurn(_Move):
     index: int
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the light turned by `value` degrees."""
         place = np.array(design.lights[self.name].lights[self.index].position)
         turn = rotation(_along(self.axis, 1.0), value)
         return _with_poses(design, self.name, turn, place - turn @ place, only=self.index)
@@ -81,6 +87,7 @@ class CameraTurn(_Move):
     """Turn of the camera about one of its own axes: right, up, viewing direction."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the camera turned by `value` degrees."""
         turn = rotation(design.camera.axes()[self.axis], value)
         camera = design.camera.model_copy(
             update={
@@ -97,6 +104,7 @@ class PartShift(_Move):
     shapes: ClassVar[bool] = True
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the part shifted by `value` mm."""
         return _with_mesh(design, self.name, np.eye(3), _along(self.axis, value))
 
 
@@ -106,6 +114,7 @@ class PartTurn(_Move):
     shapes: ClassVar[bool] = True
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with the part turned by `value` degrees."""
         middle = design.meshes[self.name].bounds.mean(axis=0)
         turn = rotation(_along(self.axis, 1.0), value)
         return _with_mesh(design, self.name, turn, middle - turn @ middle)

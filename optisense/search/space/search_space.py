@@ -31,7 +31,7 @@ FloatArray = NDArray[np.float64]
 
 SURE_SECTIONS = ("coating", "cages", "materials")
 """Sections of a design whose numbers are limited by bounds only, so that every value between two
-valid ones is valid.
+valid ones is valid and need not be checked.
 """
 
 
@@ -64,7 +64,7 @@ class SearchSpace:
             except SearchError as error:
                 raise SearchError(error.message, where=path, hint=error.hint) from None
         if not self.parameters:
-            raise SearchError("nothing may change", hint="Name a path and its bounds")
+            raise SearchError("the space has no parameter", hint="Name a path and its bounds")
         self.constraints = tuple(constraints)
 
     def bind(self, design: SensorDesign, *, tried: bool = True) -> BoundSpace:
@@ -110,7 +110,7 @@ class BoundSpace:
         parameters: parameter of each coordinate.
         lower, upper: bounds (n,), included.
         start: the design as a point (n,), or the point nearest to it.
-        whole: coordinates (n,) that are integers (integers and choices), bool.
+        discrete: coordinates (n,) that are integers (integers and choices), bool.
         reshapes: whether a parameter moves surfaces.
     """
 
@@ -130,7 +130,7 @@ class BoundSpace:
         self.lower = np.array([_low(kind) for kind in kinds])
         self.upper = np.array([_high(kind) for kind in kinds])
         self.start = np.array([parameter.start for parameter in found])
-        self.whole = np.array([isinstance(kind, Integer | Choice) for kind in kinds])
+        self.discrete = np.array([isinstance(kind, Integer | Choice) for kind in kinds])
         sections = {parameter.name.split(".")[0] for parameter in found}
         self.reshapes = "cages" in sections or any(p.variable and p.variable.shapes for p in found)
         self._sure = sections <= set(SURE_SECTIONS) and not any(p.variable for p in found)
@@ -149,7 +149,9 @@ class BoundSpace:
         return [parameter.name for parameter in self.parameters]
 
     def values(self, vector: ArrayLike) -> dict[str, float | int | str]:
-        """Return the values of a point by parameter: numbers, and the labels of options."""
+        """Return the values of a point (n,) by the names of the parameters: numbers, and labels of
+        options.
+        """
         return {
             parameter.name: _meaning(parameter, coordinate)
             for parameter, coordinate in zip(
@@ -174,21 +176,21 @@ class BoundSpace:
         return point
 
     def check(self, vector: ArrayLike) -> None:
-        """Refuse a point outside the space.
+        """Check that a vector (n,) is a point of the space.
 
         Raises:
-            SearchError: the point is outside; the message names the first such parameter.
+            SearchError: it is not; the message names the first coordinate outside its bounds.
         """
         point = np.asarray(vector, dtype=float)
         if point.shape != (self.size,):
             raise SearchError(f"a point of this space has {self.size} numbers, not {point.shape}")
         wrong = ~((point >= self.lower) & (point <= self.upper))
-        wrong |= self.whole & (point != np.round(point))
+        wrong |= self.discrete & (point != np.round(point))
         if wrong.any():
             first = int(np.flatnonzero(wrong)[0])
             low, high = self.lower[first], self.upper[first]
             raise SearchError(
-                f"{point[first]:g} is not between {low:g} and {high:g}, or not whole",
+                f"{point[first]:g} is not between {low:g} and {high:g}, or not a whole number",
                 where=self.parameters[first].name,
             )
 
@@ -197,7 +199,7 @@ class BoundSpace:
         return np.asarray((np.asarray(vector) - self.lower) / (self.upper - self.lower))
 
     def from_unit(self, unit: ArrayLike) -> FloatArray:
-        """Return the point (..., n) for coordinates 0 to 1, clipped, and rounded where `whole`.
+        """Return the point (..., n) for coordinates 0 to 1, clipped, and rounded where `discrete`.
 
         Integers share the unit interval evenly: four options get a quarter each.
         """
@@ -205,18 +207,19 @@ class BoundSpace:
         span = self.upper - self.lower
         counted = self.lower + np.minimum(np.floor(share * (span + 1.0)), span)
         smooth = np.clip(self.lower + share * span, self.lower, self.upper)
-        return np.where(self.whole, counted, smooth)
+        return np.where(self.discrete, counted, smooth)
 
     def unit_of(self, vector: ArrayLike) -> FloatArray:
-        """Return coordinates that `from_unit` turns back into this point (integers: the middle of
-        their interval).
+        """Return the coordinates (..., n), 0 to 1, that `from_unit` maps to the points (..., n).
+
+        An integer gets the middle of its interval.
         """
         point = np.asarray(vector, dtype=np.float64)
         middle = (point - self.lower + 0.5) / (self.upper - self.lower + 1.0)
-        return np.where(self.whole, middle, self.to_unit(point))
+        return np.where(self.discrete, middle, self.to_unit(point))
 
     def apply(self, vector: ArrayLike) -> SensorDesign:
-        """Return the design at a point.
+        """Return the design at a point (n,).
 
         Raises:
             OptiSenseError: the values do not fit together.

@@ -3,7 +3,7 @@
 ```text
 vary  = PATH "=" range [ "/" NAME "=" VALUE ]...
 range = LOW ":" HIGH [ ":" STEPS ]      between two bounds
-      | "+-" REACH [ ":" STEPS ]        so far to either side of what it is now
+      | "+-" REACH [ ":" STEPS ]        a distance to either side of the present value
       | NAME "," NAME [ "," NAME ]...   one of several
 ```
 
@@ -35,7 +35,7 @@ def parse_vary(text: str) -> tuple[str, Specification]:
     """
     path, equals, rest = (part.strip() for part in text.partition("="))
     if not equals or not path or not rest:
-        raise SearchError(f"'{text}' does not say what may change", hint=EXAMPLE)
+        raise SearchError(f"'{text}' is not a parameter and its range", hint=EXAMPLE)
     given, *extra = (part.strip() for part in rest.split("/"))
     try:
         spec = _range(given)
@@ -69,9 +69,9 @@ def parse_errors(texts: list[str]) -> ManufacturingErrors:
     for text in texts:
         path, equals, size = (part.strip() for part in text.partition("="))
         if not equals or not path or not size:
-            raise SearchError(f"'{text}' is no manufacturing error", hint="Write PATH=SIZE")
+            raise SearchError(f"'{text}' is not a manufacturing error", hint="Write PATH=SIZE")
         if path in found:
-            raise SearchError(f"'{path}' is off twice")
+            raise SearchError(f"'{path}' has two manufacturing errors")
         limit = re.fullmatch(r"(?:\+-|\+/-|±)(.+)", size)
         try:
             found[path] = (

@@ -104,13 +104,13 @@ def _of_light(
 ) -> list[DesignVariable]:
     if group not in design.lights:
         raise DesignError(
-            f"'{path}' leads nowhere: 'lights' has no '{group}'",
+            f"'{path}' does not exist: 'lights' has no '{group}'",
             hint=suggestion(group, design.lights, limit=20),
         )
     count = len(design.lights[group].lights)
     if index >= count:
         raise DesignError(
-            f"'{path}' leads nowhere: the group has {count} lights",
+            f"'{path}' does not exist: the group has {count} lights",
             hint=f"Indices run from 0 to {count - 1}",
         )
     if what == "model":
@@ -125,15 +125,17 @@ def _moves(
     design: SensorDesign, path: str, section: str, name: str, what: str, letter: str | None
 ) -> list[DesignVariable]:
     if section == "camera" and what == "shift":
-        raise SearchError("the camera has a position to move", where=path, hint="camera.position.x")
+        raise SearchError(
+            "the camera has no shift", where=path, hint="Vary camera.position.x instead"
+        )
     known: Iterable[str] = design.parts if section == "parts" else design.lights
     if section != "camera" and name not in known:
         raise DesignError(
-            f"'{path}' leads nowhere: '{section}' has no '{name}'",
+            f"'{path}' does not exist: '{section}' has no '{name}'",
             hint=suggestion(name, known, limit=20),
         )
     if letter is not None and letter not in ("x", "y", "z"):
-        raise DesignError(f"'{path}' leads nowhere: there is no axis '{letter}'", hint="x, y or z")
+        raise DesignError(f"'{path}' does not exist: there is no axis '{letter}'", hint="x, y or z")
     if section == "parts":
         for cage_name, cage in design.cages.items():
             if name in cage.parts:

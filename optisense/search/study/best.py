@@ -62,7 +62,7 @@ def nearest(trials: Sequence[Trial]) -> Trial | None:
     scored = [trial for trial in trials if math.isfinite(trial.score) and not trial.is_feasible]
     if not scored or best_of(trials) is not None:
         return None
-    return min(scored, key=lambda trial: (trial.breach, -trial.score, trial.number))
+    return min(scored, key=lambda trial: (trial.violation, -trial.score, trial.number))
 
 
 def tied(trials: Sequence[Trial]) -> list[Trial]:
@@ -93,7 +93,7 @@ def tie_note(trials: Sequence[Trial]) -> str | None:
     if len(same) == len(points):
         return (
             f"all {len(same)} designs that were scored have the same score: within these bounds "
-            f"{best.objective or 'it'} does not depend on what was varied"
+            f"{best.objective or 'it'} does not depend on the parameters"
         )
     named = "the start, which changes nothing, is" if best.is_start else f"trial {best.number} is"
     return (

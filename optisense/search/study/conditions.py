@@ -27,7 +27,7 @@ def unmet(conditions: Mapping[str, float | None]) -> list[str]:
     return [
         f"{text} (is {_shown(value)})"
         for text, value in conditions.items()
-        if Requirement.parse(text).breach(math.nan if value is None else value) > 0.0
+        if Requirement.parse(text).violation(math.nan if value is None else value) > 0.0
     ]
 
 
@@ -41,15 +41,17 @@ def margins(trial: Trial) -> list[tuple[str, float | None, float | None]]:
     ]
 
 
-def kept(trial: Trial, start: Trial | None) -> list[str]:
-    """Return a line for each condition: the value of a trial, that of the start, and the margin."""
+def condition_lines(trial: Trial, start: Trial | None) -> list[str]:
+    """Return a line of text for each condition: value of a trial, margin, and value of the
+    start.
+    """
     lines = []
     for text, value in trial.conditions.items():
         wanted = Requirement.parse(text)
         measured = math.nan if value is None else value
         before = None if start is None else start.conditions.get(text)
         margin = wanted.margin(measured)
-        state = f"margin {margin:.3g}" if wanted.breach(measured) == 0.0 else "broken"
+        state = f"margin {margin:.3g}" if wanted.violation(measured) == 0.0 else "broken"
         beside = "" if before is None else f", start {_shown(before)}"
         lines.append(f"{text}: {_shown(value)} ({state}{beside})")
     return lines
@@ -73,7 +75,7 @@ def condition_note(trials: Sequence[Trial]) -> str | None:
     return f"the start breaks conditions, which is allowed: {', '.join(unmet(start.conditions))}"
 
 
-def lost(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
+def worsened(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
     """Return the quantities without a condition that are worse in the best outcome than in the
     start, by the name of the objective.
 
@@ -94,7 +96,7 @@ def worsened_note(best: Trial | None, start: Trial | None) -> str | None:
     """Return a note for the user if the score rose at the cost of another quantity, else None."""
     if best is None or start is None or best.is_start or not best.score > start.score:
         return None
-    worse = lost(best.outcome, start.outcome)
+    worse = worsened(best.outcome, start.outcome)
     if not worse:
         return None
     phrases = ", ".join(

@@ -8,7 +8,7 @@ from optisense.errors import SearchError
 from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.coarse import CoarseEvaluator
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
-from optisense.search.evaluation.relit import RelitEvaluator, is_relit
+from optisense.search.evaluation.relit import RelitEvaluator, can_relight
 from optisense.search.methods import Method
 from optisense.search.space.manufacturing import ManufacturingErrors
 from optisense.search.study.study import Study
@@ -27,7 +27,7 @@ def evaluators(study: Study, usual: DesignEvaluator, method: Method) -> tuple[Ev
         SearchError: the study has manufacturing errors, which the method can't apply.
     """
     own = method.evaluator(usual)
-    if own is usual and study.settings.errors is None and is_relit(usual):
+    if own is usual and study.settings.errors is None and can_relight(usual):
         relit = RelitEvaluator(usual)
         return relit, relit
     if study.settings.errors is not None and own is not usual:

@@ -18,11 +18,13 @@ SQLITE_ENDINGS = ("", "-wal", "-shm", "-journal")
 """Endings that SQLite appends to the name of a store for the files that it keeps beside it."""
 
 MOST_SHOWN = 8
-"""Number of differences between settings that an error lists; the others are counted."""
+"""Largest number of differences between settings that an error lists; the others are counted, so
+that the message fits on a screen.
+"""
 
 
-def begin(folder: Path, design: SensorDesign) -> FolderLock:
-    """Take the lock of a folder for a new study, and record which files it will have.
+def lock_new_folder(folder: Path, design: SensorDesign) -> FolderLock:
+    """Lock a folder for a new study, and record which files it will have.
 
     Raises:
         SearchError: there is a study in the folder.
@@ -35,7 +37,7 @@ def begin(folder: Path, design: SensorDesign) -> FolderLock:
             raise SearchError(
                 "there is a study in this folder already",
                 where=str(folder),
-                hint="Go on with it by --resume, or name another folder",
+                hint="Continue it with --resume, or name another folder",
             )
         lock.check_empty()
         inner = [f"{DESIGN_FOLDER}/{file}" for file in (*files_of(design), LOCK_FILE)]
@@ -46,7 +48,7 @@ def begin(folder: Path, design: SensorDesign) -> FolderLock:
     return lock
 
 
-def kept(folder: Path, design: SensorDesign) -> SensorDesign:
+def save_and_reload(folder: Path, design: SensorDesign) -> SensorDesign:
     """Save the design, and return it as it is read again, so that a resumed study has exactly the
     same one.
     """
@@ -54,7 +56,7 @@ def kept(folder: Path, design: SensorDesign) -> SensorDesign:
     return load_design(folder / DESIGN_FOLDER)
 
 
-def as_begun(folder: Path, settings: StudySettings, store: Store) -> SensorDesign:
+def unedited_design(folder: Path, settings: StudySettings, store: Store) -> SensorDesign:
     """Return the study's own design, after a check that neither it nor the settings were edited.
 
     Raises:

@@ -121,7 +121,7 @@ class StudyRun:
         self._doing = ""
         self._pace = math.nan
 
-    def go(self) -> SearchResult:
+    def run(self) -> SearchResult:
         """Run to the end, or until Ctrl-C; the caller unlocks the study.
 
         Raises:
@@ -150,22 +150,22 @@ class StudyRun:
                 self._score_start(runner)
                 self._begin(TRIALS, self._tally.done)
                 ended = self._search(runner)
-                self._look(last=True)
+                self._watch_reading(last=True)
                 self._report(now=True)
                 if not self._coarse:
                     self._begin(FRESH)
-                    rescore(study, partial(self._work_fresh, runner))
+                    rescore(study, partial(self._score_fresh, runner))
             if self._coarse:
                 with self._running(self._full) as runner:
                     self._begin(FRESH)
-                    promote(study, partial(self._work_fresh, runner))
+                    promote(study, partial(self._score_fresh, runner))
         except KeyboardInterrupt:
             interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
         study.store.set_fact("stage", None)
         if not interrupted and self._tally.has_no_score:
             raise self._tally.all_failed()
-        several = self.method.several  # the result is a front, not one best trial
+        several = self.method.multi_objective  # the result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
         found_notes = [tie, condition_note(study.trials)]
         found_notes += [] if several else [worsened_note(study.best, study.start)]
@@ -192,7 +192,7 @@ class StudyRun:
         while True:
             asked = self.method.ask()
             rows = self.study.store.rows(generation) if generation <= known else []
-            self._compare(asked, rows)
+            self._check_proposals(asked, rows)
             room = self.limit - self.study.store.proposed_before(generation)
             missing = asked[len(rows) :][: max(0, room - len(rows))]
             if len(missing):
@@ -200,18 +200,18 @@ class StudyRun:
                 rows = self.study.store.rows(generation)
             if not rows:
                 return "the method has finished" if not len(asked) else "the budget is spent"
-            self._work(runner, rows)
+            self._score_rows(runner, rows)
             whole = self.study.store.rows(generation)
             if len(whole) < len(asked):
                 return "the budget is spent"
             outcomes = [row.outcome for row in whole if row.outcome is not None]
             self.method.tell(np.array([row.vector for row in whole]), outcomes)
             generation += 1
-            self._look()
+            self._watch_reading()
 
-    def _look(self, *, last: bool = False) -> None:
+    def _watch_reading(self, *, last: bool = False) -> None:
         """Read the best design so far, unless the method looks for a front."""
-        if not self.method.several:
+        if not self.method.multi_objective:
             self._watch.look(last=last)
 
     def _score_start(self, runner: Runner) -> None:
@@ -220,9 +220,9 @@ class StudyRun:
         if not rows:
             store.propose(START, self.study.space.start[None])
             rows = store.rows(START)
-        self._work(runner, rows)
+        self._score_rows(runner, rows)
 
-    def _work(self, runner: Runner, rows: Sequence[Row]) -> None:
+    def _score_rows(self, runner: Runner, rows: Sequence[Row]) -> None:
         """Score the rows that are not finished, and write each as it finishes.
 
         A point that was scored before keeps its score: a grid holds the start, and choices and
@@ -247,9 +247,9 @@ class StudyRun:
                 jobs.append((row.number, row.vector, self.study.settings.seed))
             else:
                 finished(row.number, replace(known, seconds=0.0))
-        self._each(runner, jobs, finished)
+        self._run_jobs(runner, jobs, finished)
 
-    def _work_fresh(
+    def _score_fresh(
         self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int, later: float
     ) -> list[Outcome]:
         """Score trials with other seeds; `more` such scores may follow for these trials, and
@@ -271,10 +271,10 @@ class StudyRun:
             self._report(now=True)
 
         numbered = [(k, trial.vector, seed) for k, (trial, seed) in enumerate(jobs)]
-        self._each(runner, numbered, finished)
+        self._run_jobs(runner, numbered, finished)
         return [found[number] for number in range(len(jobs))]
 
-    def _each(
+    def _run_jobs(
         self,
         runner: Runner,
         jobs: Sequence[tuple[int, np.ndarray, int]],
@@ -288,7 +288,7 @@ class StudyRun:
                 number, vector, seed = waiting.pop()
                 future = runner.submit(vector, seed)
                 open_jobs += 1
-                future.add_done_callback(partial(self._hand_over, number))
+                future.add_done_callback(partial(self._enqueue, number))
             try:
                 number, done = self._finished.get(timeout=TICK)
             except queue.Empty:
@@ -297,11 +297,11 @@ class StudyRun:
             open_jobs -= 1
             finished(number, outcome_of(done))
 
-    def _hand_over(self, number: int, done: Future[Outcome]) -> None:
+    def _enqueue(self, number: int, done: Future[Outcome]) -> None:
         """Queue a finished trial; it is called in the thread where the trial finished."""
         self._finished.put((number, done))
 
-    def _compare(self, asked: np.ndarray, rows: Sequence[Row]) -> None:
+    def _check_proposals(self, asked: np.ndarray, rows: Sequence[Row]) -> None:
         """Note if the method proposes other points than it did before."""
         if not rows or self._notes:
             return
@@ -316,8 +316,8 @@ class StudyRun:
         ]
         why = ", ".join(changed) or "another machine computes differently in the last digit"
         self._notes.append(
-            "the method would have proposed other points than when the study was begun "
-            f"({why}): it goes on from the trials that are there"
+            "the method would propose other points than when the study was begun "
+            f"({why}): it continues from the stored trials"
         )
 
     def _begin(self, stage: str, done: float = 0.0) -> None:
@@ -381,7 +381,7 @@ class StudyRun:
                 failed=tally.failed,
                 broken=tally.broken,
                 nearest=tally.nearest_note(),
-                lost=tally.lost(),
+                worsened=tally.worsened(),
                 best=tally.best,
                 start=tally.start,
                 trials_per_hour=self._trials_an_hour,

@@ -16,7 +16,7 @@ from optisense.objectives.combined import goal_of
 from optisense.objectives.settings import size_for
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
-from optisense.search.evaluation.relit import is_relit
+from optisense.search.evaluation.relit import can_relight
 from optisense.search.evaluation.requirements import requirements_of
 from optisense.search.methods import Method, Problem, find, make
 from optisense.search.methods import names as method_names
@@ -87,11 +87,11 @@ class Plan:
             )
         budget = self.budget
         if budget is None:
-            budget = chosen.usual_budget(bound)
+            budget = chosen.default_budget(bound)
         if budget < 1:
-            raise SearchError(f"a budget of {budget} trials is nothing", hint="Give 1 or more")
+            raise SearchError(f"the budget is {budget} trials", hint="Give 1 or more")
         if not 0 <= self.seed < 2**32:
-            raise SearchError(f"the seed is {self.seed}", hint="Give 0 to 4294967295")
+            raise SearchError(f"the seed is {self.seed}", hint="Give a number from 0 to 4294967295")
         options = dict(self.options or {})
         names = tuple(evaluator.names)
         make(self.method, Problem(bound, names, budget, self.seed, tuple(kept)), options)
@@ -128,8 +128,8 @@ class Plan:
         Raises:
             SearchError: they do not fit the plan.
         """
-        if not method.may_be_coarse:
-            able = [name for name in method_names() if find(name).may_be_coarse]
+        if not method.accepts_coarse_scores:
+            able = [name for name in method_names() if find(name).accepts_coarse_scores]
             raise SearchError(
                 f"{self.method} can't search by coarse scores",
                 hint=f"Use {', '.join(able)}, or leave --coarse-first out",
@@ -140,7 +140,7 @@ class Plan:
                 "save no time",
                 hint="Leave --coarse-first out",
             )
-        if self.errors is None and is_relit(evaluator):
+        if self.errors is None and can_relight(evaluator):
             raise SearchError(
                 "only colours and powers of lights vary, so trials render no image, and coarse "
                 "scores would save no time",

@@ -24,8 +24,8 @@ class SearchProgress:
         broken: number of finished trials that break a condition.
         nearest: conditions that the trial nearest to feasibility breaks; empty as soon as a trial
             meets them all.
-        lost: watched quantities, such as coverage, that are worse in the best trial so far than in
-            the start.
+        worsened: watched quantities, such as coverage, that are worse in the best trial so far
+            than in the start.
         best: best score so far of trials that meet all conditions; NaN before there is one.
         start: score of the start.
         trials_per_hour: rate of the last trials; 0 before it is known.
@@ -47,7 +47,7 @@ class SearchProgress:
     doing: str = ""
     broken: int = 0
     nearest: str = ""
-    lost: tuple[str, ...] = ()
+    worsened: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -26,18 +26,18 @@ BATCH = 3
 between full and coarse scores varies. More would take most of the time of a search of 40 trials.
 """
 
-LEAST_MOST, PROMOTED_SHARE = 6, 0.1
+LEAST_PROMOTED, PROMOTED_SHARE = 6, 0.1
 """Largest number of trials that get full scores: a tenth of all trials, or 6 if that is more. A
 full score takes as long as six coarse ones.
 """
 
-SURE = 2.0
+DEVIATIONS = 2.0
 """Number of standard deviations by which the full score of a trial may exceed what its coarse score
 suggests. A trial that would not lead even then is not promoted (95 % of a normal distribution are
 within two).
 """
 
-NEAR = 0.02
+SAME_DESIGN = 0.02
 """Largest difference between two points, as a share of each range, at which they count as the same
 design, so that only the better one is promoted: the last trials of CMA-ES are nearly equal.
 """
@@ -49,7 +49,7 @@ def promote(study: Study, work: Work) -> None:
     The start gets one full score, and further ones only if chance may be why it is worse than the
     trial that leads.
 
-    Scores that exist are kept, so that a study that was stopped meanwhile goes on.
+    Scores that exist are kept, so that a study that was stopped meanwhile continues.
 
     Args:
         study: study whose trials have coarse scores.
@@ -59,7 +59,7 @@ def promote(study: Study, work: Work) -> None:
     trials = study.trials
     start = [trial for trial in trials if trial.is_start and math.isfinite(trial.score)]
     waiting = _different([trial for trial in ranked(trials) if not trial.is_start])
-    most = max(LEAST_MOST, math.ceil(PROMOTED_SHARE * len(trials)))
+    most = max(LEAST_PROMOTED, math.ceil(PROMOTED_SHARE * len(trials)))
     promoted: list[Trial] = []
     while waiting and len(promoted) < (most if _leader(promoted) else MOST_BROKEN):
         batch = _promising(promoted, waiting[:BATCH])
@@ -81,7 +81,7 @@ def _may_be_as_good(trial: Trial, leader: Trial) -> bool:
     """Return whether chance may be why a trial with one full score is worse than the leader, whose
     scores tell by how much two scores of a design differ.
     """
-    chance = SURE * math.sqrt(2.0) * leader.fresh_spread()
+    chance = DEVIATIONS * math.sqrt(2.0) * leader.fresh_spread()
     return trial.fresh_score() > leader.fresh_score() - chance
 
 
@@ -94,7 +94,7 @@ def _promising(promoted: Sequence[Trial], batch: Sequence[Trial]) -> list[Trial]
         return list(batch)
     shifts = np.array([trial.fresh_score() - trial.score for trial in promoted])
     known = shifts[np.isfinite(shifts)]
-    slack = SURE * float(known.std(ddof=1)) if len(known) > 1 else math.inf
+    slack = DEVIATIONS * float(known.std(ddof=1)) if len(known) > 1 else math.inf
     least = leader.fresh_score() - float(known.mean()) - slack
     return [trial for trial in batch if trial.score > least]
 
@@ -120,7 +120,7 @@ def _scored(
 
 
 def _different(trials: Sequence[Trial]) -> list[Trial]:
-    """Return the trials without those that are nearly equal (`NEAR`) to one before them."""
+    """Return the trials without those that are nearly equal (`SAME_DESIGN`) to one before them."""
     if not trials:
         return []
     space = trials[0].space
@@ -130,7 +130,7 @@ def _different(trials: Sequence[Trial]) -> list[Trial]:
     points = np.empty((0, space.size))
     for trial in trials:
         point = trial.vector / span
-        if not (np.abs(points - point) <= NEAR).all(axis=1).any():
+        if not (np.abs(points - point) <= SAME_DESIGN).all(axis=1).any():
             kept.append(trial)
             points = np.vstack([points, point])
     return kept

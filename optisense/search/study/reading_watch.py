@@ -86,7 +86,9 @@ class ReadingWatch:
             )
         row = next(each for each in study.store.rows() if each.number == number)
         try:
-            found: Outcome = self._reader.judge(study.space.apply(row.vector), study.settings.seed)
+            found: Outcome = self._reader.evaluate(
+                study.space.apply(row.vector), study.settings.seed
+            )
         except OptiSenseError:
             return None
         return None if found.failed else -next(iter(found.scores.values()))

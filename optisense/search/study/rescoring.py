@@ -24,7 +24,7 @@ SEEDS = 3
 well the mean is known.
 """
 
-MOST = 5
+MOST_RESCORED = 5
 """Largest number of trials that are scored again, which bounds the time at the end of a search."""
 
 MOST_BROKEN = 20
@@ -56,17 +56,17 @@ def rescore(study: Study, work: Work) -> None:
     fine = ranked(trials)
     start = [trial for trial in fine if trial.is_start]
     others = [trial for trial in fine if not trial.is_start]
-    if find(study.settings.method).several:
-        _score([*start, *_spread_out(study)], seeds, work)
+    if find(study.settings.method).multi_objective:
+        _score([*start, *_along_front(study)], seeds, work)
         return
     best = -math.inf
     if start and not others and study.settings.requirements:
         _score(start, seeds, work)
     for number, trial in enumerate(others[:MOST_BROKEN]):
-        if trial.score <= best or (number >= MOST and best > -math.inf):
+        if trial.score <= best or (number >= MOST_RESCORED and best > -math.inf):
             return  # even with its luck it is not better, or enough were scored
         scored = [trial, *start] if number == 0 else [trial]
-        rivals = others[number + 1 : MOST]
+        rivals = others[number + 1 : MOST_RESCORED]
         again = _score(scored, seeds, work, [each.score for each in rivals], best)[0]
         if again.is_feasible and math.isfinite(again.fresh_score()):
             best = max(best, again.fresh_score())
@@ -125,10 +125,10 @@ def _likely(rivals: Sequence[float], best: float) -> float:
     return 0.5 * (above + 1) if above else 0.0
 
 
-def _spread_out(study: Study) -> list[Trial]:
+def _along_front(study: Study) -> list[Trial]:
     """Return some trials of the front, from one end to the other."""
     front = study.front
-    if len(front) <= MOST:
+    if len(front) <= MOST_RESCORED:
         return front
-    places = np.linspace(0, len(front) - 1, MOST).round().astype(int)
+    places = np.linspace(0, len(front) - 1, MOST_RESCORED).round().astype(int)
     return [front[place] for place in places]

@@ -135,7 +135,9 @@ class StudySettings:
         path = folder / STUDY_FILE
         if not is_file(path):
             raise SearchError(
-                "there is no study here", where=str(folder), hint="Name the folder given as --out"
+                "there is no study in this folder",
+                where=str(folder),
+                hint="Name the folder given as --out",
             )
         data = read_json(path, SearchError)
         if not isinstance(data, dict):

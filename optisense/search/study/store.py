@@ -86,7 +86,7 @@ class Store:
     """Trials of one study.
 
     A store that was opened is only read: nothing is written in its folder, and commits of another
-    process are seen. `write` opens it for writing, by one process at a time.
+    process are seen. `open_writer` opens it for writing, by one process at a time.
     """
 
     def __init__(self, path: Path | None, objectives: Sequence[str]) -> None:
@@ -110,7 +110,7 @@ class Store:
         store = Store(path, objectives)
         with translated_errors(path):
             store._connect("rwc")
-            with store._together() as db:
+            with store._transaction() as db:
                 for statement in _TABLES.split(";"):
                     db.execute(statement)
                 db.execute(f"pragma user_version = {STORE_VERSION}")
@@ -141,7 +141,7 @@ class Store:
             raise damaged("the store", path, f"it has a {strange[0]} that is none of a study's")
         return store
 
-    def write(self) -> None:
+    def open_writer(self) -> None:
         """Open the store for writing; the caller holds the lock of the folder.
 
         Raises:
@@ -159,7 +159,7 @@ class Store:
                 if not _has_conditions(self._writer):
                     self._writer.execute("alter table fresh_scores add column conditions text")
 
-    def only_read(self) -> None:
+    def close_writer(self) -> None:
         """Close the file for writing; the write-ahead log is merged into it."""
         if self.path is not None:
             self.close()
@@ -222,7 +222,7 @@ class Store:
             (first + k, generation, place + k, np.ascontiguousarray(vector, "<f8").tobytes())
             for k, vector in enumerate(vectors)
         ]
-        with translated_errors(self.path), self._together() as db:
+        with translated_errors(self.path), self._transaction() as db:
             db.executemany(
                 "insert into trials (number, generation, place, vector) values (?, ?, ?, ?)", rows
             )
@@ -366,7 +366,7 @@ class Store:
         return dict(zip(self.objectives, np.frombuffer(blob, "<f8").tolist(), strict=True))
 
     @contextmanager
-    def _together(self) -> Iterator[sqlite3.Connection]:
+    def _transaction(self) -> Iterator[sqlite3.Connection]:
         """Run the block as one transaction, which is committed whole or not at all."""
         db = self._writer
         db.execute("begin immediate")

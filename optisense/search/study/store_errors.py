@@ -42,7 +42,7 @@ def _error(error: Exception, path: Path | None) -> OptiSenseError:
     text = str(error)
     if isinstance(error, MemoryError | UnicodeDecodeError):
         # SQLite also reports pages with impossible content like this.
-        return damaged("the study's store", path, text or "its pages make no sense")
+        return damaged("the study's store", path, text or "its pages have no valid content")
     if "full" in text:
         return OutputError("the disk is full", where=where, hint="Free some space on it")
     if any(sign in text for sign in ("not a database", "malformed", "no such table")):

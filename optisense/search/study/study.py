@@ -28,7 +28,13 @@ from optisense.search.methods.dominance import front as front_of
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.best import best_of, nearest
-from optisense.search.study.folder import STORE_FILE, as_begun, begin, kept, listed
+from optisense.search.study.folder import (
+    STORE_FILE,
+    listed,
+    lock_new_folder,
+    save_and_reload,
+    unedited_design,
+)
 from optisense.search.study.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
 from optisense.search.study.settings import StudySettings
 from optisense.search.study.store import Row, Store
@@ -91,11 +97,11 @@ class Study:
             settings = plan.settings_for(design)
             in_memory = Store.create(None, settings.names)
             return Study(None, settings, design, plan.goals, rules, in_memory)
-        lock = begin(place, design)
+        lock = lock_new_folder(place, design)
         store: Store | None = None
         try:
             settings = plan.settings_for(design)
-            design = kept(place, design)
+            design = save_and_reload(place, design)
             settings = replace(settings, fingerprint=fingerprint(design))
             store = Store.create(place / STORE_FILE, settings.names)
             store.set_fact("settings", settings.fingerprint_of_all())
@@ -137,7 +143,7 @@ class Study:
             raise SearchError(f"the study has no {STORE_FILE}", where=str(place))
         store = Store.open(place / STORE_FILE, settings.names)
         try:
-            own = as_begun(place, settings, store)
+            own = unedited_design(place, settings, store)
             if design is not None:
                 changed = differences(own, with_own_lights(design))
                 if changed:
@@ -168,9 +174,9 @@ class Study:
         changed = plain_differences({key: here[key] for key in there}, there)
         if changed:
             raise SearchError(
-                f"the study was begun otherwise:\n{listed(changed)}",
+                f"the study was begun with other settings:\n{listed(changed)}",
                 where=str(self.folder or "the study"),
-                hint="Go on with it as it was begun, or begin a new one with another --out",
+                hint="Continue it with its own settings, or begin a new study with another --out",
             )
 
     @property
@@ -200,22 +206,22 @@ class Study:
         if lacks_goals or lacks_rules:
             raise SearchError(
                 f"only the program that began this study knows {', '.join(unknown)}",
-                hint="Go on with it from that program",
+                hint="Continue it from that program",
             )
         now = file_prints(known)
         for path, print_before in self.settings.files.items():
             if now.get(path) != print_before:
                 raise SearchError(
-                    "the file has gone or was edited since the study's trials were made",
+                    "the file is missing or was edited since the study's trials were scored",
                     where=path,
                     hint="Undo the change, or begin a new study",
                 )
         strange = [] if self._trusted else not_trusted(known)
         if strange:
             raise SearchError(
-                f"the study runs Python code that you have not named: {', '.join(strange)}",
+                f"the study runs Python code that you did not name: {', '.join(strange)}",
                 where=str(self.folder),
-                hint="Read it; if you trust it, go on once with optisense search --resume --trust",
+                hint="Read it; if you trust it, continue with optisense search --resume --trust",
             )
         settings = self.settings
         return DesignEvaluator(
@@ -275,11 +281,11 @@ class Study:
                 number = int(which)
             except ValueError:
                 hint = "Write best, start, or its number"
-                raise SearchError(f"'{which}' is no trial", hint=hint) from None
+                raise SearchError(f"'{which}' is not a trial", hint=hint) from None
             found = next((trial for trial in trials if trial.number == number), None)
         if found is None:
             last = max((trial.number for trial in trials), default=-1)
-            hint = f"Trials 0 to {last} are there" if trials else "No trial is finished yet"
+            hint = f"The study has trials 0 to {last}" if trials else "No trial is finished yet"
             if which == "best" and trials:
                 hint = "All trials failed"
                 close = nearest(trials)
@@ -312,7 +318,7 @@ class Study:
             return
         if self._lock is None:
             self._lock = FolderLock(self.folder)
-        self.store.write()
+        self.store.open_writer()
 
     @property
     def is_new(self) -> bool:
@@ -322,7 +328,7 @@ class Study:
     def unlock(self) -> None:
         """Release the lock; the study can still be read."""
         if self._lock is not None:
-            self.store.only_read()
+            self.store.close_writer()
             self._lock.release()
             self._lock = None
 

@@ -6,7 +6,7 @@ import math
 
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.study.conditions import lost, unmet
+from optisense.search.study.conditions import unmet, worsened
 from optisense.search.study.failures import cause_of
 from optisense.search.study.store import START, Row
 
@@ -65,7 +65,7 @@ class Tally:
             if outcome.is_feasible and not score <= self.best:
                 self.best, self._best_outcome = score, outcome
                 self._best_number = row.number
-            if self._nearest is None or outcome.breach < self._nearest.breach:
+            if self._nearest is None or outcome.violation < self._nearest.violation:
                 self._nearest = outcome
         enough = ALL_FAIL_WITH_START if math.isnan(self.start) else ALL_FAIL
         if self.failed == self.done >= enough:
@@ -108,7 +108,7 @@ class Tally:
         if number == self._best_number:
             self._best_outcome = outcome
 
-    def lost(self) -> tuple[str, ...]:
+    def worsened(self) -> tuple[str, ...]:
         """Return the watched quantities that are worse in the best trial so far than in the
         start.
         """
@@ -116,5 +116,5 @@ class Tally:
         if not leading:
             return ()
         (_, start), (_, best) = leading
-        worse = lost(best, start)
+        worse = worsened(best, start)
         return tuple(f"{name} {now:.3g} (start {was:.3g})" for name, (now, was) in worse.items())

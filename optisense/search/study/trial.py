@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from optisense.design import SensorDesign
 from optisense.objectives.score import deviation_of
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.evaluation.requirements import breach_of
+from optisense.search.evaluation.requirements import total_violation
 from optisense.search.space.search_space import BoundSpace
 
 
@@ -76,14 +76,14 @@ class Trial:
         return {text: _mean([each.get(text) for each in again]) for text in again[0]}
 
     @property
-    def breach(self) -> float:
+    def violation(self) -> float:
         """Sum of the violations of the study's conditions; 0 if all are met."""
-        return breach_of(self.conditions) if self.fresh else self.outcome.breach
+        return total_violation(self.conditions) if self.fresh else self.outcome.violation
 
     @property
     def is_feasible(self) -> bool:
         """True if all conditions of the study are met."""
-        return self.breach == 0.0
+        return self.violation == 0.0
 
     @property
     def values(self) -> dict[str, float | int | str]:

@@ -20,7 +20,7 @@ from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
-from optisense.search.executors import Runner, SerialRunner, Workers, runner_of
+from optisense.search.executors import Runner, SerialRunner, Workers, create_runner
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.study.failures import cause_of
 from optisense.search.study.rescoring import fresh_seeds
@@ -35,11 +35,13 @@ from optisense.time_left import TimedStep, TimeLeft
 FloatArray = NDArray[np.float64]
 
 SENSORS = 120
-"""Number of sensors that are tried where none is given."""
+"""Default number of sensors with manufacturing errors. They render in about ten minutes, and shares
+of five errors then have a standard error of up to 0.3 (docs/tolerance.md).
+"""
 
 LEAST_ROWS = 8
-"""Smallest number of rows of sensors; each row is one sensor, and one more for each source of
-error.
+"""Smallest number of rows of sensors, twice the pairs that an estimate of a share needs; each row
+is one sensor, and one more for each source of error.
 """
 
 NOISE_SEEDS = 3
@@ -59,14 +61,14 @@ index. They are assumptions for a sensor that is built by hand: LEDs soldered to
 glued in, a printed mould, silicone and resin of another batch.
 """
 
-FIRST, SENSORS_STEP = "the design itself", "sensors"
+FIRST, SENSORS_STEP = "the nominal design", "sensors"
 """Stages for estimates of the time left: the first score, which includes compiling, and all
 others.
 """
 
 ToleranceCallback = Callable[[int, int, float, str], None]
 """Function that is called with the number of finished scores, the number of all, the seconds left
-(NaN if unknown), and the stage of the current score, if it is worked out in this process.
+(NaN if unknown), and the stage of the current score, if it is computed in this process.
 """
 
 
@@ -208,7 +210,7 @@ def tolerance(
     nominal = bound.points(np.zeros(bound.size))
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
-    with runner_of(evaluator, workers, on_wait) as runner:
+    with create_runner(evaluator, workers, on_wait) as runner:
         show = progress or (lambda done, of, left, doing: None)
         usual = evaluator.usual_trials()
         steps = tolerance_steps(len(jobs) - OWN_SCORES, usual, runner.workers)
@@ -222,7 +224,7 @@ def tolerance(
     if itself[0] is None:
         raise KeyboardInterrupt
     if itself[0].failed:
-        raise SearchError(f"the design itself has no score: {itself[0].failure}")
+        raise SearchError(f"the nominal design has no score: {itself[0].failure}")
     if whole > 0:
         outcomes = [each for each in tried[: whole * count] if each is not None]
         shape = whole, count

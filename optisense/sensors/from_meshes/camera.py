@@ -67,7 +67,7 @@ def make_camera(
             way = -vector(choice.direction)
         if np.linalg.norm(way) < 1e-3:
             raise DesignError(
-                "the sensing surface looks to all sides, so no place for the camera can be told",
+                "the sensing surface faces all sides, so a place for the camera can't be derived",
                 where="camera",
                 hint="Give its place: at: [x, y, z]",
             )

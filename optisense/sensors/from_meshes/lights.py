@@ -221,7 +221,7 @@ def _mean_direction(mesh: TriangleMesh, patch: Faces, where: str) -> FloatArray:
     length = float(np.linalg.norm(normal))
     if length < SPREAD:
         raise DesignError(
-            "this surface looks to all sides at once, so where its lights belong can't be told",
+            "this surface faces all sides, so the places of its lights can't be derived",
             where=where,
             hint="Say which faces with towards: (+z, -x, ...), or use a ring",
         )

@@ -35,7 +35,7 @@ class ShapeReference(Model):
     solid: str | None = Field(default=None, description="which body of a STEP file")
     units: Units | None = Field(default=None, description="of this file, if not as the others")
     faces_of: Name | None = Field(default=None, description="the part whose faces these are")
-    towards: Way | None = Field(default=None, description="only the faces that look there")
+    towards: Way | None = Field(default=None, description="only the faces that point there")
     within: Angle | None = Field(default=None, description="degrees, how far they may look aside")
     tangent: bool | None = Field(
         default=None, description="and those that go on from them without a sharp edge"

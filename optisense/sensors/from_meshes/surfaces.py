@@ -40,7 +40,7 @@ def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
     if len(faces) == 0:
         nearest = angle_to_nearest(mesh, way)
         raise DesignError(
-            f"no face looks to {said(shape.towards)} within {within:g} degrees; the nearest one "
+            f"no face points to {said(shape.towards)} within {within:g} degrees; the nearest one "
             f"looks {nearest:.0f} degrees aside",
             where=where,
             hint="Choose another direction after towards, or a larger within",
@@ -71,6 +71,6 @@ def chosen(mesh: TriangleMesh, shape: ShapeReference, where: str) -> tuple[Trian
     taken = float(mesh.face_areas[found[0]].sum())
     note = (
         f"{count} of {left:.3g} mm2 beside the {taken:.3g} mm2 chosen "
-        f"also look to {said(shape.towards)}; 'patches: all' takes them in"
+        f"also point to {said(shape.towards)}; 'patches: all' includes them"
     )
     return mesh.with_faces(mesh.faces[found[0]]).compacted(), [note]

@@ -24,7 +24,7 @@ from optisense.errors import NoDerivativeError, OptiSenseError
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import FloatArray
-from optisense.search.methods.jacobian import Jacobian, holds, jacobian
+from optisense.search.methods.jacobian import Jacobian, jacobian, predicts
 from optisense.search.methods.score_differences import STEP, ScoreDifferences
 from optisense.search.methods.smooth_scores import SmoothScore
 from optisense.search.space.pickling import PickledWithoutCaches
@@ -32,7 +32,7 @@ from optisense.search.space.pickling import PickledWithoutCaches
 if TYPE_CHECKING:
     from optisense.optics.transport.ray_gradient import DifferentiableRays
 
-FEW = 8
+FEW_PARAMETERS = 8
 """Largest number of parameters for which central differences by each parameter need no more scores
 than ray derivatives with their check. Differences over `STEP` also see past the small hills of a
 true score, on which ascents by derivatives end.
@@ -71,6 +71,7 @@ two steps. If it does not, the score has no derivative at this scale.
 
 RAYS, DIFFERENCES = "derivatives of rays", "differences of scores"
 LAYERS = "differences of scores of relit pictures"
+"""Sources of gradients, as outcomes and notes name them."""
 
 
 class Agreement(Enum):
@@ -81,7 +82,7 @@ class Agreement(Enum):
     UNSTEADY = "differences over the two steps disagree: the score steps or has a kink"
 
 
-class CheckedSlope(NamedTuple):
+class CheckedGradient(NamedTuple):
     """Values and gradients at a point.
 
     Attributes:
@@ -108,7 +109,7 @@ class _Check(NamedTuple):
     typical: float
 
 
-class SlopeEvaluator(PickledWithoutCaches):
+class GradientEvaluator(PickledWithoutCaches):
     """Evaluator that scores a point as usual, and adds the smoothed values and gradients of the
     score and of the quantities that conditions limit.
     """
@@ -153,7 +154,7 @@ class SlopeEvaluator(PickledWithoutCaches):
             return outcome
         began = time.perf_counter()
         try:
-            found = self.checked_slope(vector, seed)
+            found = self.checked_gradient(vector, seed)
         except OptiSenseError as error:
             return self.usual.failed(str(error), began)
         parts = dict(outcome.parts)
@@ -169,7 +170,7 @@ class SlopeEvaluator(PickledWithoutCaches):
     def usual_trials(self) -> None:
         """Return None: the duration of gradients is unknown before the first one was made."""
 
-    def checked_slope(self, vector: FloatArray, seed: int) -> CheckedSlope:
+    def checked_gradient(self, vector: FloatArray, seed: int) -> CheckedGradient:
         """Return the smoothed score at a point (n,), and a gradient that has been compared with the
         score.
 
@@ -183,17 +184,17 @@ class SlopeEvaluator(PickledWithoutCaches):
         """
         if self.layers:
             gradients = self._differences.gradients(vector, seed, self.wanted)
-            return CheckedSlope(self._values(vector, seed), gradients, LAYERS, None)
-        if self.usual.space.size > FEW:
+            return CheckedGradient(self._values(vector, seed), gradients, LAYERS, None)
+        if self.usual.space.size > FEW_PARAMETERS:
             try:
                 return self._by_rays(vector, seed)
             except (NoDerivativeError, _ContradictedError):
                 pass
         gradients = self._differences.gradients(vector, seed, self.wanted)
         steady = self.steady(vector, gradients[0], seed)
-        return CheckedSlope(self._values(vector, seed), gradients, DIFFERENCES, steady)
+        return CheckedGradient(self._values(vector, seed), gradients, DIFFERENCES, steady)
 
-    def _by_rays(self, vector: FloatArray, seed: int) -> CheckedSlope:
+    def _by_rays(self, vector: FloatArray, seed: int) -> CheckedGradient:
         """Return the smoothed values at a point (n,) and their gradients by ray derivatives; by
         differences for quantities without a smooth form.
 
@@ -217,21 +218,21 @@ class SlopeEvaluator(PickledWithoutCaches):
             names = [self.wanted[k] for k in rough]
             gradients[rough] = self._differences.gradients(vector, seed, names)
             values[rough] = self._differences.exact(self.usual.space.apply(vector), seed, names)
-        return CheckedSlope(values, gradients, RAYS, holds)
+        return CheckedGradient(values, gradients, RAYS, holds)
 
     def _contradicted_at_start(self, seed: int) -> bool:
         """Return whether differences contradict ray derivatives at the start; computed once."""
         if self._contradicted is None:
             start = self.usual.space.start
             try:
-                _, gradient = self.slope(start)
+                _, gradient = self.gradient(start)
             except OptiSenseError:  # the check is impossible here, so every point is checked
                 self._contradicted = True
             else:
                 self._contradicted = self.agreement(start, gradient, seed) is Agreement.DIFFERS
         return self._contradicted
 
-    def slope(self, vector: FloatArray) -> tuple[float, FloatArray]:
+    def gradient(self, vector: FloatArray) -> tuple[float, FloatArray]:
         """Return the smoothed score at a point (n,), and its gradient (n,) by ray derivatives.
 
         Raises:
@@ -246,7 +247,7 @@ class SlopeEvaluator(PickledWithoutCaches):
         derivatives; NaN for quantities without a smooth form.
 
         Raises:
-            NoDerivativeError, OptiSenseError: see `slope`.
+            NoDerivativeError, OptiSenseError: see `gradient`.
         """
         space = self.usual.space
         design = space.apply(vector)
@@ -254,7 +255,7 @@ class SlopeEvaluator(PickledWithoutCaches):
         # The Jacobian of the start serves all points where shapes move linearly. It may not be
         # that of whichever point came first: a study that is resumed would differ in rounding.
         moves = self._jacobian
-        if not holds(moves, space, design, vector):
+        if not predicts(moves, space, design, vector):
             moves = jacobian(space, np.array(vector, dtype=np.float64), self.parts)
         values = np.full(len(self.wanted), np.nan)
         gradients = np.full((len(self.wanted), space.size), np.nan)
@@ -327,7 +328,14 @@ class SlopeEvaluator(PickledWithoutCaches):
     def difference(
         self, vector: FloatArray, way: FloatArray, step: float, seed: int
     ) -> float | None:
-        """Return the derivative of the true score along `way`; see `ScoreDifferences.along`."""
+        """Return the derivative of the true score along `way`; see `ScoreDifferences.along`.
+
+        Args:
+            vector: point (n,).
+            way: direction (n,), in the units of the coordinates.
+            step: step to each side, as a multiple of `way`.
+            seed: seed of the objectives.
+        """
         found = self._differences.along(vector, way, step, seed, self.wanted[:1])
         return None if found is None else float(found[0])
 
@@ -350,7 +358,7 @@ class SlopeEvaluator(PickledWithoutCaches):
     def _rays(self, design: SensorDesign, moving: Sequence[str]) -> DifferentiableRays:
         width, height = design.camera.resolution
         size = self.resolution, max(1, round(self.resolution * height / width))
-        return self.usual.keeper.model(design).differentiable_rays(moving, size)
+        return self.usual.models.model(design).differentiable_rays(moving, size)
 
     @cached_property
     def _jacobian(self) -> Jacobian:
