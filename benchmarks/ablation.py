@@ -353,19 +353,21 @@ def changes(rows: dict[str, dict[str, float]], what: str) -> dict[str, float]:
 def table(found: dict[str, Any]) -> str:
     """Return the results as Markdown."""
     lines = [
-        "# What each refinement of the optics brings", "",
-        "Written by `python -m benchmarks.ablation`; do not edit.", "",
-        f"One thing at a time is switched off, at {RESOLUTION[0]}x{RESOLUTION[1]} with "
-        f"{PHOTONS:,} photons, a ball of radius {RADIUS} mm pressed in by {DEPTH} mm, and "
-        f"coatings of specularity {COATINGS['diffuse']:g} (diffuse) and {COATINGS['metallic']:g} "
-        f"(metallic). Errors are RMS differences from progressive photon mapping with "
+        "# Ablation of the optics", "",
+        "The command `python -m benchmarks.ablation` writes this page; do not edit it.", "",
+        "Each acceleration and refinement of the optics is switched off in turn. Images have "
+        f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels and {PHOTONS:,} photons; a ball of radius "
+        f"{RADIUS} mm is pressed in by {DEPTH} mm, and coatings have a specularity of "
+        f"{COATINGS['diffuse']:g} (diffuse) or {COATINGS['metallic']:g} (metallic). The error is "
+        "the RMS difference from progressive photon mapping with "
         f"{2 * REFERENCE_PHOTONS / 1e6:g} million photons, over squares of {BOX} pixels, relative "
-        "to the mean, the reference's own noise taken off; bias is that of the mean. Seconds are "
-        "those of the processor, all threads: of an image with its pilot pass and light, and of a "
-        "further image in light that is there.", "",
-        "## The largest effect of each", "",
-        "What its lack adds to the error or the time, in the case where it adds most of those that "
-        "were measured.", "",
+        "to the mean; the noise of the reference is subtracted. The bias is the error of the mean. "
+        "Seconds are the processor time of all threads: of an image with its pilot pass and "
+        "photons (*new light*), and of a further image with the same radiance cache (*light "
+        "kept*).", "",
+        "## Largest effects", "",
+        "Each cell is the largest increase of the error or the time without the feature among the "
+        "measured cases, in brackets the case.", "",
         "| switched off | error in the contact | error elsewhere | seconds, new light "
         "| seconds, light kept |", "|---|---|---|---|---|",
     ]  # fmt: skip

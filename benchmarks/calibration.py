@@ -166,15 +166,17 @@ def table(found: dict[str, Any]) -> str:
     """Return the results as Markdown."""
     lines = [
         "# Fits to photographs of simulated sensors", "",
-        "Written by `python -m benchmarks.calibration`; do not edit.", "",
+        "The command `python -m benchmarks.calibration` writes this page; do not edit it.", "",
         f"The photographs, a background and {len(PLACES)} presses of a ball of {2 * RADIUS:g} mm, "
-        "are simulated with hidden numbers, and have noise, dust, blur and rough labels. The fit "
-        "starts from the built-in sensor, changes what `optisense calibrate` changes by default, "
-        "and does not use every third press. Errors are given as shares of the range of a number "
-        "(two plausible ranges to each side of its start) and in standard deviations as the fit "
-        "states them.", "",
-        "| sensor | numbers | not determined | error below 5 % of the range | within 2 deviations "
-        "| within 3 | unexplained, held out | noise alone | background | processor time |",
+        "are simulated with parameters that the fit does not know, and have noise, dust, blur and "
+        "inaccurate labels. The fit starts from the built-in sensor, varies the default parameters "
+        "of `optisense calibrate`, and does not use every third press. Errors are given relative "
+        "to the range of a parameter (two plausible ranges to each side of its start), and in "
+        "standard deviations that the fit states. *Unexplained* is the energy of the error divided "
+        "by that of the measured response, over the presses that were held out; *noise alone* is "
+        "the part of it that the noise of the photographs causes.", "",
+        "| sensor | parameters | not determined | error below 5 % of the range | within 2 "
+        "deviations | within 3 | unexplained | noise alone | background | processor time |",
         "|" + "---|" * 10,
     ]  # fmt: skip
     for name, part in found.items():
@@ -190,7 +192,7 @@ def table(found: dict[str, Any]) -> str:
     for name, part in found.items():
         lines += [
             "", f"## {name}", "",
-            "| number | start | hidden | found | ± | error, % of the range | deviations |",
+            "| parameter | start | true | found | ± | error, % of the range | deviations |",
             "|" + "---|" * 7,
         ]  # fmt: skip
         for row in part["rows"]:
@@ -202,7 +204,7 @@ def table(found: dict[str, Any]) -> str:
                 f"| {100 * row['share_of_range']:.1f} | {row['deviations']:.1f} |"
             )
         for one, other, value in part["alike"]:
-            lines += ["", f"Strongly correlated: {one}, and {other} ({value:.2f})."]
+            lines += ["", f"Strongly correlated parameters: {one}, and {other} ({value:.2f})."]
     return "\n".join(lines) + "\n"
 
 

@@ -180,7 +180,7 @@ def _load(row: dict[str, Any]) -> str:
 
 def _table(found: dict[str, Any]) -> str:
     lines = [
-        "# Searches by coarse scores first",
+        "# Searches that use coarse scores first",
         "",
         "| search | trials | full scores in the coarse search | processor time, s: full, coarse "
         "| share | load of the machine: full, coarse "
@@ -207,19 +207,20 @@ def _table(found: dict[str, Any]) -> str:
         )
     lines += [
         "",
-        "Lower values of `reading` are better; its scores are negative here. ± is the standard "
-        "deviation over the seeds. Processor times are longer on a busy machine (load at the start "
-        "of the part above 1), so shares of searches under different loads are rough.",
+        "Lower values of `reading` are better; the table gives the negative values that the search "
+        "maximises. ± is the standard deviation over the seeds. Processor times are longer on a "
+        "busy machine (load at the start above 1), so that ratios of searches under different "
+        "loads are approximate.",
         "",
     ]
     if "powers" in found:
         row = found["powers"]
         lines += [
             f"Powers of GelSight Mini's lights by RGB2Normal: {row['trials']} trials from layers "
-            f"take {row['processor_seconds']:.0f} s, start included; by renderings they would take "
-            f"{row['trials'] * row['seconds_a_rendered_trial']:.0f} s "
-            f"({row['seconds_a_rendered_trial']} s each, with the light traced once). The scores "
-            f"differ by {row['largest_difference']:.1g} at most.",
+            f"take {row['processor_seconds']:.0f} s, including the start of the search. Renderings "
+            f"would take {row['trials'] * row['seconds_a_rendered_trial']:.0f} s "
+            f"({row['seconds_a_rendered_trial']} s each, with photons traced once). The scores "
+            f"differ by at most {row['largest_difference']:.1g}.",
             "",
         ]
     for name in CASES:

@@ -203,14 +203,17 @@ def markdown(runs: dict[str, Any]) -> str:
     lines = [
         "# All colourings of GelSight360",
         "",
-        "All 3^8 = 6,561 ways to make the eight light groups red, green or blue, by RGB2Normal",
-        "and NormDiff, from one rendering of each group. Made by `python -m",
-        f"benchmarks.colourings`. The goal is {TARGET_SECONDS:.0f} s on two cores, rendering",
-        "included. The time also holds scoring the best ones again with three fresh seeds.",
-        "Processor time is that of all threads; on a machine with nothing else to do the wall",
-        "time is below it.",
+        "The command `python -m benchmarks.colourings` writes this page; do not edit it.",
         "",
-        "| photons | wall time | processor time | of it the layers | a colouring | memory | load |",
+        "All 3^8 = 6,561 assignments of red, green and blue to the eight light groups are scored",
+        "by RGB2Normal and NormDiff, from one rendering of each group. The goal is "
+        f"{TARGET_SECONDS:.0f} s",
+        "on two cores, rendering included. The time also includes scoring the best colourings",
+        "again with three fresh seeds. Processor time is that of all threads; on an idle machine,",
+        "the wall time is shorter.",
+        "",
+        "| photons | wall time | processor time | part for the layers | per colouring | memory "
+        "| load |",
         "|---|---|---|---|---|---|---|",
     ]
     for found in runs.values():
@@ -238,7 +241,7 @@ def _scores(found: dict[str, Any]) -> list[str]:
         "",
         f"## Scores, {found['photons_an_image']:,} photons",
         "",
-        "| objective | best | its score | median of all | worst |",
+        "| objective | best | best score | median of all | worst |",
         "|---|---|---|---|---|",
     ]
     for name, best in found["best"].items():
@@ -249,14 +252,14 @@ def _scores(found: dict[str, Any]) -> list[str]:
     fresh = found["after_fresh_seeds"]
     lines += [
         "",
-        "All scores of this table are by the seed of the search, which tends to make the best of",
-        "thousands too high. The search scores the best again with three fresh seeds and announces",
-        f"{fresh['colouring']}: RGB2Normal {fresh['rgb2normal']:.3f} ± "
-        f"{fresh['standard_deviation']:.3f} (standard deviation).",
+        "All scores of this table are computed with the seed of the search. The best score of",
+        "thousands therefore tends to be too high. The search scores the best colourings again",
+        f"with three fresh seeds and selects {fresh['colouring']}: RGB2Normal "
+        f"{fresh['rgb2normal']:.3f} ± {fresh['standard_deviation']:.3f} (standard deviation).",
     ]
     lines += [
         "",
-        "The colourings of the OptiSense paper, on our geometry, by the seed of the search:",
+        "Scores of the OptiSense paper's colourings on this geometry, with the seed of the search:",
         "",
     ]
     lines += ["| colouring | NormDiff | RGB2Normal |", "|---|---|---|"]
@@ -268,13 +271,13 @@ def _scores(found: dict[str, Any]) -> list[str]:
 def _agreement(found: dict[str, Any]) -> list[str]:
     lines = [
         "",
-        f"## Rendered by themselves, {found['photons_an_image']:,} photons",
+        f"## Layers and separate renderings, {found['photons_an_image']:,} photons",
         "",
-        "Colourings drawn at random, each rendered by itself with another seed, against the",
-        "mean over four seeds from layers. The noise is the standard deviation over these",
-        "seeds, pooled over the five; the difference is in units of the noise of both together,",
-        "where three or more would be one chance in a hundred. The last column is a rendering",
-        "with the seed of the search.",
+        "Random colourings are rendered separately with another seed, and compared with the mean",
+        "over four seeds from layers. The noise is the standard deviation over these seeds, pooled",
+        "over the five colourings. The difference is in units of the noise of both; a value of",
+        "three or more has a probability of one in a hundred. The last column is a separate",
+        "rendering with the seed of the search.",
         "",
         "| colouring | objective | from layers | noise | rendered | difference in noises | in the "
         "search | same seed |",

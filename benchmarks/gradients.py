@@ -224,23 +224,25 @@ def _markdown(found: dict[str, Any]) -> str:
     lines = [
         "# Derivatives of chief-ray scores",
         "",
-        "Written by `python -m benchmarks.gradients`; do not edit.",
+        "The command `python -m benchmarks.gradients` writes this page; do not edit it.",
         "",
-        f"Along {DIRECTIONS} random directions in the space of camera position (± 1 mm), turn and "
-        "field of view (± 3 degrees) and all points of the sensor's cage if it has one (± 1 mm), "
-        "derivatives at the built-in design are compared with central differences of the true "
-        f"score, over {STEPS[1]:.0%} of the ranges to both sides, where those over {STEPS[0]:.0%} "
-        f"agree with them to {STABLE:.0%} (stable). The score is the mean of {SHIFTS} of "
-        f"{RAYS[0]} x {RAYS[1]} rays, through other points of the pixels each. Errors are parts "
-        "of the difference, or of the average slope of random directions (the gradient's length "
-        'over the root of the number of parameters) where the difference is smaller. "The method '
-        f'says" is what a search tells at its start: it compares its gradient with differences '
-        f"of the score that it searches by (320 rays across) over {STEP / 2:.1%} and {STEP:.0%} "
-        "of the ranges.",
+        "The derivatives at the built-in design are compared with central differences of the score "
+        f"along {DIRECTIONS} random directions. The parameters are the camera's position (± 1 mm), "
+        "rotation and field of view (± 3 degrees), and all points of the sensor's cage if it has "
+        f"one (± 1 mm). The differences are over {STEPS[1]:.0%} of the ranges to both sides. A "
+        f"direction is *stable* if differences over {STEPS[0]:.0%} agree with them to "
+        f"{STABLE:.0%}. The score is the mean of {SHIFTS} scores of {RAYS[0]} x {RAYS[1]} rays, "
+        "each through other points of the pixels. Errors are relative to the difference, or to the "
+        "average slope of random directions (the length of the gradient divided by the square root "
+        "of the number of parameters) if the difference is smaller. *Result of the check* is the "
+        "result of a test at the start of a search: the search compares its gradient with "
+        f"differences of its own score (320 rays across) over {STEP / 2:.1%} and {STEP:.0%} of the "
+        "ranges. The last column says whether the errors of the method are within "
+        f"{WITHIN:.0%}, or whether the check reports that they may not be.",
         "",
-        "| sensor | score | parameters | stable | derivatives of rays off by (median, largest) | "
-        "the method uses | which is off by (median, largest) | the method says | "
-        f"within {WITHIN:.0%}, or told |",
+        "| sensor | score | parameters | stable | error of derivatives of rays (median, largest) | "
+        "used by the method | error of the method (median, largest) | result of the check | "
+        f"within {WITHIN:.0%}, or reported |",
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name in SENSORS:
@@ -285,8 +287,8 @@ def _line(name: str, parameters: int, objective: str, row: dict[str, Any]) -> st
 
     used = off("used")
     right = bool(len(used)) and bool(used.max() <= WITHIN)
-    verdict = "within" if right else "told" if not row["holds"] else "neither"
-    says = "the gradient holds" if row["holds"] else "no steady derivative"
+    verdict = "within" if right else "reported" if not row["holds"] else "neither"
+    says = "the gradient is correct" if row["holds"] else "no stable derivative"
     return (
         f"| {name} | {objective} | {parameters} | {len(stable)} of {len(row['directions'])} | "
         f"{shown(off('by_rays'))} | {row['source']} | {shown(used)} | {says} | {verdict} |"

@@ -287,17 +287,17 @@ def main() -> None:
         )
         print(rows[-1], flush=True)
     heads = (
-        "indentation | depth (mm) | force, neo-Hookean (N) | linear (N) | off | "
-        "contact radius, neo-Hookean (mm) | linear (mm) | off"
+        "indentation | depth (mm) | force, neo-Hookean (N) | linear (N) | difference | "
+        "contact radius, neo-Hookean (mm) | linear (mm) | difference"
     )
     text = [
-        "# Large strains: the linear layer beside a neo-Hookean one",
+        "# Large indentations: the linear elastic layer compared with a neo-Hookean one",
         "",
-        "Written by `python -m benchmarks.large_strains`; do not edit.",
+        "The command `python -m benchmarks.large_strains` writes this page; do not edit it.",
         "",
-        f"A ball of radius {RADIUS:g} mm pressed into a bonded layer of {THICKNESS:g} mm, "
-        f"E = {GEL.youngs_modulus:g} MPa, Poisson ratio {GEL.poisson_ratio:g}, without friction; "
-        f"{ACROSS} x {DOWN} elements.",
+        f"A ball of radius {RADIUS:g} mm is pressed without friction into a bonded layer with a "
+        f"thickness of {THICKNESS:g} mm, E = {GEL.youngs_modulus:g} MPa and a Poisson ratio of "
+        f"{GEL.poisson_ratio:g}. The neo-Hookean model has {ACROSS} x {DOWN} elements.",
         "",
         f"| {heads} |",
         "|" + "---|" * 8,

@@ -234,20 +234,21 @@ def main() -> None:
 def table(found: dict[str, Any]) -> str:
     """Return the results as Markdown."""
     lines = [
-        "# Errors of the light by patches of contacts", "",
-        "Written by `python -m benchmarks.patches`; do not edit.", "",
-        f"A ball of radius {RADIUS} mm is pressed in; {RESOLUTION[0]}x{RESOLUTION[1]} pixels or "
-        f"more, the mean of {len(SEEDS)} images of {PHOTONS / 1e6:g} million photons, against "
-        f"Mitsuba's `path` with {BATCHES * PATH_SAMPLES:,} samples a pixel or progressive photon "
-        f"mapping with {BATCHES * SPPM_PASSES * SPPM_PHOTONS / 1e6:g} million photons (`sppm`), in "
-        "absolute units. In per cent: RMS "
-        f"over patches ({TILTS} bands of tilt times {QUARTERS} quarters of azimuth in the contact, "
-        "quarters of the skin around it and of the row of pixels between both) and three channels, "
-        "in relation to each channel's mean there, all noise taken off; the noise of the reference "
-        "and that of the mean of the images (not taken off where it is not told); and by how much "
-        "the means of the channels are off.", "",
-        "| sensor, specularity, place, depth | where | RMS | noise of the reference | noise of the "
-        "images | red | green | blue |", "|---|---|---|---|---|---|---|---|",
+        "# Errors of the rendered light by regions of a contact", "",
+        "The command `python -m benchmarks.patches` writes this page; do not edit it.", "",
+        f"A ball of radius {RADIUS} mm is pressed in. The mean of {len(SEEDS)} images of "
+        f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels or more and {PHOTONS / 1e6:g} million photons is "
+        f"compared with Mitsuba's `path` with {BATCHES * PATH_SAMPLES:,} samples per pixel, or "
+        "with progressive photon mapping with "
+        f"{BATCHES * SPPM_PASSES * SPPM_PHOTONS / 1e6:g} million photons (`sppm`), in absolute "
+        "units. All values are in per cent. *RMS* is the error over patches and three channels, "
+        "relative to the mean of each channel there, after subtraction of all noise. The patches "
+        f"are {TILTS} bands of tilt times {QUARTERS} quarters of azimuth in the contact, and "
+        "quarters of the skin around it and of the row of pixels between both. The noise of the "
+        "images is that of their mean; where it is not given, it is not subtracted. The last three "
+        "columns are the errors of the means of the channels.", "",
+        "| sensor, specularity, place, depth | region | RMS | noise of the reference | noise of "
+        "the images | red | green | blue |", "|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for name, row in found.items():
         for where in ("contact", "skin", "rim"):
@@ -257,7 +258,7 @@ def table(found: dict[str, Any]) -> str:
             numbers.append(f"{100 * of['image_noise']:.1f}" if "image_noise" in of else "")
             numbers += [f"{100 * of[key]:+.1f}" for key in ("red", "green", "blue")]
             lines.append(f"| {name} | {where} | " + " | ".join(numbers) + " |")
-    lines += ["", "Cases without a row have not been measured yet."]
+    lines += ["", "Cases without a row have not been measured."]
     return "\n".join(lines) + "\n"
 
 

@@ -204,12 +204,13 @@ def page(records: dict[str, dict[str, Any]]) -> str:
         rows.append(f"| {name} | {whole:.0f} | {shown} |")
     return "\n".join(
         [
-            "# The promised time of long commands",
+            "# Accuracy of the estimated time of long commands",
             "",
-            "Written by `python -m benchmarks.progress_records`; do not edit.",
+            "The command `python -m benchmarks.progress_records` writes this page; do not edit it.",
             "",
-            "The total that the progress line promises, over the real one, after parts of the "
-            "whole time. Seconds are those of two idle processors, worked out from processor time.",
+            "The table gives the total time that the progress line estimates, divided by the "
+            "actual total time, after parts of the latter. Seconds are those of two idle "
+            "processors, computed from processor time.",
             "",
             f"| command | seconds | {heads} |",
             "|---|---|" + "---|" * len(SHARES),

@@ -120,15 +120,18 @@ def agreement(rows: list[dict[str, Any]], score: str) -> tuple[float, int]:
 def _page(content: dict[str, Any]) -> str:
     rows = content["rows"]
     lines = [
-        "# Do the objectives follow the full reconstruction task?",
+        "# Scores compared with the reconstruction task",
         "",
-        "Written by `python -m benchmarks.reading`. Errors of normals in degrees; `reading` is the",
-        "median over places, and beside it is the mean; RGB2Normal and",
-        f"NormDiff are better where higher. Pictures {WIDE} across for the scores ({2 * WIDE} for",
-        f"{' and '.join(SMALL_CONTACTS)}) and {TASK_WIDE} for the task, {BALLS} balls,",
+        "The command `python -m benchmarks.reading` writes this page; do not edit it.",
+        "",
+        "Errors of normals are in degrees. `reading` is the median over places, and the next",
+        "column is the mean over places. Higher values of RGB2Normal and NormDiff are better. The",
+        f"images are {WIDE} pixels wide for the scores ({2 * WIDE} for",
+        f"{' and '.join(SMALL_CONTACTS)}) and {TASK_WIDE} for the task, with {BALLS} balls and",
         f"{PHOTONS:,} photons.",
         "",
-        "| sensor | specularity | task: off by | reading | its mean | RGB2Normal | NormDiff |",
+        "| sensor | specularity | error in the task | reading | mean of places | RGB2Normal "
+        "| NormDiff |",
         "|---|---|---|---|---|---|---|",
     ]
     for row in rows:
@@ -143,10 +146,10 @@ def _page(content: dict[str, Any]) -> str:
         )
     lines += [
         "",
-        "Rank correlation (Spearman) with the task, each score's better end against the smaller",
-        "error; within one sensor over its coatings, and over all:",
+        "Rank correlation (Spearman) with the task, over the coatings of one sensor and over all",
+        "sensors and coatings (1 means that better scores always have smaller errors):",
         "",
-        "| | reading | its mean | RGB2Normal | NormDiff |",
+        "| | reading | mean of places | RGB2Normal | NormDiff |",
         "|---|---|---|---|---|",
     ]
     groups = {name: [row for row in rows if row["sensor"] == name] for name in SENSORS}
@@ -158,9 +161,9 @@ def _page(content: dict[str, Any]) -> str:
     seconds = [row["cpu_s"] for row in rows]
     lines += [
         "",
-        f"{len(rows)} sensors and coatings. Processor seconds, median: all three scores "
-        f"{np.median([each['scores'] for each in seconds]):.0f}, the task "
-        f"{np.median([each['task'] for each in seconds]):.0f}.",
+        f"The table has {len(rows)} sensors and coatings. The median processor time is "
+        f"{np.median([each['scores'] for each in seconds]):.0f} s for all three scores, and "
+        f"{np.median([each['task'] for each in seconds]):.0f} s for the task.",
         "",
     ]
     return "\n".join(lines)

@@ -159,7 +159,7 @@ def _speed_table(speed: dict[str, Any]) -> _TableData:
             more.append(f"peak memory {values['peak_memory_gb']:.2f} GB")
         time, cpu = f"{values['wall_s']:.2f}", f"{values['cpu_s']:.2f}"
         rows.append([name, time, cpu, ", ".join(more), TARGETS.get(key, "")])
-    return "Speed", ["what", "seconds", "CPU seconds", "and", "target"], rows
+    return "Speed", ["measurement", "seconds", "CPU seconds", "further results", "target"], rows
 
 
 def _breakdown_table(speed: dict[str, Any]) -> _TableData:
@@ -168,14 +168,14 @@ def _breakdown_table(speed: dict[str, Any]) -> _TableData:
     rows = [[f"{name} (s)", f"{parts[name]:.3f}"] for name in parts]
     rows += [
         ["photons of an image", f"{image['photons']:,}"],
-        ["photons a second, field included", f"{image['photons_per_s_with_field']:,}"],
-        ["photons a second, tracing alone", f"{rays['photons_per_s']:,}"],
-        ["rays a photon", f"{rays['rays_per_photon']:.2f}"],
-        ["rays a second in the photon pass", f"{rays['rays_per_s']:,}"],
-        ["rays a second, ray tracer alone", f"{rays['pure_rays_per_s']:,}"],
+        ["photons per second, radiance cache included", f"{image['photons_per_s_with_field']:,}"],
+        ["photons per second, tracing only", f"{rays['photons_per_s']:,}"],
+        ["rays per photon", f"{rays['rays_per_photon']:.2f}"],
+        ["rays per second in the photon pass", f"{rays['rays_per_s']:,}"],
+        ["rays per second, ray tracer only", f"{rays['pure_rays_per_s']:,}"],
         ["share of the ray tracer's rate", f"{100 * rays['share_of_pure_rate']:.0f} %"],
     ]
-    return "Where the time goes, 320x240", ["what", "value"], rows
+    return "Times of the steps, 320x240", ["step", "value"], rows
 
 
 def _renderer_table(comparison: dict[str, Any]) -> _TableData:
@@ -196,13 +196,25 @@ def _renderer_table(comparison: dict[str, Any]) -> _TableData:
             ]
         )
     error, ours = comparison["target_error"], comparison["our_seconds"]
-    title = f"Seconds to the error of our warm image ({100 * error:.2f} %, {ours:.2f} s)"
-    heads = ["renderer", "rendered s", "error", "scale", "s to our error", "times ours"]
+    title = f"Times to the error of OptiSense's warm image ({100 * error:.2f} %, {ours:.2f} s)"
+    heads = [
+        "renderer",
+        "seconds rendered",
+        "error",
+        "scale",
+        "seconds to this error",
+        "relative to OptiSense",
+    ]
     return title, heads, rows
 
 
 def _markdown(results: dict[str, Any]) -> str:
-    lines = ["# Benchmark results", "", "Written by `python -m benchmarks`; do not edit.", ""]
+    lines = [
+        "# Speed and accuracy",
+        "",
+        "The command `python -m benchmarks` writes this page; do not edit it.",
+        "",
+    ]
     for part in ("reference", "speed", "renderers"):
         if part in results:
             lines += [f"- {part}: {_about(results[part]['machine'])}"]
@@ -210,9 +222,9 @@ def _markdown(results: dict[str, Any]) -> str:
         ref = results["reference"]
         lines += [
             "",
-            f"Reference: {ref['photons']:,} photons of {ref['seeds']} seeds, noise inside the "
-            f"contact {100 * ref['noise']:.2f} % (subtracted in quadrature), "
-            f"{ref['seconds']:.0f} s.",
+            f"The reference has {ref['photons']:,} photons of {ref['seeds']} seeds and a noise of "
+            f"{100 * ref['noise']:.2f} % inside the contact, which is subtracted in quadrature. It "
+            f"took {ref['seconds']:.0f} s.",
         ]
     for title, heads, rows in _tables(results):
         lines += ["", f"## {title}", "", "| " + " | ".join(heads) + " |"]
@@ -221,9 +233,9 @@ def _markdown(results: dict[str, Any]) -> str:
     if "renderers" in results:
         lines += [
             "",
-            "\\* extrapolated from the last image: error falls as 1/sqrt(time). Scale: what the "
-            "renderer's image is multiplied by so that its mean inside the contact is the "
-            "reference's.",
+            "\\* This time is extrapolated from the last image, under the assumption that the "
+            "error falls as 1/sqrt(time). The scale is the factor by which the renderer's image is "
+            "multiplied so that its mean inside the contact equals that of the reference.",
         ]
     return "\n".join(lines) + "\n"
 

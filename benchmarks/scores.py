@@ -322,12 +322,12 @@ def _markdown(found: dict[str, Any]) -> str:
     about = found["machine"]
     busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
     lines = [
-        "# Scores: scatter, bias, time",
+        "# Scatter, bias and time of scores",
         "",
-        "Written by `python -m benchmarks.scores`; do not edit.",
+        "The command `python -m benchmarks.scores` writes this page; do not edit it.",
         "",
-        f"{about['date']}, {about['processor']}, {about['cores']} cores, Python "
-        f"{about['python']}{busy}. {found['design']}, default settings.",
+        f"The sensor is {found['design']}, with default settings. Measured on {about['date']}: "
+        f"{about['processor']}, {about['cores']} cores, Python {about['python']}{busy}.",
         "",
         "| score | value | standard deviation over seeds | seconds | CPU seconds | target |",
         "|---|---|---|---|---|---|",
@@ -347,11 +347,12 @@ def _markdown(found: dict[str, Any]) -> str:
     kept = found["scores"]["rgb2normal"]["kept_light"]
     lines += [
         "",
-        f"RGB2Normal traces its light; in light that is there it takes {kept['wall_s']:.2f} s "
-        f"({kept['cpu_s']:.2f} CPU seconds). NormDiff's seconds are those that it adds where both "
-        f"are asked for. {len(found['scores']['rgb2normal']['values'])} seeds.",
+        "The time of RGB2Normal includes the photons; with an existing radiance cache, it takes "
+        f"{kept['wall_s']:.2f} s ({kept['cpu_s']:.2f} CPU seconds). The time of NormDiff is the "
+        "additional time if both are computed. The standard deviations are over "
+        f"{len(found['scores']['rgb2normal']['values'])} seeds.",
         "",
-        "## Off a converged image",
+        "## Bias",
         "",
         "| score | images averaged | value |",
         "|---|---|---|",
@@ -359,12 +360,12 @@ def _markdown(found: dict[str, Any]) -> str:
     for name, row in found["more_light"].items():
         lines += [f"| {name} | {k} | {v:.4f} |" for k, v in row["mean_of_images"].items()]
         lines.append(
-            f"| {name} | endless | {row['endless_light']:.4f} (off by {row['bias']:+.4f}) |"
+            f"| {name} | infinitely many | {row['endless_light']:.4f} (bias {row['bias']:+.4f}) |"
         )
     one = found["one_image"]
     lines += ["", "## All nine contacts in one image", ""]
     lines += [
-        "| score | one image | one by one | largest difference of a place |",
+        "| score | one image | one image per contact | largest difference at a place |",
         "|---|---|---|---|",
     ]
     lines += [
@@ -375,12 +376,12 @@ def _markdown(found: dict[str, Any]) -> str:
     each, together = one["seconds_one_by_one"], one["seconds_one_image"]
     lines += [
         "",
-        f"In light that is there: {together['cpu_s']:.1f} CPU seconds in one image, "
-        f"{each['cpu_s']:.1f} one by one.",
+        f"With an existing radiance cache, one image takes {together['cpu_s']:.1f} CPU seconds, "
+        f"and one image per contact {each['cpu_s']:.1f}.",
         "",
-        "## What RGB2Normal depends on, one thing at a time",
+        "## Dependence of RGB2Normal on single settings",
         "",
-        "| what | RGB2Normal | " + " | ".join(f"{a:g}°" for a in DIRECTIONS) + " |",
+        "| setting | RGB2Normal | " + " | ".join(f"{a:g}°" for a in DIRECTIONS) + " |",
         "|---|---|" + "---|" * len(DIRECTIONS),
     ]
     for row in found["rgb2normal_depends_on"]:

@@ -196,31 +196,34 @@ def _seconds(value: float | None) -> str:
 
 
 def _table(found: dict[str, Any]) -> str:
-    lines = ["# Searches", "", "| what | measured | target |", "|---|---|---|"]
+    lines = ["# Searches", "", "| quantity | measured | target |", "|---|---|---|"]
     if "overhead" in found:
         part = found["overhead"]
         for name, title in (("this_process", "in one process"), ("two_workers", "two workers")):
             value = part[name]["cpu_ms_a_trial"]
-            lines.append(f"| Overhead a trial, 81 numbers, {title} | {value:.2f} ms | under 1 ms |")
+            lines.append(
+                f"| Overhead per trial, 81 parameters, {title} | {value:.2f} ms | under 1 ms |"
+            )
     if "workers" in found:
         for name, title in (("chief_rays", "chief rays"), ("rendered", "rendered")):
             row = found["workers"][name]
             lines.append(
-                f"| Trials of two worker processes to one's, {title} | {row['two_to_one']:.2f} "
-                f"({row['two_to_one_with_all_threads']:.2f} to one with the threads of both; "
-                f"{row['two_to_one_by_processor_time']:.2f} by processor time) | "
+                f"| Trials per second of two worker processes relative to one, {title} | "
+                f"{row['two_to_one']:.2f} "
+                f"({row['two_to_one_with_all_threads']:.2f} relative to one with the threads of "
+                f"both; {row['two_to_one_by_processor_time']:.2f} by processor time) | "
                 f"{row['target']} or more |"
             )
     if "coatings" in found:
         lines.append(
-            f"| 11 coatings by RGB2Normal, and the best and the start again with fresh seeds | "
+            f"| 11 coatings by RGB2Normal, and the best and the initial one with fresh seeds | "
             f"{found['coatings']['seconds']:.0f} s | 120 s or less |"
         )
     if "mirror" in found:
         row = found["mirror"]
         start, best = row["start"], row["best"]
         lines.append(
-            f"| Svelte's mirror by AOAP and CMA-ES, 81 numbers, {row['trials']} trials in "
+            f"| Svelte's mirror by AOAP and CMA-ES, 81 parameters, {row['trials']} trials in "
             f"{row['seconds']:.0f} s | {start['aoap']:.3f} to {best['aoap']:.3f} (coverage "
             f"{start['coverage']:.2f} to {best['coverage']:.2f}); the paper's improvement after "
             f"{_seconds(row['seconds_to_the_papers_improvement'])} | "
@@ -240,8 +243,9 @@ def _table(found: dict[str, Any]) -> str:
         )
     lines += [
         "",
-        "The mirror's control points may move 8 mm towards the skin and back, 1 mm across and 2 mm",
-        "along the finger, wherever no part cuts through another. Rays are 320 across the image.",
+        "The mirror's control points may move by 8 mm towards the skin and back, by 1 mm across",
+        "and by 2 mm along the finger, as long as parts do not intersect. 320 rays are traced",
+        "across the image.",
     ]
     parts: dict[str, list[str]] = {}
     for part, row in found.items():

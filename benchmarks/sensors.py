@@ -130,14 +130,16 @@ def table(found: dict[str, Any]) -> str:
             "noise in the contact", "image, new photons", "image, light kept",
             "first image in a new process")  # fmt: skip
     lines = [
-        "# Built-in sensors", "", "Written by `python -m benchmarks.sensors`; do not edit.", "",
-        "Seconds, and in brackets processor seconds of all threads; medians. A ball of radius "
-        f"{RADIUS} mm, {DEPTH} mm deep, in the middle of what the camera sees, at "
-        f"{RESOLUTION[0]}x{RESOLUTION[1]}, with as many photons as bring the noise in the contact "
-        f"to {100 * WANTED_NOISE:g} %. The first image in a new process goes from command to "
-        "files, with as many photons as `optisense render` takes unasked. Targets: load and check "
-        f"{TARGETS['load_and_check']:g} s, image {TARGETS['image']:g} s, first image "
-        f"{TARGETS['first_image']:g} s.", "",
+        "# Times of the built-in sensors", "",
+        "The command `python -m benchmarks.sensors` writes this page; do not edit it.", "",
+        "Times are medians in seconds; the processor time of all threads is in brackets. A ball of "
+        f"radius {RADIUS} mm is pressed {DEPTH} mm deep into the middle of the view, at "
+        f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels. The number of photons is that which reduces the "
+        f"noise in the contact to {100 * WANTED_NOISE:g} %. The time of the first image in a new "
+        "process is measured from the command until all files are written, with the default number "
+        "of photons of `optisense render`. The goals are "
+        f"{TARGETS['load_and_check']:g} s for loading and checking, {TARGETS['image']:g} s for an "
+        f"image and {TARGETS['first_image']:g} s for the first image.", "",
         "| " + " | ".join(head) + " |", "|" + "---|" * len(head),
     ]  # fmt: skip
     for name, row in found.items():
