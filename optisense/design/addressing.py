@@ -121,7 +121,10 @@ def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
             )
         known = ["x", "y", "z"] if len(value) == 3 else []
     else:
-        raise DesignError(f"'{path}' does not exist: {here} has nothing inside it")
+        raise DesignError(
+            f"'{path}' does not exist: {here} is a single value",
+            hint=f"End the path at {here}",
+        )
     raise DesignError(
         f"'{path}' does not exist: {here} has no '{step}'",
         hint=suggestion(str(step), known, limit=20),

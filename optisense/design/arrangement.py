@@ -29,7 +29,8 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
     """Return problems of solids of different index that overlap without a priority between them.
 
     Args:
-        meshes: deformed meshes, mm.
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
     """
     problems: list[Diagnostic] = []
     solids = [n for n in meshes if design.parts[n].role in TRANSPARENT_SOLIDS]
@@ -56,7 +57,12 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
 
 
 def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return whether points lie in the picture, seen along straight rays, (n,) bool."""
+    """Return a mask (n,) of the points that lie in the picture along straight rays.
+
+    Args:
+        camera: camera of the design.
+        points: points (n, 3), mm.
+    """
     across, down = picture_places(camera, points)
     with np.errstate(invalid="ignore"):
         inside: NDArray[np.bool_] = (np.abs(across - 0.5) <= 0.5) & (np.abs(down - 0.5) <= 0.5)
@@ -64,6 +70,6 @@ def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]
 
 
 def straight_rays(camera: Camera) -> NDArray[np.float64]:
-    """Return the directions (k, 3) of some points spread over the picture."""
+    """Return unit vectors (k, 3) of rays through a grid of `SAMPLES` points of the picture."""
     across, down = np.meshgrid(np.linspace(0.0, 1.0, SAMPLES[0]), np.linspace(0.0, 1.0, SAMPLES[1]))
     return directions(camera, across, down).reshape(-1, 3)

@@ -39,15 +39,17 @@ LatticeCount = Annotated[Count, Field(ge=2, le=MOST_ALONG)]
 
 
 class Cage(Model):
-    """Control points over a box around some parts. At the points of the regular lattice they change
-    nothing. Point (i, j, k) has index (i * ny + j) * nz + k: x is slowest, z fastest.
+    """Control points over a box around some parts, which deform the parts (free-form deformation).
 
-    The shape is either given by `points`, or, with `blend` (A in the OptiSense paper, section
-    "Geometric shape of the components"), it is (1 - A) * c_min + A * c_max, for all coordinates
-    with one number or for each with its own.
+    Control points on the regular lattice leave the parts as they are. Point (i, j, k) has the index
+    (i * ny + j) * nz + k: x is slowest, z fastest.
+
+    The shape is given by `points`, or by `blend` (A in the OptiSense paper, section "Geometric
+    shape of the components") as (1 - A) * c_min + A * c_max, with one A for all coordinates or one
+    for each.
     """
 
-    parts: Annotated[list[Name], Field(min_length=1)] = Field(description="what it deforms")
+    parts: Annotated[list[Name], Field(min_length=1)] = Field(description="parts that it deforms")
     resolution: tuple[LatticeCount, LatticeCount, LatticeCount] = Field(
         description="control points along x, y, z"
     )

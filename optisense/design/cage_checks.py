@@ -117,10 +117,14 @@ def contact_problems(design: SensorDesign) -> list[Diagnostic]:
 
 
 def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
-    """Return warnings about cages around a sensing surface without the solid that it coats, or
-    around that solid alone: to deform one is to tear the two apart.
+    """Return warnings about cages around a sensing surface without the solid that it coats.
 
+    The same holds for the solid without the surface: deforming one of them tears the two apart.
     Cages that have moved are left to `cage_problems`.
+
+    Args:
+        design: design to check.
+        meshes: deformed meshes, mm, by part.
     """
     solids = [name for name in meshes if design.parts[name].role in TRANSPARENT_SOLIDS]
     problems: list[Diagnostic] = []
@@ -170,8 +174,10 @@ def _has_moved(cage: Cage) -> bool:
 
 
 def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
-    """Return whether two parts can overlap: solids may, if their priorities tell which one
-    counts.
+    """Return whether two parts may overlap.
+
+    Solids of one refractive index may ("yes"); solids of different priority are cut out of each
+    other, which is unusual ("odd"); others may not ("no").
     """
     parts = design.parts[name], design.parts[other]
     if not all(part.role in TRANSPARENT_SOLIDS for part in parts):

@@ -43,31 +43,33 @@ class ImagingModel(Model):
     """
 
     distortion: LensDistortion | None = Field(
-        default=None, description="of the lens; fov is that of the lens without it"
+        default=None, description="distortion of the lens; fov is that of the lens without it"
     )
     shading: LensShading | None = Field(
-        default=None, description="how the lens dims the picture towards its corners"
+        default=None, description="dimming of the picture towards its corners"
     )
-    blur: LensBlur | None = Field(default=None, description="of the lens")
+    blur: LensBlur | None = Field(default=None, description="blur of the lens")
     crosstalk: ChannelMatrix | None = Field(
-        default=None, description="rows: what R, G, B of the sensor see of R, G, B of the light"
+        default=None, description="rows: shares of R, G, B of the light in R, G, B of the sensor"
     )
     stray_light: Colour | None = Field(
         default=None,
-        description="what fills the whole sensor alike, such as ambient light that leaks in: R, G, "
+        description="uniform light on the whole sensor, such as ambient light that leaks in: R, G, "
         "B, shares of a full pixel",
     )
     response: CameraResponse | None = Field(
-        default=None, description="how light becomes the picture, instead of the usual way"
+        default=None, description="conversion of light into the picture; the usual one if left out"
     )
-    noise: SensorNoise | None = Field(default=None, description="of the sensor")
-    black_level: BlackLevel | None = Field(default=None, description="of the sensor")
+    noise: SensorNoise | None = Field(default=None, description="noise of the sensor")
+    black_level: BlackLevel | None = Field(
+        default=None, description="level that the sensor reads in the dark"
+    )
     white_balance: PositiveRGB | None = Field(default=None, description="gains of R, G, B")
     colour_matrix: ChannelMatrix | None = Field(
-        default=None, description="rows: R, G, B of the picture of R, G, B of the sensor"
+        default=None, description="rows: shares of R, G, B of the sensor in R, G, B of the picture"
     )
     tone_curve: ToneCurve | None = Field(
-        default=None, description="what is stored, instead of the response's own curve"
+        default=None, description="curve of the stored levels, instead of the response's own"
     )
 
     def kinds_of_imaging(self) -> dict[str, KindModel]:
@@ -102,7 +104,7 @@ class Viewpoint(Model):
     )
     resolution: tuple[Pixels, Pixels] = Field(description="pixels, width and height")
     position: Vector = Field(description="mm, entrance pupil, x y z")
-    direction: Direction = Field(description="where it looks, any length")
+    direction: Direction = Field(description="viewing direction, any length")
     up: Direction = Field(description="upward in the picture, any length")
 
 
@@ -128,8 +130,8 @@ class Camera(ImagingModel, Viewpoint):
         """Return the chain that turns radiance into the camera's picture.
 
         Args:
-            vergence: one over the apparent distance of the scene, (h, w) of any size, 1/mm. Without
-                it a blur that depends on depth is left out.
+            vergence: inverse (h, w), of any size, of the apparent distance of the scene, 1/mm. If
+                it is None, a blur that depends on depth is left out.
         """
         focus = None
         if self.blur is not None and (vergence is not None or not self.blur.by_depth):
@@ -157,8 +159,8 @@ class Camera(ImagingModel, Viewpoint):
             raise ValueError("direction and up are parallel; up must point to the picture's top")
         if self.distortion is not None and self.distortion.projection != self.projection:
             raise InconsistentValueError(
-                f"a lens distortion of kind '{self.distortion.kind}' is one of "
-                f"{self.distortion.projection} lenses, and this one is {self.projection}",
+                f"a lens distortion of kind '{self.distortion.kind}' is for "
+                f"{self.distortion.projection} lenses, but this lens is {self.projection}",
                 ("distortion", "kind"),
                 f"Use 'projection: {self.distortion.projection}', or another kind of distortion",
             )

@@ -1,4 +1,4 @@
-"""Checks of the camera: angles that no lens has, a position inside a part, a view past the skin.
+"""Checks of the camera: its field of view, its position, and the skin in its view.
 
 A design does not state the size of its camera's lens, so the size of the smallest camera on sale is
 assumed.
@@ -102,15 +102,15 @@ def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
 
 
 def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """Return the problem of a camera inside a transparent solid, or so near to a part that its lens
-    is in it.
+    """Return the problem of a camera whose lens is inside a transparent solid or another part.
 
     Cameras inside opaque solids are found together with the lights. A camera that is cast into a
     solid needs a cavity in it: a sphere about the pupil bends no ray, as the lens is made for that
     medium.
 
     Args:
-        meshes: deformed meshes, mm.
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
     """
     position = np.array(design.camera.position)
     at = "({:g}, {:g}, {:g})".format(*design.camera.position)
@@ -144,7 +144,8 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagn
     """Return the first reason why the camera can't exist, or None.
 
     Args:
-        meshes: deformed meshes, mm.
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
     """
     found = lens_problems(design.camera, design.where("camera", "fov"))
     found = found or fold_problems(design.camera, design.where("camera", "distortion"))
@@ -159,7 +160,8 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     mirrors are not checked.
 
     Args:
-        meshes: deformed meshes, mm.
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
     """
     shares = view_shares(design, meshes)
     if shares is None:
@@ -193,11 +195,12 @@ def view_shares(
     along straight rays.
 
     Args:
-        meshes: deformed meshes, mm.
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
 
     Returns:
-        The share of the surface's area, by whole triangles, and that of the picture; None if there
-        is no sensing surface, or a mirror.
+        Share of the surface's area, by whole triangles, and share of the picture, both 0 to 1; None
+        if there is no sensing surface, or a mirror.
     """
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
     if not skins or design.parts_of(Role.MIRROR):

@@ -55,6 +55,7 @@ def check_design(
     is created.)
 
     Args:
+        design: design to check.
         light_names: names of the lights of the library; None skips the check of light models.
 
     Returns:

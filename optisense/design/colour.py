@@ -15,13 +15,16 @@ NAMED_COLOURS = {
 
 
 def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Encode linear values, 0 to 1, as values of 0 to 1, before rounding."""
+    """Return the sRGB encoding (...), 0 to 1 before rounding, of linear values (...), 0 to 1."""
     linear = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
 
 
 def encode(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Encode linear values, 0 to 1, with 8 bits, in single precision for speed."""
+    """Return the sRGB encoding (...) in 8 bits of linear values (...), 0 to 1.
+
+    The computation is in single precision for speed.
+    """
     linear = np.clip(np.asarray(linear, dtype=np.float32), 0.0, 1.0)
     curved = np.power(linear, np.float32(1 / 2.4))
     curved *= np.float32(255 * 1.055)
@@ -32,6 +35,6 @@ def encode(linear: NDArray[np.floating]) -> NDArray[np.uint8]:
 
 
 def decode(picture: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Decode values of 8 bits to linear ones, 0 to 1."""
+    """Return the linear values (...), 0 to 1, of an sRGB picture (...) in 8 bits."""
     encoded = picture.astype(np.float64) / 255.0
     return np.where(encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4)

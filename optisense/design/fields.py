@@ -84,8 +84,9 @@ RelativePath = Annotated[str, IN_FOLDER, Field(json_schema_extra={"format": "pat
 
 
 def is_left_out(value: object) -> bool:
-    """Return whether a field that a later release added has no value. It is then not written, so
-    that designs without it are unchanged, down to their fingerprints.
+    """Return whether an optional field has no value and is left out of the file.
+
+    Designs without a field that a later release added are then unchanged, with equal fingerprints.
     """
     return value is None
 
@@ -106,7 +107,7 @@ def unit_of(model: type[BaseModel], name: str) -> str:
 
 
 class InconsistentValueError(ValueError):
-    """Error: a value that is valid by itself does not fit the rest of the design.
+    """A value that is valid by itself does not fit the rest of the design.
 
     Attributes:
         path: keys and indices from the model that found it to the value.

@@ -24,15 +24,16 @@ pixels wide has a standard deviation of half a pixel, little more than that of a
 
 
 def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """Return a warning if the sensing surface is out of focus, for cameras whose blur depends on
-    depth.
+    """Return a warning if the sensing surface is out of focus.
 
+    Cameras whose blur does not depend on depth are not checked.
     Gel and other solids on the way make objects appear nearer: the apparent thickness of a layer is
     its thickness divided by its index. Rays are not refracted here, so this is only a warning.
     Designs with mirrors are not checked.
 
     Args:
-        meshes: deformed meshes, mm.
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
     """
     camera = design.camera
     if camera.blur is None or not camera.blur.by_depth or design.parts_of(Role.MIRROR):
@@ -61,14 +62,14 @@ def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
 
 
 def apparent_distances(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> FloatArray:
-    """Return the apparent distances of the sensing surface along straight rays spread over the
-    picture.
+    """Return the apparent distances of the sensing surface along straight rays.
 
-    They are measured along the axis for perspective lenses, whose field of focus is flat, else
-    along the ray.
+    Distances are measured along the axis for perspective lenses, whose field of focus is flat, and
+    along the ray for others.
 
     Args:
-        meshes: deformed meshes, mm.
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
 
     Returns:
         Distances (k,), mm, of the rays that meet the surface before any blocker.
@@ -99,8 +100,14 @@ def _reduced(
     rays: FloatArray,
     length: FloatArray,
 ) -> FloatArray:
-    """Return the apparent lengths of rays (k, 3), (k,) mm: each piece divided by the index of its
-    medium.
+    """Return the apparent lengths (k,) of rays, mm: each piece is divided by its medium's index.
+
+    Args:
+        design: design of the sensor.
+        meshes: deformed meshes, mm, by part.
+        origin: start (3,) of all rays, mm.
+        rays: unit directions (k, 3).
+        length: geometric lengths (k,), mm.
     """
     solids = [
         (design.parts[name].priority, getattr(design.materials[material], "ior", 1.0), meshes[name])

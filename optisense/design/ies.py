@@ -96,7 +96,7 @@ def parse_ies(text: str, source: str) -> IesProfile:
     n_vertical = values.integer("number of vertical angles", 2, MAX_VALUES)
     n_horizontal = values.integer("number of horizontal angles", 1, MAX_VALUES)
     if n_vertical * n_horizontal > MAX_VALUES:
-        values.fail(f"{n_vertical} x {n_horizontal} intensities are too many")
+        values.fail(f"{n_vertical} x {n_horizontal} intensities are more than {MAX_VALUES:,}")
     if values.integer("photometric type", 1, 3) != 1:
         values.fail("only type C photometry (1) is read, not type A or B")
     values.integer("units type", 1, 2)
@@ -137,6 +137,7 @@ class _Values:
         self._last_line = len(lines)
 
     def fail(self, message: str) -> None:
+        """Raise a LibraryError that names the line of the last value."""
         line = self._last_line
         if self._next:
             line = self._start + bisect_left(self._ends, self._next) + 1
@@ -145,15 +146,18 @@ class _Values:
         )
 
     def number(self, name: str) -> float:
+        """Return the next value."""
         return float(self.array(name, 1)[0])
 
     def integer(self, name: str, low: int, high: int) -> int:
+        """Return the next value, which must be a whole number from `low` to `high`."""
         value = self.number(name)
         if value != int(value) or not low <= value <= high:
             self.fail(f"the {name} is {value:g}, it must be a whole number from {low} to {high}")
         return int(value)
 
     def array(self, name: str, count: int) -> FloatArray:
+        """Return the next values (count,), which must be finite."""
         words = self._words[self._next : self._next + count]
         begin = self._next
         try:
@@ -183,6 +187,7 @@ class _Values:
         return result
 
     def expect_end(self) -> None:
+        """Refuse further values."""
         left = len(self._words) - self._next
         if left:
             self._next += 1

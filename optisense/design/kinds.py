@@ -20,14 +20,14 @@ from optisense.untrusted_files import MOST_IES, inside, read_bytes
 class KindModel(Model):
     """Base class of models that come in several kinds, each a class with its own fields.
 
-    A direct subclass with a `kinds` of its own is a noun (emitter, material, ...): as the type of a
-    field, it accepts any kind of it and finds the class by `kind`. A subclass of that one whose
-    `kind` has a default is a kind.
+    A direct subclass with a registry `kinds` of its own is an interface (emitter, material, ...).
+    As the type of a field, it accepts any of its kinds and finds the class by the field `kind`. A
+    subclass of an interface whose `kind` has a default is a kind.
 
     Attributes:
-        kinds: registry of all kinds of the noun.
-        usual_kind: of a noun, the kind of values that name none; if omitted, values must name one.
-        title: name of the kind in menus; the kind's name if omitted.
+        kinds: registry of all kinds of the interface.
+        usual_kind: kind of values that name none; if it is None, values must name one.
+        title: name of the kind in menus; the kind's name if empty.
     """
 
     kinds: ClassVar[Registry[Any]]
@@ -48,9 +48,8 @@ class KindModel(Model):
     def __get_pydantic_core_schema__(
         cls, source: Any, handler: GetCoreSchemaHandler, /
     ) -> CoreSchema:
-        """Return the schema of a noun, which accepts any of its kinds, including those registered
-        later.
-        """
+        """Return the schema of an interface, which accepts any kind, also those registered
+        later."""
         if "kinds" not in cls.__dict__:
             return handler(source)
         return core_schema.no_info_plain_validator_function(
@@ -61,7 +60,7 @@ class KindModel(Model):
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /
     ) -> dict[str, Any]:
-        """Return the JSON schema of a noun: one of the schemas of its kinds."""
+        """Return the JSON schema of an interface: one of the schemas of its kinds."""
         if "kinds" not in cls.__dict__:
             return handler(schema)
         kinds = [cls.kinds.find(name) for name in cls.kinds.names()]

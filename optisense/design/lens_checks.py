@@ -20,9 +20,9 @@ def fold_problems(camera: Camera, where: str) -> list[Diagnostic]:
     return [
         Diagnostic(
             f"the lens's distortion folds {angle:.3g} degrees off its axis, inside the picture: "
-            "what lies there is shown twice, or some pixels show nothing",
+            "points beyond are shown twice, or some pixels show nothing",
             where,
-            "Give coefficients nearer to 0, or a smaller field of view (fov); a calibration holds "
-            "only as far out as its marks were",
+            "Give coefficients nearer to 0, or a smaller field of view (fov); a calibration is "
+            "valid only where its marks were",
         )
     ]

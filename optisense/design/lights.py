@@ -20,7 +20,7 @@ class Light(Model):
     """Pose of one light."""
 
     position: Vector = Field(description="mm, x y z")
-    direction: Direction = Field(description="where it shines, any length")
+    direction: Direction = Field(description="axis of its beam, any length")
     up: Direction | None = Field(default=None, description="along the height of its window")
 
 
@@ -28,15 +28,18 @@ class LightGroup(Model):
     """Lights that are switched and recoloured together."""
 
     model: Name = Field(description="library light, or a name for the emitter below")
-    colour: Colour = Field(description="how its flux is shared among R, G, B; only ratios count")
+    colour: Colour = Field(description="shares of R, G, B in its flux; only ratios count")
     flux: Annotated[NonNegative, Field(le=1e6)] = Field(
         description="mW, radiant flux of each light, over all channels"
     )
-    emitter: LightModel | None = Field(default=None, description="instead of the library's light")
+    emitter: LightModel | None = Field(
+        default=None, description="emitter, instead of the library's light"
+    )
     spectrum: LightSpectra | None = Field(
         default=None,
         exclude_if=is_left_out,
-        description="of the red, green and blue dies; without, each has its channel",
+        description="spectra of the red, green and blue dies; without them, each die emits in its "
+        "own channel",
     )
     lights: Annotated[list[Light], Field(min_length=1, max_length=MOST_LIGHTS)] = Field(
         description="position in mm, direction of any length"

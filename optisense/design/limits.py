@@ -80,11 +80,15 @@ def refuse_far(label: str, position: ArrayLike) -> None:
 
 
 def place_slip(position: ArrayLike) -> str | None:
-    """Return what is wrong with the place of a light or camera, or None."""
+    """Return a text that says how a light or camera is too far away, or None.
+
+    Args:
+        position: position (3,), mm.
+    """
     distance = float(np.linalg.norm(position))
     if distance <= LARGEST:
         return None
-    return f"is {distance:.6g} mm from the origin: not in millimetres?"
+    return f"is {distance:.6g} mm from the origin: is its position in millimetres?"
 
 
 def placed_things(

@@ -11,4 +11,4 @@ ROLE_LOOKS: dict[str, tuple[str, float]] = {
     "interface": ("#b7a6f2", 0.3),
     "indenter": ("#b9a44c", 1.0),
 }
-"""Colour and opacity of each role."""
+"""Colour and opacity (0 to 1) of each role: transparent parts show what is behind them."""

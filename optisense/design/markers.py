@@ -26,9 +26,11 @@ Side = Annotated[int, Field(strict=True, ge=1, le=200)]
 class Markers(Model):
     """Dots on the sensing surface: a grid of them around its middle, or a list of positions."""
 
-    radius: Positive = Field(description="of a dot", examples=[0.4], json_schema_extra=MILLIMETRES)
+    radius: Positive = Field(
+        description="radius of a dot", examples=[0.4], json_schema_extra=MILLIMETRES
+    )
     reflectance: Colour = Field(
-        default=(0.03, 0.03, 0.03), description="of the dots' ink, diffuse, for R, G, B"
+        default=(0.03, 0.03, 0.03), description="diffuse reflectance of the dots' ink for R, G, B"
     )
     grid: tuple[Side, Side] | None = Field(
         default=None, exclude_if=is_left_out, description="numbers of dots along u and along v"
@@ -36,7 +38,7 @@ class Markers(Model):
     pitch: Positive | None = Field(
         default=None,
         exclude_if=is_left_out,
-        description="between dots of the grid",
+        description="distance between dots of the grid",
         json_schema_extra=MILLIMETRES,
     )
     places: Places | None = Field(

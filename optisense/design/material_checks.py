@@ -86,8 +86,8 @@ def absorption_problems(
     once.
 
     Args:
-        design: the design.
-        meshes: the meshes of its parts, mm.
+        design: design of the sensor.
+        meshes: meshes of its parts, mm, by part.
     """
     problems: list[Diagnostic] = []
     told: set[str] = set()

@@ -32,7 +32,7 @@ def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> 
         path: tuple[str | int, ...] = ("parts", name, "faces", label)
         if part.role is Role.SENSING_SURFACE:
             raise InconsistentValueError(
-                f"part '{name}' is a sensing_surface: it wears the coating, and can't be frosted "
+                f"part '{name}' is a sensing_surface: it has the coating, and can't be frosted "
                 "or painted",
                 path,
                 "Change the coating, or name faces of the elastomer that it does not cover",

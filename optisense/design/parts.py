@@ -54,7 +54,7 @@ class FaceFinish(Model):
     """
 
     direction: Direction | None = Field(
-        default=None, description="the faces look this way, to `within` degrees"
+        default=None, description="direction of the faces' normals, to `within` degrees"
     )
     within: Annotated[Number, Field(gt=0.0, le=180.0)] = Field(
         default=30.0,
@@ -75,7 +75,9 @@ class FaceFinish(Model):
     def _check_faces(self) -> FaceFinish:
         if self.direction is None and self.box is None:
             raise InconsistentValueError(
-                "it is not said which faces", (), "Give 'direction', 'box' or both"
+                "the finish does not say which faces it covers",
+                (),
+                "Give 'direction', 'box' or both",
             )
         if (self.roughness is None) == (self.paint is None):
             raise InconsistentValueError(

@@ -83,6 +83,7 @@ def design_error(
     """Return the DesignError for an error of pydantic.
 
     Args:
+        error: error of pydantic.
         data: data that were validated.
         where: file, or dotted path that was set.
         lines: line of each path in the file, if there is one.

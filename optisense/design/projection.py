@@ -38,8 +38,11 @@ def image_edges(camera: Camera) -> tuple[float, float]:
 
 
 def shown_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """Return x and y on the image plane, as the lens shows them, of positions in the picture,
-    (2, ...).
+    """Return x and y (2, ...) on the image plane, as the lens shows them, of positions.
+
+    Args:
+        camera: camera of the design.
+        across, down: positions (...) in the picture, in shares of its width and height.
     """
     edge, tall = image_edges(camera)
     middle = (0.5, 0.5) if camera.distortion is None else camera.distortion.centre
@@ -47,7 +50,12 @@ def shown_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatA
 
 
 def ideal_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """Return x and y on the image plane of an ideal lens for positions in the picture, (2, ...)."""
+    """Return x and y (2, ...) on the image plane of an ideal lens for positions in the picture.
+
+    Args:
+        camera: camera of the design.
+        across, down: positions (...) in the picture, in shares of its width and height.
+    """
     shown = shown_places(camera, across, down)
     lens = camera.distortion
     if lens is None:
@@ -57,7 +65,12 @@ def ideal_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatA
 
 
 def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """Return unit vectors (..., 3) in the viewing directions of positions in the picture."""
+    """Return unit vectors (..., 3) in the viewing directions of positions in the picture.
+
+    Args:
+        camera: camera of the design.
+        across, down: positions (...) in the picture, in shares of its width and height.
+    """
     x, y = ideal_places(camera, across, down)
     height = np.hypot(x, y)
     angle = height if camera.projection == "equidistant" else np.arctan(height)
@@ -67,10 +80,10 @@ def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArr
 
 
 def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the positions across (n,) and down (n,) of points in the picture; NaN for those that
-    the lens can't show.
+    """Return the positions across (n,) and down (n,) of points, in shares of the picture's size.
 
-    Positions outside of the picture are below 0 or above 1.
+    Positions outside of the picture are below 0 or above 1; those of points that the lens can't
+    show are NaN.
 
     Args:
         camera: camera of the design.
@@ -109,14 +122,13 @@ def _largest_height(camera: Camera) -> float:
 
 
 def folding_angle(camera: Camera) -> float | None:
-    """Return the angle off the axis from which on the lens shows points again that are in the
-    picture, degrees.
+    """Return the angle off the axis at which a lens folds within the picture, degrees.
 
-    Beyond it the distortion has no inverse: two directions are shown at one position, and others
-    nowhere.
+    Beyond this angle the distortion has no inverse: two directions are shown at one position, and
+    others nowhere.
 
     Returns:
-        The angle, or None for a lens that shows each point of the picture once.
+        Angle, or None for a lens that shows each point of the picture once.
     """
     lens = camera.distortion
     if lens is None:
@@ -130,15 +142,19 @@ def folding_angle(camera: Camera) -> float | None:
         off = np.hypot(*(np.array(lens.distort(ideal[0], ideal[1], numbers)) - shown))
         found = off <= UNDISTORTED_TO * np.maximum(1.0, np.hypot(*shown))
         way = np.linspace(0.0, 1.0, FOLD_STEPS).reshape(-1, 1, 1)
-        a, b, c, d = lens.slopes(way * ideal[0], way * ideal[1], numbers)
+        a, b, c, d = lens.jacobian(way * ideal[0], way * ideal[1], numbers)
         unfolded = (a * d - b * c > 0.0).all(axis=0)
     bad = ~(found & unfolded)
     return _first_fold(camera, shown[:, bad]) if bad.any() else None
 
 
 def _first_fold(camera: Camera, shown: FloatArray) -> float:
-    """Return the angle off the axis at which the lens first folds on the way to positions that it
-    shows, degrees.
+    """Return the smallest angle off the axis, degrees, at which the lens folds.
+
+    Args:
+        camera: camera of the design.
+        shown: positions (2, k) on the image plane, towards the farthest of which the fold is
+            searched.
     """
     lens = camera.distortion
     assert lens is not None
@@ -146,7 +162,7 @@ def _first_fold(camera: Camera, shown: FloatArray) -> float:
     way = farthest / np.hypot(*farthest)
     limit = np.pi if camera.projection == "equidistant" else np.tan(np.radians(89.9))
     height = np.geomspace(1e-3, limit, 4000)
-    a, b, c, d = lens.slopes(way[0] * height, way[1] * height, lens.coefficients())
+    a, b, c, d = lens.jacobian(way[0] * height, way[1] * height, lens.coefficients())
     folds = np.flatnonzero(a * d - b * c <= 0.0)
     at = float(height[folds[0]] if len(folds) else limit)
     return float(np.degrees(at if camera.projection == "equidistant" else np.arctan(at)))

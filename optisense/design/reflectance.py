@@ -9,10 +9,13 @@ FloatArray = NDArray[np.float64]
 
 
 def fresnel_dielectric(cosine: ArrayLike, eta: float | FloatArray) -> FloatArray:
-    """Return the reflectance of a smooth face between transparent media for unpolarised light.
+    """Return the reflectance (...) of a smooth face between transparent media.
+
+    The light is unpolarised (Fresnel's equations; Born and Wolf, 1.5.2); beyond the critical angle
+    the reflectance is 1.
 
     Args:
-        cosine: cosine of the angle of incidence, 0 to 1.
+        cosine: cosine (...) of the angle of incidence, 0 to 1.
         eta: index behind the face divided by the index in front of it.
     """
     ci = np.asarray(cosine, dtype=np.float64)
@@ -44,16 +47,24 @@ def fresnel_metal(cosine: ArrayLike, eta: ArrayLike, k: ArrayLike) -> FloatArray
 
 
 def ggx_density(cosine: ArrayLike, alpha: float) -> FloatArray:
-    """Return the GGX distribution of facet normals, by the cosine to the mean normal (Walter et al.
-    2007).
+    """Return the GGX density (...) of facet normals, 1/sr (Walter et al. 2007, equation 33).
+
+    Args:
+        cosine: cosine (...) of the angle between facet normal and mean normal.
+        alpha: roughness.
     """
     cos2 = np.square(np.asarray(cosine, dtype=np.float64))
     return np.asarray(alpha**2 / (np.pi * np.square(cos2 * (alpha**2 - 1.0) + 1.0)))
 
 
 def smith_shadowing(cosine: ArrayLike, alpha: float) -> FloatArray:
-    """Return the share of the facets that is visible from a direction, by its cosine to the mean
-    normal.
+    """Return the share (...) of the facets that is visible from a direction.
+
+    The formula is Smith's masking function for GGX (Walter et al. 2007, equation 34).
+
+    Args:
+        cosine: cosine (...) of the angle between direction and mean normal.
+        alpha: roughness.
     """
     cos2 = np.maximum(np.square(np.asarray(cosine, dtype=np.float64)), 1e-12)
     tan2 = (1.0 - cos2) / cos2
@@ -68,6 +79,7 @@ def sample_facets(view: FloatArray, alpha: float, u: FloatArray) -> FloatArray:
 
     Args:
         view: unit directions (n, 3), z above 0.
+        alpha: roughness.
         u: numbers (n, 2) from 0 to 1.
 
     Returns:

@@ -40,8 +40,9 @@ class Outline(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """Section of a design by a plane through the camera; coordinates are (across, along the view)
-    in mm.
+    """Section of a design by a plane through the camera.
+
+    Coordinates in the plane are across the view and along it, mm.
 
     Attributes:
         outlines: outlines of the parts that the plane meets, in the design's order.

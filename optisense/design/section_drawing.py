@@ -1,4 +1,4 @@
-"""Labelled drawing of a section: SVG text, for notebooks and reports."""
+"""Labelled drawing of a section as an SVG element, for notebooks and reports."""
 
 from __future__ import annotations
 

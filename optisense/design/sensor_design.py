@@ -59,7 +59,7 @@ class Provenance(Model):
     """Source of a number of the design."""
 
     status: Status = Field(description="; ".join(status.value for status in Status))
-    source: str = Field(description="where it is from, or how it was derived")
+    source: str = Field(description="origin of the number, or its derivation")
 
 
 class SensorDesign(Model):
@@ -72,7 +72,7 @@ class SensorDesign(Model):
     schema_version: Literal[1] = Field(default=1, description="version of this file format")
     name: Annotated[str, StringConstraints(min_length=1, max_length=200)]
     description: str = ""
-    coating: CoatingModel = Field(description="of the sensing surface")
+    coating: CoatingModel = Field(description="coating of the sensing surface")
     materials: dict[Name, Material] = Field(
         max_length=MOST_OF_A_KIND, description="optical materials, by name"
     )
@@ -97,7 +97,7 @@ class SensorDesign(Model):
     provenance: dict[str, Provenance] = Field(
         default_factory=dict,
         max_length=MOST_NOTES,
-        description="where the numbers come from, by dotted path",
+        description="sources of the numbers, by dotted path",
     )
 
     _meshes: dict[str, TriangleMesh] = PrivateAttr(default_factory=dict)
@@ -150,7 +150,7 @@ class SensorDesign(Model):
             return
         if part.role is Role.SENSING_SURFACE:
             raise InconsistentValueError(
-                f"part '{name}' is a sensing_surface and wears the coating, not a material",
+                f"part '{name}' is a sensing_surface: it has the coating, and no material",
                 path,
                 "Remove its material",
             )

@@ -32,7 +32,7 @@ class Spectrum(Model):
     )
 
     def shares(self) -> NDArray[np.float64]:
-        """Return the shares of the flux that count as light of R, G and B, (3,); they sum to 1.
+        """Return the shares (3,) of the flux in the channels R, G and B; they sum to 1.
 
         Light between the wavelengths of two channels is shared between them linearly by its
         distance to each; beyond the last it belongs to that channel. The response of a camera's
@@ -57,9 +57,7 @@ class LightSpectra(Model):
     blue: Spectrum | None = None
 
     def spread(self) -> NDArray[np.float64]:
-        """Return the shares of the light of the red, green and blue die (rows) in R, G and B,
-        (3, 3); rows sum to 1.
-        """
+        """Return the shares (3, 3) of each die's light (rows) in R, G and B; rows sum to 1."""
         dies = (self.red, self.green, self.blue)
         return np.array(
             [own if die is None else die.shares() for die, own in zip(dies, np.eye(3), strict=True)]

@@ -46,7 +46,7 @@ def load_design(path: str | Path) -> SensorDesign:
     file = path / DESIGN_FILE if is_folder(path) else path
     if not is_file(file):
         raise DesignError(
-            "there is no sensor design here",
+            "no sensor design is at this place",
             where=str(file),
             hint="Name a folder that holds a design.yaml",
         )
@@ -158,7 +158,7 @@ def _inside(folder: Path, relative: str, where: str) -> Path:
 
 def _hint_of_siblings(path: Path) -> str:
     if os.path.lexists(path):
-        return "What has this name is no regular file"
+        return "A folder or another special file has this name: remove or rename it"
     try:
         near = near_match(path.name, [sibling.name for sibling in path.parent.iterdir()])
     except OSError:

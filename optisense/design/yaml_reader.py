@@ -74,6 +74,8 @@ def parse_yaml(
 
 
 class _Reader:
+    """Parser of one YAML text, which builds plain values from its events."""
+
     def __init__(self, text: str, source: str, error: type[OptiSenseError]) -> None:
         self._events: Iterator[Any] = yaml.parse(text, Loader=_LOADER)
         self._source = source
@@ -81,6 +83,7 @@ class _Reader:
         self._lines: Lines = {}
 
     def read(self) -> tuple[dict[str, Any], Lines]:
+        """Return the data and the line of each value."""
         event = next(self._events)
         while isinstance(event, yaml.StreamStartEvent | yaml.DocumentStartEvent):
             event = next(self._events)

@@ -63,7 +63,7 @@ def test_setting_numpy_values_vectors_and_sections(design: SensorDesign) -> None
         ("cages.skin.point[3].z", "'points'"),
         ("cages.skin.points[99].z", "from 0 to 7"),
         ("camera.position.w", "x, y, z"),
-        ("camera.fov.x", "nothing inside"),
+        ("camera.fov.x", "is a single value"),
         ("coatings", "'coating'"),
     ],
 )

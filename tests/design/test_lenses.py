@@ -65,10 +65,10 @@ def test_undistorting_takes_a_distorted_grid_back(lens: LensDistortion, reach: f
 
 
 @pytest.mark.parametrize("lens", [BARREL, FISHEYE])
-def test_slopes_are_those_of_differences(lens: LensDistortion) -> None:
+def test_jacobian_is_that_of_differences(lens: LensDistortion) -> None:
     x, y = grid(0.7)
     numbers, step = lens.coefficients(), 1e-6
-    a, b, c, d = lens.slopes(x, y, numbers)
+    a, b, c, d = lens.jacobian(x, y, numbers)
     by_x = np.subtract(lens.distort(x + step, y, numbers), lens.distort(x - step, y, numbers))
     by_y = np.subtract(lens.distort(x, y + step, numbers), lens.distort(x, y - step, numbers))
     assert np.abs(np.array([a, c]) - by_x / (2 * step)).max() < 1e-8
@@ -123,7 +123,7 @@ def test_a_lens_that_folds_is_found_where_it_folds() -> None:
 
 
 def test_only_the_lens_that_it_is_made_for_is_distorted_by_a_model() -> None:
-    with pytest.raises(DesignError, match="equidistant lenses, and this one is perspective"):
+    with pytest.raises(DesignError, match="equidistant lenses, but this lens is perspective"):
         mini(distortion={"kind": "kannala-brandt", "k1": 0.1})
 
 

@@ -78,7 +78,7 @@ def test_a_clear_material_says_nothing_of_absorption() -> None:
         ({"thickness": 3.0}, "needs 'transmittance'"),
         ({"transmittance": (0.9,) * 3, "thickness": 0.0}, "greater than 0"),
         ({"transmittance": (0.9, 0.9, 0.97), "thickness": 3.0}, "passes at most 0.923"),
-        ({"transmittance": (0.9, 0.9, 0.0), "thickness": 3.0}, "does not tell"),
+        ({"transmittance": (0.9, 0.9, 0.0), "thickness": 3.0}, "does not follow"),
         ({"sellmeier_b": (1.0, 0.0, 0.0)}, "needs 'sellmeier_c'"),
         ({"ior": 1.3, **PDMS}, "gives an index of 1.431 at 589 nm"),
         ({"sellmeier_b": (1.0, 0, 0), "sellmeier_c": (13185.0, 0, 0)}, "at 589 nm"),

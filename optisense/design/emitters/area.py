@@ -26,7 +26,7 @@ class AreaEmitter(LightModel):
         examples=[(2.0, 2.0)],
         json_schema_extra=MILLIMETRES,
     )
-    lambertian: Literal[True] = Field(default=True, description="as bright from all sides")
+    lambertian: Literal[True] = Field(default=True, description="equal radiance in all directions")
 
     @model_validator(mode="after")
     def _disc_is_round(self) -> AreaEmitter:
@@ -35,7 +35,12 @@ class AreaEmitter(LightModel):
         return self
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Return the radiant intensity over its peak: the cosine (Lambert's law)."""
+        """Return the radiant intensity over its peak: the cosine (Lambert's law).
+
+        Args:
+            polar: angle (...) from the light's direction, degrees.
+            azimuth: angle about it, degrees, of a shape that broadcasts with `polar`.
+        """
         cosine = np.cos(np.radians(np.asarray(polar, dtype=np.float64)))
         return np.maximum(cosine, 0.0) + 0.0 * np.asarray(azimuth)
 

@@ -74,8 +74,11 @@ class LightModel(KindModel):
 
     @abstractmethod
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Return the radiant intensity over its largest value, at angles of any shapes that
-        broadcast.
+        """Return the radiant intensity over its largest value, in the shape of the angles.
+
+        Args:
+            polar: angle (...) from the light's direction, degrees.
+            azimuth: angle about it, degrees, of a shape that broadcasts with `polar`.
 
         Raises:
             OptiSenseError: a file of the lamp can't be read.
@@ -92,10 +95,10 @@ class LightModel(KindModel):
         return None
 
     def angles(self) -> tuple[FloatArray, FloatArray]:
-        """Return polar (n,) and azimuth (m,) angles between which the intensity is nearly linear.
+        """Return polar (n,) and azimuth (m,) angles, degrees, of a table of the intensity.
 
-        Both ascend; polar angles start at 0 and end where the light does, azimuths run from 0 to
-        360 inclusive.
+        Between these angles, the intensity is nearly linear. Both ascend; polar angles start at 0
+        and end where the light does, azimuths run from 0 to 360 inclusive.
         """
         azimuth = np.linspace(0.0, 360.0, AZIMUTHS)
         polar = np.arange(0.0, 180.0 + COARSE_POLAR, COARSE_POLAR)
@@ -116,10 +119,12 @@ class LightModel(KindModel):
         return Intensity(polar, azimuth, np.broadcast_to(values, shape)).without_azimuth()
 
     def half_angle(self, azimuth: float = 0.0) -> float:
-        """Return the angle from the axis at which the intensity has fallen to half its value there,
-        degrees.
+        """Return the angle from the axis, degrees, at which the intensity is half that on the axis.
 
-        The result is 180 if it never does, or if the axis is dark.
+        The result is 180 if there is no such angle, or if the axis is dark.
+
+        Args:
+            azimuth: azimuth of the plane in which the angle is measured, degrees.
         """
         angle = np.linspace(0.0, 180.0, 7201)
         value = self.relative_intensity(angle, azimuth)

@@ -44,6 +44,10 @@ class IesEmitter(LightModel):
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
         """Return the radiant intensity over its peak, linear between the file's angles.
 
+        Args:
+            polar: angle (...) from the light's direction, degrees.
+            azimuth: angle about it, degrees, of a shape that broadcasts with `polar`.
+
         Raises:
             LibraryError: the file is missing or malformed.
         """

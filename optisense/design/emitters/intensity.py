@@ -14,9 +14,10 @@ FloatArray = NDArray[np.floating]
 class Intensity:
     """Radiant intensity over the polar angle from the axis and the azimuth.
 
-    Attributes: polar (n,) degrees ascending from 0; azimuth (m,) degrees, [0] alone if symmetric,
-    else covering 0..360; values (m, n) relative intensity, linear between the given angles, zero
-    beyond the last.
+    Attributes:
+        polar: polar angles (n,), degrees, ascending from 0.
+        azimuth: azimuths (m,), degrees: 0 alone if the lamp is symmetric, else from 0 to 360.
+        values: relative intensity (m, n), linear between the angles and 0 beyond the last one.
     """
 
     polar: FloatArray
@@ -24,7 +25,7 @@ class Intensity:
     values: FloatArray
 
     def at(self, polar: FloatArray, azimuth: FloatArray) -> FloatArray:
-        """Return the intensity at angles in degrees (arrays of one shape)."""
+        """Return the relative intensity (...) at polar angles and azimuths (...), degrees."""
         p = np.clip(np.interp(polar, self.polar, np.arange(len(self.polar))), 0, None)
         i = np.minimum(p.astype(int), max(len(self.polar) - 2, 0))
         f = p - i

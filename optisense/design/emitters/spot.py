@@ -17,7 +17,7 @@ cubic: linear interpolation between them is off by less than 1e-4 of the peak.
 
 
 class SpotEmitter(LightModel):
-    """A point whose light is even up to `beam` and falls to nothing at `cutoff`."""
+    """A point whose intensity is constant up to `beam` and falls to 0 at `cutoff`."""
 
     title: ClassVar[str] = "Spot"
 
@@ -36,8 +36,13 @@ class SpotEmitter(LightModel):
         return self
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Return the radiant intensity over its peak: a smooth step, 3 t^2 - 2 t^3 with t from 0 at
-        the cut-off to 1 at the beam.
+        """Return the radiant intensity over its peak.
+
+        It is a smooth step, 3 t^2 - 2 t^3, with t from 0 at the cut-off to 1 at the beam.
+
+        Args:
+            polar: angle (...) from the light's direction, degrees.
+            azimuth: angle about it, degrees, of a shape that broadcasts with `polar`.
         """
         angle = np.asarray(polar, dtype=np.float64)
         if self.cutoff > self.beam:
@@ -47,7 +52,10 @@ class SpotEmitter(LightModel):
         return t * t * (3.0 - 2.0 * t) + 0.0 * np.asarray(azimuth)
 
     def angles(self) -> tuple[FloatArray, FloatArray]:
-        """Return the axis, and angles from the beam to the cut-off; the spot is symmetric."""
+        """Return polar angles (n,), degrees, on the axis and from the beam to the cut-off.
+
+        The azimuths are 0 alone, (1,), since a spot is symmetric.
+        """
         fall = np.linspace(self.beam, self.cutoff, FALL_ANGLES)
         return np.unique(np.concatenate([[0.0, self.beam], fall])), np.zeros(1)
 

@@ -1,7 +1,7 @@
 """Departures of a camera's lens from an ideal one: distortion, shading, blur.
 
-Each noun has a base class with a registry of its kinds, and a file for each kind. `film` has the
-positions of a picture's pixels at which they are evaluated.
+Each of them has a base class with a registry of its kinds, and a file for each kind. `film` has the
+positions of the pixels at which they are evaluated.
 """
 
 from optisense.design.lenses.blur import LensBlur

@@ -1,6 +1,6 @@
-"""Blur: the spread of a point's light over the picture by a lens.
+"""Blur of a lens: the point spread function.
 
-The spread is a normal distribution, whose standard deviation is given as a share of the picture's
+It is a normal distribution, whose standard deviation is given as a share of the picture's
 width, so that it does not depend on the resolution of a render.
 """
 
@@ -51,7 +51,7 @@ class LensView(Protocol):
 
 
 class LensBlur(KindModel):
-    """The point spread of a lens; each kind is a subclass."""
+    """The point spread function of a lens; each kind is a subclass."""
 
     kinds: ClassVar[Registry[Any]] = Registry(
         "kind of lens blur",
@@ -68,28 +68,33 @@ class LensBlur(KindModel):
 
     @abstractmethod
     def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """Return the standard deviation as a share of the picture's width.
+        """Return the standard deviation (...) as a share of the picture's width.
 
         Args:
             camera: camera of the lens.
-            vergence: one over the apparent distance of what each pixel sees, (...), 1/mm; a single
-                0 if `by_depth` is false.
+            vergence: inverse (...) of the apparent distance of the point that a pixel sees, 1/mm; a
+                single 0 if `by_depth` is false.
         """
 
 
 def reach_of(deviation: float, width: int) -> int:
-    """Return the radius of a blur in a picture of this width, in pixels."""
+    """Return the radius, pixels, within which a blur is computed.
+
+    Args:
+        deviation: standard deviation, as a share of the picture's width.
+        width: width of the picture, pixels.
+    """
     return int(np.ceil(REACH * min(deviation, LARGEST) * width)) + 1
 
 
 def blurred(
     levels: FloatArray, deviation: FloatArray, span: tuple[float, float] | None = None
 ) -> FloatArray:
-    """Return levels blurred by a width that may vary.
+    """Return levels (h, w, 3), blurred by a width that may vary over the picture.
 
     Args:
         levels: levels (h, w, 3).
-        deviation: standard deviation, () or (h, w), in pixels.
+        deviation: standard deviation, a scalar or (h, w), pixels.
         span: smallest and largest deviation in the whole picture, if the levels are a part of it,
             which is then blurred as it is in the whole.
     """

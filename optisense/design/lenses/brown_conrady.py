@@ -32,7 +32,7 @@ class BrownConrady(LensDistortion):
 
     @staticmethod
     def distort(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Return the position at which the lens shows a point of the ideal image plane."""
+        """Return the position (x, y) at which the lens shows points of the ideal image plane."""
         k1, k2, p1, p2, k3 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * k3))
@@ -42,8 +42,8 @@ class BrownConrady(LensDistortion):
         )
 
     @staticmethod
-    def slopes(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
-        """Return the derivatives of `distort`."""
+    def jacobian(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
+        """Return dx/dx, dx/dy, dy/dx and dy/dy of `distort`, each in the shape of `x`."""
         k1, k2, p1, p2, k3 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * k3))

@@ -18,11 +18,11 @@ DISC_DEVIATION = 0.25
 
 
 class Defocus(LensBlur):
-    """A thin lens: what lies nearer or farther than the focus is spread over a disc.
+    """Blur of a thin lens: a point nearer or farther than the focus is spread over a disc.
 
     A point at the distance z from the entrance pupil is seen under the angle A |1/z - 1/z_f|, with
-    A the diameter of the entrance pupil and z_f the distance in focus: the circle of confusion. Its
-    disc is taken for a normal distribution of the same variance.
+    A the diameter of the entrance pupil and z_f the distance in focus: the circle of confusion. The
+    disc is replaced by a normal distribution of the same variance.
     """
 
     title: ClassVar[str] = "Defocus"
@@ -30,23 +30,33 @@ class Defocus(LensBlur):
 
     kind: Literal["defocus"] = "defocus"
     focal_length: Positive = Field(
-        description="mm, of the lens", examples=[3.04], json_schema_extra=MILLIMETRES
+        description="focal length of the lens", examples=[3.04], json_schema_extra=MILLIMETRES
     )
     f_number: Positive = Field(
         description="focal length over the diameter of the entrance pupil", examples=[2.0]
     )
     focus_distance: Positive = Field(
-        description="mm, from the entrance pupil to what is sharp, in air",
+        description="distance in focus, from the entrance pupil, in air",
         examples=[25.0],
         json_schema_extra=MILLIMETRES,
     )
 
     def circle(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """Return the diameter of the circle of confusion, as a share of the picture's width."""
+        """Return the diameter (...) of the circle of confusion, as a share of the picture's width.
+
+        Args:
+            camera: camera of the lens.
+            vergence: inverse (...) of the apparent distance, 1/mm.
+        """
         pupil = self.focal_length / self.f_number
         angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
         return np.asarray(angle * camera.angle_scale)
 
     def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """Return a quarter of the circle's diameter."""
+        """Return the standard deviation (...) of the disc: a quarter of the circle's diameter.
+
+        Args:
+            camera: camera of the lens.
+            vergence: inverse (...) of the apparent distance, 1/mm.
+        """
         return DISC_DEVIATION * self.circle(camera, vergence)

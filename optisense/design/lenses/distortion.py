@@ -37,7 +37,7 @@ Coefficient = Annotated[Number, Field(ge=-1e6, le=1e6)]
 class LensDistortion(KindModel):
     """Departure of a lens from its projection; each kind is a subclass.
 
-    `distort` and `slopes` use only the four arithmetic operations, so that they work for NumPy's
+    `distort` and `jacobian` use only the four arithmetic operations, so that they work for NumPy's
     arrays and those of the renderer. The coefficients are arguments, because they are arrays of the
     renderer there.
     """
@@ -58,8 +58,8 @@ class LensDistortion(KindModel):
     kind: str
     centre: tuple[Share, Share] = Field(
         default=(0.5, 0.5),
-        description="where the lens's axis meets the picture, shares of its width and height from "
-        "the top left",
+        description="point where the lens's axis meets the picture, in shares of its width and "
+        "height from the top left",
     )
 
     @abstractmethod
@@ -69,26 +69,36 @@ class LensDistortion(KindModel):
     @staticmethod
     @abstractmethod
     def distort(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Return the position at which the lens shows a point of the ideal image plane.
+        """Return the position (x, y) at which the lens shows points of the ideal image plane.
 
         Args:
-            x, y: point of the ideal image plane.
+            x, y: points of the ideal image plane, arrays of one shape.
             numbers: coefficients, as from `coefficients`.
         """
 
     @staticmethod
     @abstractmethod
-    def slopes(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
-        """Return the derivatives of `distort`: of its x by x and by y, of its y by x and by y."""
+    def jacobian(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
+        """Return the derivatives of `distort`: dx/dx, dx/dy, dy/dx and dy/dy.
+
+        Args:
+            x, y: points of the ideal image plane, arrays of one shape.
+            numbers: coefficients, as from `coefficients`.
+        """
 
     def undistort(self, x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Return the point of the ideal image plane that the lens shows at a position, by Newton's
-        method.
+        """Return the points (x, y) of the ideal image plane that the lens shows at positions.
+
+        Newton's method is used; where the lens folds, it does not converge.
+
+        Args:
+            x, y: positions as the lens shows them, arrays of one shape.
+            numbers: coefficients, as from `coefficients`.
         """
         ideal_x, ideal_y = x, y
         for _ in range(NEWTON_STEPS):
             shown_x, shown_y = self.distort(ideal_x, ideal_y, numbers)
-            a, b, c, d = self.slopes(ideal_x, ideal_y, numbers)
+            a, b, c, d = self.jacobian(ideal_x, ideal_y, numbers)
             off_x, off_y = shown_x - x, shown_y - y
             inverse = 1.0 / (a * d - b * c)
             ideal_x = ideal_x - (d * off_x - b * off_y) * inverse

@@ -55,7 +55,7 @@ class FilmPlaces:
 
 
 def film_places(height: int, width: int) -> FilmPlaces:
-    """Return the centres of the pixels of a picture."""
+    """Return the centres (height, width) of the pixels of a picture."""
     across, down = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
     x, y = 2.0 * across - 1.0, (2.0 * down - 1.0) * height / width
     return FilmPlaces(across, down, np.hypot(x, y) / np.hypot(1.0, height / width))

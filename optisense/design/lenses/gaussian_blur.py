@@ -15,7 +15,7 @@ FloatArray = NDArray[np.floating]
 
 
 class GaussianBlur(LensBlur):
-    """The same width everywhere."""
+    """Blur of the same width everywhere."""
 
     title: ClassVar[str] = "Gaussian"
 
@@ -27,5 +27,5 @@ class GaussianBlur(LensBlur):
     )
 
     def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
-        """Return the width divided by the number of pixels across."""
+        """Return the width over the number of pixels across, in the shape of `vergence`."""
         return np.asarray(self.width / camera.resolution[0]) + 0.0 * vergence

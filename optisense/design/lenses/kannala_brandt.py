@@ -31,15 +31,15 @@ class KannalaBrandt(LensDistortion):
 
     @staticmethod
     def distort(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
-        """Return the position at which the lens shows a point of the ideal image plane."""
+        """Return the position (x, y) at which the lens shows points of the ideal image plane."""
         k1, k2, k3, k4 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4)))
         return x * radial, y * radial
 
     @staticmethod
-    def slopes(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
-        """Return the derivatives of `distort`."""
+    def jacobian(x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any, Any, Any]:
+        """Return dx/dx, dx/dy, dy/dx and dy/dy of `distort`, each in the shape of `x`."""
         k1, k2, k3, k4 = numbers
         square = x * x + y * y
         radial = 1.0 + square * (k1 + square * (k2 + square * (k3 + square * k4)))

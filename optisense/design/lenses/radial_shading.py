@@ -42,7 +42,7 @@ class RadialShading(LensShading):
     )
 
     def transmission(self, places: FilmPlaces) -> FloatArray:
-        """Return the transmission: 1 in the middle, 1 - falloff in the corners."""
+        """Return the transmission (h, w, 3): 1 in the middle, 1 - falloff in the corners."""
         each = [
             self.falloff if own is None else own
             for own in (self.red_falloff, None, self.blue_falloff)

@@ -27,8 +27,8 @@ GainTable = list[list[Gain]]
 class TableShading(LensShading):
     """A table of the gains that undo the shading, as tuning files of cameras hold it.
 
-    A row of the table stands for a band of the picture and a number in it for a cell of that band;
-    between the middles of cells the gain is interpolated, and it is level beyond the outermost.
+    A row of the table describes a band of the picture, and a number in it a cell of that band. The
+    gain is interpolated between the middles of cells and constant beyond the outermost ones.
     """
 
     title: ClassVar[str] = "Table"
@@ -72,7 +72,7 @@ class TableShading(LensShading):
         return self
 
     def transmission(self, places: FilmPlaces) -> FloatArray:
-        """Return the inverse of the gains."""
+        """Return the transmission (h, w, 3): the inverse of the gains."""
         from scipy.ndimage import map_coordinates  # takes a third of a second to load
 
         rows, columns = len(self.gain), len(self.gain[0])
@@ -86,7 +86,10 @@ class TableShading(LensShading):
         return 1.0 / np.stack([green * further[0], green, green * further[1]], axis=-1)
 
     def correction(self, transmission: FloatArray) -> FloatArray:
-        """Return the gain of green, and the further ones of red and blue, each by its share."""
+        """Return the gain (h, w, 3) that the processor applies for a transmission (h, w, 3).
+
+        It is the gain of green, times the further gains of red and blue, each in its share.
+        """
         green = transmission[..., 1:2]
         further = green / transmission
         gain = 1.0 + self.corrected * (1.0 / green - 1.0)

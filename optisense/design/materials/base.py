@@ -122,11 +122,11 @@ class Material(KindModel):
         return Reflection()
 
     def in_words(self) -> str:
-        """Return its most informative number, in a few words."""
+        """Return the most informative number of the material, in a few words."""
         return f"reflects {100 * float(self.reflection().normal_reflectance().mean()):.3g} %"
 
     def consequences(self) -> list[str]:
-        """Return quantities that follow from its numbers, one per line."""
+        """Return texts about quantities that follow from the numbers, such as reflectances."""
         return []
 
 
@@ -152,12 +152,12 @@ class CoatingModel(KindModel):
         """Return its reflection, with the metal's index as in air."""
 
     def in_words(self) -> str:
-        """Return its most informative number, in a few words."""
+        """Return the most informative number of the material, in a few words."""
         share = float(self.reflection().in_medium(GEL_INDEX).normal_reflectance().mean())
         return f"reflects {100 * share:.3g} % in silicone"
 
     def consequences(self) -> list[str]:
-        """Return quantities that follow from its numbers, one per line."""
+        """Return texts about quantities that follow from the numbers, such as reflectances."""
         return []
 
 

@@ -99,7 +99,7 @@ class Dielectric(Material):
         default=None,
         exclude_if=is_left_out,
         title="Plate's thickness",
-        description="of that plate",
+        description="thickness of that plate",
         examples=[3.0],
         json_schema_extra=MILLIMETRES,
     )
@@ -126,7 +126,7 @@ class Dielectric(Material):
     )
 
     elasticity: GelElasticity | None = Field(
-        default=None, description="how it yields, for elastomers", exclude_if=is_left_out
+        default=None, description="elastic constants, for elastomers", exclude_if=is_left_out
     )
 
     @model_validator(mode="after")
@@ -181,7 +181,7 @@ class Dielectric(Material):
             return
         if min(self.transmittance) <= 0.0:
             raise InconsistentValueError(
-                "a plate of transmittance 0 does not tell how much is absorbed",
+                "the absorption does not follow from a plate of transmittance 0",
                 ("transmittance",),
                 "Measure a thinner plate, or give 'absorption'",
             )

@@ -16,7 +16,9 @@ class Diffuse(Material):
     title: ClassVar[str] = "Diffuse"
 
     kind: Literal["diffuse"] = "diffuse"
-    reflectance: Colour = Field(description="of R, G, B, 0 to 1", examples=[(0.5, 0.5, 0.5)])
+    reflectance: Colour = Field(
+        description="reflectance at R, G, B, 0 to 1", examples=[(0.5, 0.5, 0.5)]
+    )
 
     def reflection(self) -> Reflection:
         """Return the reflection of the diffuse lobe alone."""

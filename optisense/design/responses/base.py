@@ -59,17 +59,18 @@ class CameraResponse(KindModel):
         return 0
 
     def spreads(self, exposed: FloatArray) -> bool:
-        """Return whether light in some pixel of a picture changes others."""
+        """Return whether light in some pixel of exposed levels (h, w, 3) changes others."""
         return self.reach(exposed.shape[1]) > 0
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """Return the stored levels, 0 to 1 before rounding, of the sensor's readings: the sRGB
-        curve.
+        """Return the stored levels (...), 0 to 1 before rounding, of readings (...), 0 to 1.
+
+        They follow the sRGB curve unless a kind has its own.
         """
         return srgb_curve(linear)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """Return the stored levels in 8 bits."""
+        """Return the stored levels (...) in 8 bits of readings (...), 0 to 1."""
         return np.round(255.0 * self.curve(linear)).astype(np.uint8)
 
     def auto_exposure(self, radiance: FloatArray) -> float:
@@ -83,7 +84,8 @@ class CameraResponse(KindModel):
 
 
 def brightest(image: FloatArray) -> FloatArray:
-    """Return the largest channel (h, w); several times faster than NumPy's maximum along an axis of
-    3.
+    """Return the largest channel (h, w) of an image (h, w, 3).
+
+    This is several times faster than NumPy's maximum along an axis of 3.
     """
     return np.maximum(np.maximum(image[..., 0], image[..., 1]), image[..., 2])

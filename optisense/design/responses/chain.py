@@ -70,9 +70,7 @@ class SoftFocus:
         return window.width * map_coordinates(self.deviation, at, order=1, mode="nearest")
 
     def span(self, width: int) -> tuple[float, float]:
-        """Return the smallest and the largest standard deviation, in pixels of a picture of this
-        width.
-        """
+        """Return the smallest and largest standard deviation in a picture of a width, pixels."""
         return width * float(self.deviation.min()), width * self.largest
 
     @property
@@ -139,8 +137,9 @@ class PictureChain:
         return self._processed(self._read(level, place, seed), place)
 
     def linear(self, exposed: FloatArray) -> NDArray[np.float32]:
-        """Return levels (h, w, 3) without noise, overexposure and clipping, which are additive:
-        those of a sum of lights are the sum of their levels.
+        """Return levels (h, w, 3) without noise, overexposure and clipping.
+
+        These levels are additive: those of a sum of lights are the sum of their levels.
 
         Args:
             exposed: radiance times the exposure, (h, w, 3).
@@ -225,14 +224,21 @@ class PictureChain:
         return self.response.full_level()
 
     def reach(self, width: int) -> int:
-        """Return the distance, in pixels, over which light in one pixel changes others, in a
-        picture of this width.
+        """Return the distance, pixels, over which light in one pixel changes others.
+
+        Args:
+            width: width of the whole picture, pixels.
         """
         own = self.response.reach(width)
         return own if not self._softens(width) else own + reach_of(self._largest, width)
 
     def spreads(self, exposed: FloatArray, window: PictureWindow | None = None) -> bool:
-        """Return whether light in some pixel of a picture, or of a part of it, changes others."""
+        """Return whether light in some pixel changes others.
+
+        Args:
+            exposed: radiance times the exposure, (h, w, 3), of a picture or of a part of it.
+            window: window of the part, if it is one.
+        """
         if self.is_plain:
             return self.response.spreads(exposed)
         place = window or PictureWindow.whole(*exposed.shape[:2])
@@ -246,11 +252,11 @@ class PictureChain:
         return self._largest * width >= LEAST_WIDTH
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """Return the stored levels, 0 to 1 before rounding, of linear levels."""
+        """Return the stored levels (...), 0 to 1 before rounding, of linear levels (...)."""
         return (self.tone_curve or self.response).curve(linear)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """Return the stored levels in 8 bits."""
+        """Return the stored levels (...) in 8 bits of linear levels (...), 0 to 1."""
         return (self.tone_curve or self.response).encode(linear)
 
 

@@ -39,18 +39,22 @@ class BlackLevel(Model):
     """
 
     level: Annotated[Number, Field(ge=0.0, lt=0.9)] = Field(
-        description="what the sensor reads in the dark, a share of its range"
+        description="level that the sensor reads in the dark, a share of its range"
     )
     subtracted: Fraction = Field(
-        default=1.0, description="share of it that is subtracted before anything is done with it"
+        default=1.0, description="share of it that the processor subtracts first"
     )
 
     def read(self, level: FloatArray) -> FloatArray:
-        """Return the converter's output, 0 to 1, for levels above black, negative ones included."""
+        """Return the converter's output (...), 0 to 1, for levels (...) relative to black."""
         return np.clip(self.level + (1.0 - self.level) * level, 0.0, 1.0)
 
     def subtract(self, read: FloatArray) -> FloatArray:
-        """Return the levels above the assumed black, scaled so that a full pixel stays at 1."""
+        """Return the levels (...) above the assumed black, scaled so that a full pixel stays at 1.
+
+        Args:
+            read: output (...) of the converter, 0 to 1.
+        """
         off = self.subtracted * self.level
         return (read - off) / (1.0 - off)
 
@@ -77,7 +81,7 @@ class SensorNoise(Model):
     )
 
     def deviation(self, level: FloatArray) -> FloatArray:
-        """Return the standard deviation of levels, as a share of a full pixel."""
+        """Return the standard deviation (...) of levels (...), as a share of a full pixel."""
         per_electron = self.gain / self.full_well
         shot = np.maximum(level, 0.0) * per_electron
         return np.sqrt((shot + (self.read_noise * per_electron) ** 2) / self.binning)
@@ -86,8 +90,8 @@ class SensorNoise(Model):
         """Return levels with noise.
 
         Args:
-            level: level of each pixel and channel.
-            normal: as many numbers of the standard normal distribution.
+            level: level (...) of each pixel and channel.
+            normal: numbers (...) of the standard normal distribution.
         """
         return level + self.deviation(level) * normal
 

@@ -53,11 +53,16 @@ class FullWellResponse(CameraResponse):
         return int(BLUR_REACH * self.blur * width) + SPARE
 
     def spreads(self, exposed: FloatArray) -> bool:
-        """Return whether a pixel is overexposed."""
+        """Return whether a pixel of exposed levels (h, w, 3) is overexposed."""
         return bool(exposed.max() > self.full_well)
 
     def respond(self, exposed: FloatArray, width: int | None = None) -> NDArray[np.float32]:
-        """Spread overexposure over the channels and clip."""
+        """Return the reading (h, w, 3), with overexposure spread over the channels, and clipped.
+
+        Args:
+            exposed: exposed levels (h, w, 3) of the picture or a part of it.
+            width: number of pixels across the whole picture, if `exposed` is a part of it.
+        """
         exposed = np.asarray(exposed, dtype=np.float32)
         excess = np.clip(brightest(exposed) - self.full_well, 0.0, MAX_EXCESS)
         if excess.any():
@@ -71,5 +76,5 @@ class FullWellResponse(CameraResponse):
         return np.clip(exposed, 0.0, 1.0, dtype=np.float32)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """Return the sRGB curve in 8 bits, in single precision."""
+        """Return the stored levels (...) in 8 bits, by the sRGB curve in single precision."""
         return encode(linear)

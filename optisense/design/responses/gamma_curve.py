@@ -23,6 +23,6 @@ class GammaCurve(ToneCurve):
     gamma: Positive = Field(default=2.2, description="1 stores linear levels", examples=[2.2])
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """Return the power of linear levels."""
+        """Return the stored levels (...), 0 to 1: a power of linear levels (...)."""
         level = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
         return np.asarray(level ** (1.0 / self.gamma))

@@ -45,5 +45,5 @@ class PointsCurve(ToneCurve):
         return self
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """Return the linear interpolation of linear levels."""
+        """Return the stored levels (...), 0 to 1, interpolated between the points."""
         return np.interp(np.clip(linear, 0.0, 1.0), *np.array(self.points).T)

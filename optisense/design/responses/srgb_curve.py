@@ -21,9 +21,9 @@ class SrgbCurve(ToneCurve):
     kind: Literal["srgb"] = "srgb"
 
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """Return a power of 1 / 2.4 with a linear piece in the dark."""
+        """Return the stored levels (...), 0 to 1: a power of 1 / 2.4, linear in the dark."""
         return srgb_curve(linear)
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """Return the stored levels in 8 bits, in single precision."""
+        """Return the stored levels (...) in 8 bits, in single precision."""
         return encode(linear)

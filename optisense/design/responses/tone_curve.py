@@ -31,10 +31,11 @@ class ToneCurve(KindModel):
 
     @abstractmethod
     def curve(self, linear: FloatArray) -> NDArray[np.float64]:
-        """Return the stored levels, 0 to 1 before rounding, of linear levels, which are clipped to
-        0..1.
+        """Return the stored levels (...), 0 to 1 before rounding, of linear levels (...).
+
+        Linear levels are clipped to 0..1.
         """
 
     def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
-        """Return the stored levels in 8 bits."""
+        """Return the stored levels (...) in 8 bits."""
         return np.round(255.0 * self.curve(linear)).astype(np.uint8)

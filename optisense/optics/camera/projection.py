@@ -130,7 +130,7 @@ class RayCamera:
         y = -(v + (1 - 2 * down) * (-self.height / self.width)) * edge
         numbers = tuple(dr.detach(each) for each in lens)
         ideal_x, ideal_y = distortion.undistort(dr.detach(x), dr.detach(y), numbers)
-        a, b, c, d = distortion.slopes(ideal_x, ideal_y, numbers)
+        a, b, c, d = distortion.jacobian(ideal_x, ideal_y, numbers)
         shown_x, shown_y = distortion.distort(ideal_x, ideal_y, lens)
         off_x, off_y = shown_x - x, shown_y - y
         inverse = 1 / (a * d - b * c)
