@@ -82,7 +82,7 @@ def main() -> None:
     from studio.scene import cages
     from studio.scene.collections import objects_of
     from studio.sensor.warming import warm_up
-    from studio.simulate import drafts, relight, stored
+    from studio.simulate import drafts, relight, stored_drafts
 
     studio.register()
     atexit.register(studio.unregister)
@@ -175,10 +175,10 @@ def main() -> None:
             time.sleep(session._tick() or 0.0)
 
     def kept_draft(_: int) -> None:
-        assert stored.show_kept(bpy.context.scene)
+        assert stored_drafts.show_kept(bpy.context.scene)
 
     place = Path(tempfile.mkdtemp())
-    stored.folder = lambda: place
+    stored_drafts.folder = lambda: place
     sensors = ("gelsight-svelte", "digit", "gelsight-mini-ideal")
     for name in sensors:
         bpy.ops.optisense.new(sensor=name)

@@ -18,25 +18,23 @@ from .evaluate import prop as evaluate_prop
 from .evaluate import ui as evaluate_ui
 from .export import operator as export_operator
 from .export import ui as export_ui
-from .lights import choosing as light_choosing
+from .lights import group_selection, row_gizmo, snapping, windows
 from .lights import operator as light_operator
-from .lights import row_gizmo, snapping, windows
 from .lights import rows as light_rows
 from .lights import ui as light_ui
 from .looks import drawing, footprint, glass, markers, section
 from .materials import gallery
 from .materials import operator as material_operator
 from .materials import ui as material_ui
-from .optimise import following, offering
 from .optimise import operator as optimise_operator
 from .optimise import prop as optimise_prop
+from .optimise import search_progress, unfinished_studies
 from .optimise import ui as optimise_ui
 from .scene import cages, fields, object_properties, old_files, properties
 from .sensor import cad, starting, tour, workspace
 from .sensor import operator as sensor_operator
 from .sensor import ui as sensor_ui
-from .shapes import cage_operator, cage_warnings, reference_operator, skin_operator
-from .shapes import choosing as cage_choosing
+from .shapes import cage_operator, cage_selection, cage_warnings, reference_operator, skin_operator
 from .shapes import ui as shape_ui
 from .simulate import drafts, editors, indenters, picture, relight, viewing
 from .simulate import operator as simulate_operator
@@ -62,19 +60,19 @@ MODULES = (
     indenters,
     evaluate_prop,
     optimise_prop,
-    following,
+    search_progress,
     cad,
     sensor_operator,
     workspace,
     tour,
     reference_operator,
     skin_operator,
-    cage_choosing,
+    cage_selection,
     cage_operator,
     cage_warnings,
     gallery,
     material_operator,
-    light_choosing,
+    group_selection,
     section,
     drawing,
     glass,
@@ -91,7 +89,7 @@ MODULES = (
     ledger,
     calibrate_operator,
     optimise_operator,
-    offering,
+    unfinished_studies,
     export_operator,
     sensor_ui,
     shape_ui,

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..core.engine import EngineError
-from ..core.vary import listed
+from ..core.search_parameters import listed
 from ..engine import catalogue, polls, session
 from ..engine.operators import fail, refuse, start_with_design
 from ..scene.paths import absolute, suggested
@@ -98,7 +98,7 @@ def _values(context: bpy.types.Context) -> OPTISENSE_PG_calibration:
 
 
 class OPTISENSE_OT_keep_family(bpy.types.Operator):
-    """Let a calibration change this, or keep it as the design has it"""
+    """Let the calibration change these numbers, or keep those of the design"""
 
     bl_idname = "optisense.keep_family"
     bl_label = "May Change"
@@ -111,7 +111,7 @@ class OPTISENSE_OT_keep_family(bpy.types.Operator):
         values = _values(context)
         rows = {each["name"]: each for each in catalogue.entries("calibration_families")}
         if self.family not in rows:
-            return refuse(self, f"There is nothing called '{self.family}' to fit")
+            return refuse(self, f"There is no group of numbers '{self.family}' to fit")
         if rows[self.family]["usual"]:
             values.kept = set(values.kept) ^ {self.family}
         else:
@@ -134,7 +134,7 @@ class OPTISENSE_OT_calibrate(polls.Checked, bpy.types.Operator):
         values = _values(context)
         photos = absolute(values.photos)
         if not photos.is_dir():
-            return refuse(self, f"{photos} is no folder")
+            return refuse(self, f"{photos} is no folder; choose the folder of the photographs")
         to = Path(suggested(context.scene, "-calibrated"))
         if to.exists():
             numbers = (to.with_name(f"{to.name}-{number}") for number in range(2, 1000))

@@ -13,8 +13,8 @@ gizmos.
 """
 
 ROUNDS = 12
-"""Number of iterations of the fit. Nearer points grow faster than far ones, so one step is not
-enough; after twelve nothing moves by a pixel.
+"""Number of iterations of the fit. Near points grow faster than far ones, so one step is not
+enough; after twelve steps no point moves by a pixel.
 """
 
 NEAREST = 0.2

@@ -62,7 +62,7 @@ def text_of(topic: str) -> tuple[bpy.types.Text, int]:
 
 
 class OPTISENSE_OT_help(bpy.types.Operator):
-    """Read what the documentation says of this; it comes with the extension"""
+    """Open the documentation of this panel, which comes with the extension"""
 
     bl_idname = "optisense.help"
     bl_label = "Help"
@@ -74,7 +74,7 @@ class OPTISENSE_OT_help(bpy.types.Operator):
 
     @classmethod
     def description(cls, context: bpy.types.Context, values: bpy.types.OperatorProperties) -> str:
-        return f"Read what the documentation says of: {values.topic}"
+        return f"Open the documentation: {values.topic}"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:

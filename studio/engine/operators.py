@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..core.engine import EngineError
-from . import handing, session
+from . import design_transfer, session
 
 
 def refuse(operator: bpy.types.Operator, text: str) -> set[str]:
@@ -55,7 +55,7 @@ def start_with_design(
 ) -> set[str]:
     """Start like `start`, with the scene's design among the fields of the request."""
     try:
-        design = handing.design(context.scene)
+        design = design_transfer.design(context.scene)
     except EngineError as error:
         return fail(operator, error, args[0])
     return start(operator, *args, design=design, **fields)

@@ -103,7 +103,7 @@ def restart() -> None:
     global _engine
     if _engine is not None:
         if not _engine.alive:
-            _engine.abandon()  # Pending requests are told.
+            _engine.abandon()  # reports the end to pending requests
         _engine.stop()
         _engine = None
     now = state()

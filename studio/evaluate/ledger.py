@@ -10,14 +10,14 @@ from bpy.props import StringProperty
 
 from ..core import ledger as core
 from ..core.engine import EngineError
-from ..engine import handing, polls
+from ..engine import design_transfer, polls
 from ..engine.layout import paragraph, show_job, show_outcome
 from ..engine.operators import fail, start
 
 SHARE = 0.58
 """Share of a line of the ledger that its text takes; the rest has room for `0.253 µW/mm²`."""
 
-TITLE = "Following light"
+TITLE = "Tracing light"
 
 
 class OPTISENSE_PG_ledger(bpy.types.PropertyGroup):
@@ -30,15 +30,15 @@ class OPTISENSE_PG_ledger(bpy.types.PropertyGroup):
 
 
 class OPTISENSE_OT_ledger(polls.Asking, bpy.types.Operator):
-    """Follow the light of each group and tell where it goes; of the contact that is selected, also
-    why its place is as bright as it is"""
+    """Trace the light of each group and list where it goes; for a selected contact, also list which
+    light reaches its place"""
 
     bl_idname = "optisense.ledger"
     bl_label = "Where the Light Goes"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         try:
-            design = handing.design(context.scene)
+            design = design_transfer.design(context.scene)
         except EngineError as error:
             return fail(self, error, TITLE)
         active = context.active_object

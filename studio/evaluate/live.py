@@ -7,7 +7,7 @@ from typing import Any
 import bpy
 
 from ..engine import catalogue, session
-from ..engine.latest import LatestRequest
+from ..engine.latest_request import LatestRequest
 from ..scene.collections import is_edited
 from . import prop
 from .operator import chosen, take_live

@@ -10,7 +10,7 @@ from bpy.props import StringProperty
 from ..core import scores
 from ..core.engine import EngineError
 from ..core.numbers import shown_number
-from ..engine import catalogue, handing, polls, session
+from ..engine import catalogue, design_transfer, polls, session
 from ..engine.operators import Starting, refuse, start_with_design
 from ..scene.paths import objective
 from ..simulate import editors
@@ -26,7 +26,7 @@ RAYS = (16, 12)
 
 
 class OPTISENSE_OT_choose_objective(bpy.types.Operator):
-    """Score the sensor by this objective, or no longer"""
+    """Select or clear this objective for the evaluation"""
 
     bl_idname = "optisense.choose_objective"
     bl_label = "Choose Objective"
@@ -187,7 +187,7 @@ def draw_again(scene: bpy.types.Scene) -> None:
             bpy.context.window_manager.optisense_evaluation.rays = rays.show(scene, result)
 
     try:
-        design = handing.design(scene)
+        design = design_transfer.design(scene)
     except EngineError:  # the buttons say that
         return
     request = session.ask(
@@ -199,7 +199,7 @@ def draw_again(scene: bpy.types.Scene) -> None:
 
 
 class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):
-    """Draw a coarse grid of chief rays, coloured by what becomes of them"""
+    """Draw a coarse grid of chief rays, coloured by their outcome"""
 
     bl_idname = "optisense.show_rays"
     bl_label = "Show Chief Rays"

@@ -56,7 +56,7 @@ def _export(
 ) -> set[str]:
     """Let the engine write files in these formats into the folder that the operator names."""
     if not formats:
-        return refuse(operator, "Choose a format")
+        return refuse(operator, "Tick at least one file format")
     target = chosen(operator, "a folder")
     if target is None:
         return {"CANCELLED"}
@@ -128,7 +128,7 @@ class OPTISENSE_OT_export_robot(polls.Asking, ChoosingFile, bpy.types.Operator):
     )
     mass: FloatProperty(
         name="Mass (g)",
-        description="What the whole sensor weighs; 0 for that of its parts by their densities",
+        description="Mass of the whole sensor, g; with 0 it follows from the parts' densities",
         min=0.0,
         soft_max=1000.0,
         precision=1,
@@ -140,6 +140,6 @@ class OPTISENSE_OT_export_robot(polls.Asking, ChoosingFile, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         formats = [name for name in ("mujoco", "urdf") if getattr(self, name)]
         if not formats:
-            return refuse(self, "Choose a format")
+            return refuse(self, "Tick at least one file format")
         mass = {"mass": self.mass} if self.mass > 0.0 else {}
         return _export(self, context, "export_robot", formats=formats, **mass)

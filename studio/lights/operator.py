@@ -159,7 +159,7 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
         pitch = self.pitch or self._fitting_pitch(context)
         poses = self._poses(context, pitch)
         if not poses:
-            return refuse(self, "The light reference is an empty mesh")
+            return refuse(self, "The light reference has no vertices; select another mesh")
         if self.group in ("NEW", ""):
             if self.model in ("NONE", ""):
                 return refuse(self, "The library is not loaded yet; try again in a moment")
@@ -240,7 +240,8 @@ def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) ->
 
 
 class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Operator):
-    """Put a library camera on the selected camera reference or the 3D cursor, for this one"""
+    """Replace the camera by one of the library, at the selected camera reference or the 3D
+    cursor"""
 
     bl_idname = "optisense.add_camera"
     bl_label = "Add Camera"
@@ -316,7 +317,7 @@ class OPTISENSE_OT_set_model(polls.Designing, bpy.types.Operator):
             return {"CANCELLED"}
         group.model = self.model
         group.drawn = ""
-        group.become("library")
+        group.change_kind("library")
         ask_for_windows(context.scene)
         return {"FINISHED"}
 

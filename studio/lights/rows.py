@@ -16,7 +16,7 @@ from ..engine.operators import refuse
 from ..scene import properties
 from ..scene.collections import objects_of, select_only
 from ..scene.lamps import add_light, light_pose
-from .choosing import lights_of
+from .group_selection import lights_of
 from .windows import ask_for_windows
 
 _setting = False

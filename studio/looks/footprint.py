@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..core import outlines
 from ..core.engine import EngineError
 from ..engine import session
-from ..engine.latest import LatestRequest
+from ..engine.latest_request import LatestRequest
 from ..scene.collections import is_edited
 from ..scene.contacts import sensing_surface
 from . import drawing, section

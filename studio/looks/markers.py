@@ -14,7 +14,7 @@ from bpy.props import FloatProperty, IntProperty
 from numpy.typing import NDArray
 
 from ..engine import polls, session
-from ..engine.latest import LatestRequest
+from ..engine.latest_request import LatestRequest
 from ..engine.layout import labelled
 from ..engine.operators import ChoosingProperties
 from ..scene.collections import is_edited

@@ -38,7 +38,7 @@ def items(kind: str) -> list[tuple[Any, ...]]:
 
 
 def _numbered(kind: str, names: list[str]) -> dict[str, int]:
-    """The numbers of a kind's entries; those that have gone are forgotten."""
+    """Return the numbers of a kind's entries; those of removed entries are forgotten."""
     if not catalogue.entries(kind):
         return {}
     numbers = _numbers.setdefault(kind, {})

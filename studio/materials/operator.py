@@ -9,7 +9,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..core import schema
 from ..core.engine import EngineError
-from ..engine import catalogue, handing, polls, session
+from ..engine import catalogue, design_transfer, polls, session
 from ..engine.operators import fail, refuse, start
 from ..scene.build import add_material, set_coating
 from ..scene.gather import coating_values, free_name, material_values
@@ -119,7 +119,7 @@ class OPTISENSE_OT_preview_material(polls.Checked, bpy.types.Operator):
 
 
 class OPTISENSE_OT_material_pictures(polls.Checked, bpy.types.Operator):
-    """Draw everything of this kind in the library, to choose from pictures"""
+    """Draw pictures of all library entries of this kind, to choose from"""
 
     bl_idname = "optisense.material_pictures"
     bl_label = "Show Pictures"
@@ -127,7 +127,7 @@ class OPTISENSE_OT_material_pictures(polls.Checked, bpy.types.Operator):
     checks = (
         _chosen,
         polls.requires(
-            lambda c: gallery.missing(_choice(c).kind), "All of them are drawn, or being drawn"
+            lambda c: gallery.missing(_choice(c).kind), "All pictures are drawn, or are being drawn"
         ),
     )
 
@@ -137,7 +137,7 @@ class OPTISENSE_OT_material_pictures(polls.Checked, bpy.types.Operator):
 
 
 class OPTISENSE_OT_apply_material(polls.Checked, bpy.types.Operator):
-    """Make the selected parts of the chosen material, or coat the sensing surface"""
+    """Assign the chosen material to the selected parts, or the coating to the sensing surface"""
 
     bl_idname = "optisense.apply_material"
     bl_label = "Apply to Selected"
@@ -159,7 +159,7 @@ class OPTISENSE_OT_apply_material(polls.Checked, bpy.types.Operator):
             entry = session.ask_and_wait("entry", kind=choice.kind, entry=name)["entry"]
         except EngineError as error:
             return fail(self, error)
-        values = handing.without_nulls(entry["value"])
+        values = design_transfer.without_nulls(entry["value"])
         design = context.scene.optisense
         if choice.kind == "coating":
             set_coating(context.scene, {"library": name, **values})

@@ -9,17 +9,17 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, StringProperty
 
-from ..core import vary
+from ..core import search_parameters
 from ..core.engine import EngineError
-from ..engine import handing, polls, session
+from ..engine import design_transfer, polls, session
 from ..engine.operators import ChoosingFile, Starting, fail, refuse, start
 from ..evaluate import rays
 from ..evaluate.operator import draw_again
 from ..scene.paths import chosen, objective
 from ..sensor.opening import new_stage, open_stage
-from . import advising, following
-from .offering import NOT_OVER, new_study, study_of
-from .suggesting import suggestions
+from . import search_advice, search_progress
+from .suggestions import suggestions
+from .unfinished_studies import NOT_OVER, new_study, study_of
 
 TITLE = "Searching"
 WIDEST = 72
@@ -49,7 +49,7 @@ class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):
             row = search.vary.add()
             row.name, row.text = self.label or self.text.partition("=")[0], self.text
             search.vary_index = len(search.vary) - 1
-            advising.choose_objective(search)
+            search_advice.choose_objective(search)
         return {"FINISHED"}
 
 
@@ -77,7 +77,11 @@ class OPTISENSE_OT_vary_remove(polls.Checked, bpy.types.Operator):
     bl_label = "Remove"
     bl_options = {"REGISTER", "UNDO"}
 
-    checks = (polls.requires(lambda c: c.scene.optisense_search.vary, "Nothing varies yet"),)
+    checks = (
+        polls.requires(
+            lambda c: c.scene.optisense_search.vary, "The list of varied parameters is empty"
+        ),
+    )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         search = context.scene.optisense_search
@@ -115,7 +119,8 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
     checks = (
         *polls.ASKING,
         polls.requires(
-            lambda c: vary.texts_of(c.scene.optisense_search.vary), "Choose what may vary first"
+            lambda c: search_parameters.texts_of(c.scene.optisense_search.vary),
+            "Add a parameter with Vary first",
         ),
         polls.requires(
             lambda c: c.scene.optisense_search.study or c.scene.optisense.is_saved,
@@ -132,29 +137,29 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
             study = search.study = str(new_study(Path(context.scene.optisense.folder)))
             session.push_undo("Search")  # so that Blender asks to save the file that names it
         try:
-            design = handing.design(context.scene)
+            design = design_transfer.design(context.scene)
         except EngineError as error:
             return fail(self, error, TITLE)
         fields: dict[str, Any] = {"budget": search.budget} if search.budget else {}
         try:
-            expected = advising.advice(design, search, fields)
+            expected = search_advice.advice(design, search, fields)
         except EngineError as error:
             return fail(self, error, TITLE)
         fields |= more_fields(search)
-        following.begin()
+        search_progress.begin()
         bpy.context.window_manager.optisense_found.expected = expected
         return start(
             self,
             TITLE,
             "search",
-            following.finished,
-            on_event=following.take,
+            search_progress.finished,
+            on_event=search_progress.take,
             wait=wait,
             design=design,
             study=study,
-            vary=vary.texts_of(search.vary),
-            objectives=[objective(each) for each in vary.listed(search.objective)],
-            require=vary.listed(search.require),
+            vary=search_parameters.texts_of(search.vary),
+            objectives=[objective(each) for each in search_parameters.listed(search.objective)],
+            require=search_parameters.listed(search.require),
             method=search.method,
             seed=search.seed,
             workers=search.workers,
@@ -169,10 +174,10 @@ def more_fields(search: bpy.types.PropertyGroup) -> dict[str, Any]:
     fields: dict[str, Any] = {
         "coarse_first": search.coarse_first,
         "may_cross": search.may_cross,
-        "errors": vary.listed(search.errors),
-        "rules": [objective(each) for each in vary.listed(search.rules)],
-        "options": vary.listed(search.options),
-        "settings": vary.listed(search.settings),
+        "errors": search_parameters.listed(search.errors),
+        "rules": [objective(each) for each in search_parameters.listed(search.rules)],
+        "options": search_parameters.listed(search.options),
+        "settings": search_parameters.listed(search.settings),
     }
     if fields["errors"]:
         fields["samples"] = search.samples
@@ -208,22 +213,22 @@ class OPTISENSE_OT_resume(_WithStudy, Starting, bpy.types.Operator):
 
         def follow(what: str, then: Callable[[dict[str, Any]], None], **fields: Any) -> None:
             session.start_job(
-                TITLE, what, then, on_event=following.take, wait=wait, study=study, name="search",
-                **fields,
+                TITLE, what, then, on_event=search_progress.take, wait=wait, study=study,
+                name="search", **fields,
             )  # fmt: skip
 
         def watched(result: dict[str, Any]) -> None:
             if result["ended"] in NOT_OVER:  # it was ending, as Blender had been closed
-                follow("resume", following.finished, **fields)
+                follow("resume", search_progress.finished, **fields)
             else:
-                following.finished(result)
+                search_progress.finished(result)
 
         def known(result: dict[str, Any]) -> None:
-            following.take_curve(result["curve"])
+            search_progress.take_curve(result["curve"])
             if result.get("running"):
                 follow("watch", watched)
             else:
-                follow("resume", following.finished, **fields)
+                follow("resume", search_progress.finished, **fields)
 
         return start(self, "Reading the study", "study", known, wait=wait, study=study)
 
@@ -246,7 +251,7 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
         def applied(_: dict[str, Any]) -> None:
             scene = bpy.data.scenes.get(name)
             if scene is not None:
-                following.clear_ghosts(scene)
+                search_progress.clear_ghosts(scene)
                 open_stage(
                     scene,
                     stage,
@@ -268,8 +273,8 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
 
 
 class OPTISENSE_OT_keep_variant(_WithStudy, ChoosingFile, bpy.types.Operator):
-    """Write the best design of the study to a new folder; the sensor in this scene stays as it "
-    "is"""
+    """Write the best design of the study to a new folder; the sensor in this scene does not
+    change"""
 
     bl_idname = "optisense.keep_variant"
     bl_label = "Keep as Variant"

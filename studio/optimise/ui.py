@@ -14,8 +14,8 @@ from ..engine.layout import (
     shows_more,
 )
 from ..simulate.picture import icon
-from .advising import is_flat
-from .following import CURVE, has_trials, known_scores
+from .search_advice import is_flat
+from .search_progress import CURVE, has_trials, known_scores
 
 
 class OPTISENSE_UL_vary(bpy.types.UIList):
@@ -71,7 +71,10 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
             layout.label(text=session.state().left or found.expected, icon="TIME")
         show_outcome(layout, "Searching", "Reading the study")
         if is_flat(known_scores()):
-            text = "All trials score alike: the objective does not see what varies"
+            text = (
+                "All trials score alike: the varied parameters do not affect the objective. Vary "
+                "others, or choose another objective"
+            )
             paragraph(layout, text, "ERROR")
         curve = icon(CURVE) if has_trials() else 0
         if curve:

@@ -18,7 +18,7 @@ from .meshes import new_mesh
 from .properties import USUAL_COATING
 
 MILLIMETRE = 0.001
-"""Length of a millimetre in metres, the unit length of the scene."""
+"""Length of the scene's unit, a millimetre, in metres."""
 
 
 def build(

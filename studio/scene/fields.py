@@ -27,7 +27,7 @@ NOT_FIELDS = ("kind", "library")
 NUMBERS = ("pair", "triple", "colour")
 """Names of the properties that hold several numbers."""
 
-WHAT = "A number of the lamp, material or coating; the button beside it says which"
+WHAT = "Value of a lamp, material or coating; the button beside it explains the field"
 
 _filling = False
 MOST_LISTS = 256
@@ -154,7 +154,7 @@ class OPTISENSE_PG_field(bpy.types.PropertyGroup):
 
 
 class OPTISENSE_OT_reset_field(bpy.types.Operator):
-    """Set the value that a field begins with"""
+    """Reset the field to its initial value"""
 
     bl_idname = "optisense.reset_field"
     bl_label = "Reset"
@@ -171,7 +171,9 @@ class OPTISENSE_OT_reset_field(bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         field = context.scene.path_resolve(self.path)
         if field.row is None:
-            self.report({"ERROR"}, "The engine has not told yet what it begins with")
+            self.report(
+                {"ERROR"}, "The engine has not described this field yet; try again in a moment"
+            )
             return {"CANCELLED"}
         field.put(schema.start(field.row))
         return {"FINISHED"}
@@ -229,7 +231,7 @@ class HasFields:
                 field.put(value)
         self.fields_changed()
 
-    def become(self, kind: str) -> None:
+    def change_kind(self, kind: str) -> None:
         """Change the kind; fields that both kinds have keep their values."""
         if kind != self.kind_name:
             self.fill(kind, self.field_values())
@@ -295,7 +297,8 @@ def _holder(value: Any, row: schema.Row | None) -> str:
 
 
 def kind_menu(noun: str, first: Items = ()) -> Any:
-    """Return properties of a menu of all kinds of a noun; it stores the chosen name in `kind_name`.
+    """Return properties of a menu of all kinds; it stores the name of the chosen one in
+    `kind_name`.
 
     Args:
         noun: `emitter` or `material`.
@@ -305,13 +308,13 @@ def kind_menu(noun: str, first: Items = ()) -> Any:
     def items(owner: Any, context: bpy.types.Context | None) -> Items:
         found = [*first, *((k["name"], k["title"], k["summary"]) for k in schema.kinds(noun))]
         if owner.kind_name not in [name for name, *_ in found]:
-            found.append((owner.kind_name, owner.kind_name, "The engine has not told of this kind"))
+            found.append((owner.kind_name, owner.kind_name, "This engine does not know this kind"))
         return kept_items(found)
 
     def number(owner: Any) -> int:
         return [name for name, *_ in items(owner, None)].index(owner.kind_name)
 
     def choose(owner: Any, chosen: int) -> None:
-        owner.become(items(owner, None)[chosen][0])
+        owner.change_kind(items(owner, None)[chosen][0])
 
     return {"items": items, "get": number, "set": choose}

@@ -10,7 +10,7 @@ OBJECT_KINDS: Items = [
     ("LIGHT", "Light", "One light of a group"),
     ("CAMERA", "Camera", "The sensor's camera"),
     ("CAGE", "Cage", "Control points that bend parts"),
-    ("CONTACT", "Contact", "Something that presses on the sensor"),
+    ("CONTACT", "Contact", "An object that presses on the sensor"),
     ("REFERENCE", "Reference", "A shape that parts, lights and the camera are placed by"),
     ("SHOWN", "Shown", "Drawn by the extension, such as chief rays; not saved"),
 ]
@@ -27,8 +27,8 @@ ROLES: Items = [
 
 REFERENCES: Items = [
     ("sensing_surface", "Sensing surface reference", "Becomes the coated surface"),
-    ("camera", "Camera reference", "Where the camera goes"),
-    ("light", "Light reference", "Where lights go"),
+    ("camera", "Camera reference", "Place of the camera"),
+    ("light", "Light reference", "Place of lights"),
     ("support", "Support structure reference", "Becomes a transparent support"),
     ("elastomer", "Elastomer reference", "Becomes the gel"),
     ("indenter", "Indenter reference", "Becomes a contact of this shape"),
@@ -50,13 +50,17 @@ INDENTERS: Items = [
 ]
 
 PRESSING: Items = [
-    ("DEPTH", "Depth", "It is pressed in by mm"),
-    ("FORCE", "Force", "It is pressed in by newtons, as deep as the elastic gel lets it"),
+    ("DEPTH", "Depth", "The indenter is pressed in to this depth"),
+    (
+        "FORCE",
+        "Force",
+        "The indenter is pressed in with this force; the elastic gel determines the depth",
+    ),
 ]
 
 SKINS: Items = [
     ("elastic", "Elastic", "The gel deforms around contacts as well; forces are known"),
-    ("conforming", "Conforming", "The skin takes the shape of what presses, and no force is known"),
+    ("conforming", "Conforming", "The skin takes the shape of the indenter; forces are not known"),
 ]
 
 GHOST = "ghost "

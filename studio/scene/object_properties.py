@@ -172,8 +172,8 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
     )  # fmt: skip
     force: FloatProperty(
         name="Force",
-        description="N, along the inward normal; the next picture says and draws how deep it "
-        "presses",
+        description="Force along the inward normal, N; the next picture shows the depth that it "
+        "gives",
         min=0.001,
         max=1000.0,
         default=1.0,

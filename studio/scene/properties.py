@@ -90,7 +90,7 @@ class OPTISENSE_PG_light_group(HasFields, bpy.types.PropertyGroup):
     model: StringProperty(name="Model", description="Lamp of the library")
     colour: rgb(
         "Colour",
-        "How the flux is shared among R, G, B; only ratios count",
+        "Shares of R, G, B in the flux; only their ratios matter",
         min=0.0,
         max=1.0,
         subtype="COLOR",

@@ -100,7 +100,7 @@ class ChoosingFiles:
 
 
 class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator):
-    """Make a sensor of CAD files (STEP, STL, OBJ, PLY): mark them all, or open their folder"""
+    """Make a sensor of CAD files (STEP, STL, OBJ, PLY): select all of them, or open their folder"""
 
     bl_idname = "optisense.cad_files"
     bl_label = "Sensor from CAD Files"
@@ -109,7 +109,7 @@ class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator)
     def execute(self, context: bpy.types.Context) -> set[str]:
         paths = self.paths()
         # The panel with the table may be closed, and the pointer elsewhere: files were dropped.
-        self.report({"INFO"}, "Check in the panel Sensor what each body is")
+        self.report({"INFO"}, "Check the use of each body in the panel Sensor")
 
         def read(result: dict[str, Any]) -> None:
             found = now()
@@ -127,7 +127,7 @@ class OPTISENSE_OT_cad_files(polls.Replacing, ChoosingFiles, bpy.types.Operator)
 
 
 class _Dropped:
-    """Base of what is done with CAD files that are dropped on the 3D view."""
+    """Base of the handlers of CAD files that are dropped on the 3D view."""
 
     bl_file_extensions = FORMATS.replace("*", "")
 
@@ -153,7 +153,7 @@ class OPTISENSE_FH_reference(_Dropped, bpy.types.FileHandler):
 
 
 class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
-    """Make the sensor of these bodies, with usual lights and a usual camera to begin with"""
+    """Make the sensor of these bodies, with default lights and a default camera at first"""
 
     bl_idname = "optisense.make_from_cad"
     bl_label = "Make the Sensor"
@@ -198,7 +198,7 @@ class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
 
 
 class OPTISENSE_OT_forget_cad(bpy.types.Operator):
-    """Make no sensor of these files"""
+    """Discard these files without making a sensor"""
 
     bl_idname = "optisense.forget_cad"
     bl_label = "Cancel"
@@ -215,7 +215,7 @@ def draw(layout: bpy.types.UILayout) -> None:
     if not found.bodies or session.is_busy():
         return
     box = layout.box()
-    box.label(text="What is each body?", icon="IMPORT")
+    box.label(text="Use of each body", icon="IMPORT")
     column = box.column(align=True)
     for each in found.bodies:
         row = column.split(factor=NAMES, align=True)

@@ -10,10 +10,10 @@ from typing import Any
 import bpy
 
 from ..core import mesh_file
-from ..engine import handing, session
+from ..engine import design_transfer, session
 from ..lights.windows import ask_for_windows
 from ..scene.build import build
-from ..scene.remembering import looks_of, restore
+from ..scene.selection_state import looks_of, restore
 from ..scene.startup import clear_startup
 from ..scene.views import show_design
 from .warming import warm_up
@@ -91,7 +91,7 @@ def open_stage(
         scene = bpy.data.scenes.get(name)
         if scene is None:
             return
-        document = handing.without_nulls(result["data"])
+        document = design_transfer.without_nulls(result["data"])
         parts = document["parts"].items()
         clear_startup(scene)
         picture_is_old()
@@ -105,7 +105,7 @@ def open_stage(
         else:
             restore(scene, before)
         ask_for_windows(scene)
-        if not bpy.app.background:  # scripts say themselves what they want
+        if not bpy.app.background:  # scripts ask for what they need
             warm_up(scene)
         warnings = result.get("warnings") or []
         session.state().note = "; ".join(each.get("message", "") for each in warnings)

@@ -9,7 +9,7 @@ import bpy
 from bpy.props import StringProperty
 
 from ..core.engine import EngineError
-from ..engine import catalogue, handing, polls, session
+from ..engine import catalogue, design_transfer, polls, session
 from ..engine.operators import ChoosingFile, Starting, fail, report_error, start
 from ..scene.paths import chosen, suggested
 from .opening import open_empty, open_source
@@ -56,7 +56,7 @@ class OPTISENSE_OT_new_empty(polls.Replacing, bpy.types.Operator):
             document = session.ask_and_wait("empty")["data"]
         except EngineError as error:
             return fail(self, error)
-        open_empty(context.scene, handing.without_nulls(document))
+        open_empty(context.scene, design_transfer.without_nulls(document))
         return {"FINISHED"}
 
 
@@ -109,7 +109,7 @@ class _Saves:
     def _save(self, context: bpy.types.Context, folder: str) -> set[str]:
         scene = context.scene
         try:
-            design = handing.design(scene)
+            design = design_transfer.design(scene)
         except EngineError as error:
             return fail(self, error)
         name = scene.name
@@ -136,7 +136,9 @@ class OPTISENSE_OT_save(polls.Checked, _Saves, bpy.types.Operator):
 
     checks = (
         *polls.ASKING,
-        polls.requires(lambda c: c.scene.optisense.is_saved, "It has no folder yet: use Save As"),
+        polls.requires(
+            lambda c: c.scene.optisense.is_saved, "This sensor has no folder yet: use Save As"
+        ),
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
@@ -164,7 +166,7 @@ class OPTISENSE_OT_save_as(polls.Asking, _Saves, ChoosingFile, bpy.types.Operato
 
 
 class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
-    """Find what is wrong without simulating; the object that it is about is selected"""
+    """Check the design without simulating it; the object with the worst problem is selected"""
 
     bl_idname = "optisense.check"
     bl_label = "Check"
@@ -179,7 +181,7 @@ class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
             session.say(EngineError({"kind": "DesignError", **worst}))
 
         try:
-            design = handing.design(context.scene)
+            design = design_transfer.design(context.scene)
         except EngineError as error:
             return fail(self, error)
         session.start_job("Checking", "check", checked, wait=bpy.app.background, design=design)
@@ -192,7 +194,7 @@ class OPTISENSE_OT_start_engine(polls.Checked, bpy.types.Operator):
     bl_idname = "optisense.start_engine"
     bl_label = "Start the Engine"
 
-    checks = (polls.requires(lambda c: session.running() is None, "It runs"),)
+    checks = (polls.requires(lambda c: session.running() is None, "The engine is running already"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.restart()
@@ -200,12 +202,12 @@ class OPTISENSE_OT_start_engine(polls.Checked, bpy.types.Operator):
 
 
 class OPTISENSE_OT_cancel(polls.Checked, bpy.types.Operator):
-    """Give up what the engine is working on"""
+    """Cancel the job that the engine is working on"""
 
     bl_idname = "optisense.cancel"
     bl_label = "Cancel"
 
-    checks = (polls.requires(lambda c: session.is_busy(), "Nothing is going on"),)
+    checks = (polls.requires(lambda c: session.is_busy(), "No job is running"),)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         session.cancel_job()

@@ -34,7 +34,7 @@ STEPS = (
         lambda c: bool(objects_of(c.scene, "CONTACT")),
     ),
     Step(
-        "Press Simulate: some seconds later the picture is there that the camera takes.",
+        "Press Simulate: after some seconds, the picture of the sensor's camera appears.",
         lambda c: _is_simulated(c.window_manager.optisense_picture),
     ),
     Step(
@@ -48,7 +48,7 @@ STEPS = (
 )
 """Steps of the tour in their order."""
 
-OVER = "That was the tour. The question mark in the head of a panel tells all about it."
+OVER = "That was the tour. The question mark in the header of a panel opens its help page."
 
 
 class OPTISENSE_PG_tour(bpy.types.PropertyGroup):

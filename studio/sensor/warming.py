@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..core.engine import EngineError, Request
-from ..engine import handing, session
+from ..engine import design_transfer, session
 
 START = "builtin:gelsight-mini"
 """Sensor for which the engine is prepared before any is open: a new sensor is usually this one, and
@@ -41,14 +41,16 @@ def warm_up(scene: bpy.types.Scene) -> Request | None:
         engine = session.engine()
         if _open is not None:
             engine.cancel(_open)
-        _open = engine.send("warm", design=handing.design(scene), contacts=True, drafts=True)
+        _open = engine.send(
+            "warm", design=design_transfer.design(scene), contacts=True, drafts=True
+        )
     except EngineError:  # Simulating will show the error.
         return None
     return _open
 
 
 def put_off() -> None:
-    """Cancel a preparation under way: a draft is wanted, which is sooner there without it."""
+    """Cancel a running preparation, since a draft that is wanted is ready sooner without it."""
     global _open, _is_put_off
     if _open is not None and not _open.done and session.running() is not None:
         session.engine().cancel(_open)
@@ -57,5 +59,5 @@ def put_off() -> None:
 
 
 def is_put_off() -> bool:
-    """Whether a preparation was cancelled that is still to be made up for."""
+    """Whether a preparation was cancelled and has not been repeated yet."""
     return _is_put_off

@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..engine import session
-from ..engine.latest import LatestRequest
+from ..engine.latest_request import LatestRequest
 from ..scene import cages
 
 REST = 0.3

@@ -46,7 +46,7 @@ aluminium (the index of the diffuse-grey coating's flake); a blocker absorbs.
 
 
 class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFiles, bpy.types.Operator):
-    """Read CAD files (STEP, STL, OBJ, PLY), as many as are marked, into the collection Reference"""
+    """Read the selected CAD files (STEP, STL, OBJ, PLY) into the collection Reference"""
 
     bl_idname = "optisense.add_mesh"
     bl_label = "Add CAD Files"
@@ -94,7 +94,7 @@ def _bring(scene: bpy.types.Scene, body: dict[str, Any], scale: float) -> bpy.ty
 
 
 class OPTISENSE_OT_set_reference(polls.Checked, ChoosingProperties, bpy.types.Operator):
-    """Say what the selected meshes are for; all but camera and light references become parts"""
+    """Set the use of the selected meshes; all but camera and light references become parts"""
 
     bl_idname = "optisense.set_reference"
     bl_label = "Set as Reference"

@@ -8,7 +8,7 @@ import numpy as np
 from mathutils import Vector
 from numpy.typing import NDArray
 
-from ..core import outer
+from ..core import outer_faces
 from ..engine import polls
 from ..engine.operators import refuse
 from ..scene.build import add_part
@@ -62,8 +62,8 @@ def _chosen(gel: bpy.types.Object) -> NDArray[np.int64]:
 
 
 class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
-    """Lay the sensing surface on the outside of the gel: on its faces that look away from the rest,
-    or on those that are selected in edit mode. It faces inward, and joins the gel's cage"""
+    """Make the sensing surface of the outer faces of the gel, or of those that are selected in edit
+    mode. It faces inward, and joins the gel's cage"""
 
     bl_idname = "optisense.make_skin"
     bl_label = "Make Sensing Surface"
@@ -88,14 +88,14 @@ class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
                 return refuse(self, "Select the outer faces of the gel first")
             bpy.ops.object.mode_set(mode="OBJECT")
         else:
-            faces = outer.outer_faces(mesh, outward(scene, gel))
+            faces = outer_faces.outer_faces(mesh, outward(scene, gel))
             if not len(faces):
                 return refuse(
                     self, f"No face of {gel.name} looks outward; select its faces in edit mode"
                 )
         key = free_name("skin", part_names(scene))
         values = {"role": "sensing_surface", "mesh": f"meshes/{key}.obj"}
-        skin = add_part(scene, key, values, outer.skin_of(mesh, faces))
+        skin = add_part(scene, key, values, outer_faces.skin_of(mesh, faces))
         if cage is not None:
             join_cage(scene, cage, skin)
         select_only(skin)

@@ -8,11 +8,11 @@ from typing import Any
 import bpy
 
 from ..core.engine import EngineError, Request
-from ..engine import handing, session
+from ..engine import design_transfer, session
 from ..scene.collections import is_edited
 from ..sensor import opening, warming
-from . import requests, stored
-from .exposing import exposure
+from . import requests, stored_drafts
+from .exposure import exposure
 
 NAME = "draft"
 NONE = "No draft: "
@@ -87,8 +87,8 @@ def _ask() -> None:
         return
     warming.put_off()
     try:
-        design = handing.design(scene)
-        contacts = handing.contacts(scene)
+        design = design_transfer.design(scene)
+        contacts = design_transfer.contacts(scene)
         _open.append(
             session.engine().send(
                 "simulate",
@@ -108,14 +108,13 @@ def _ask() -> None:
 
 
 def _first(scene: bpy.types.Scene) -> None:
-    """Show the draft that is kept of a sensor that was opened, and schedule its first draft, even
-    if nobody wants drafts later.
+    """Show the stored draft of an opened sensor, and schedule its first draft.
 
-    A script says itself what it wants.
+    The first draft is made even if drafts are switched off. Scripts ask for what they need.
     """
     global _opened
     if not bpy.app.background:
-        stored.show_kept(scene)
+        stored_drafts.show_kept(scene)
         _opened = True
 
 
@@ -134,11 +133,11 @@ def _take(result: dict[str, Any]) -> None:
     if scene.optisense_simulation.draft and any(settings.get(each) for each in REUSED):
         _again = time.monotonic() + REST
     elif all(each.done for each in _open):
-        stored.keep(scene, result)
+        stored_drafts.keep(scene, result)
 
 
 def _ignored(_: EngineError) -> None:
-    """Say nothing about a draft that the user did not ask for: *Check* and *Simulate* do."""
+    """Ignore the error of a draft that the user did not ask for; *Check* and *Simulate* show it."""
 
 
 def _refused(error: EngineError) -> None:

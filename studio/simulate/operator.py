@@ -78,11 +78,13 @@ class OPTISENSE_OT_add_contact(polls.Arranging, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         surface = sensing_surface(context.scene)
         if surface is None:
-            return refuse(self, "There is no sensing surface")
+            return refuse(
+                self, "There is no sensing surface; make one under Shapes (Make Sensing Surface)"
+            )
         middle = sum((Vector(corner) for corner in surface.bound_box), Vector()) / 8.0
         found, point, normal, _ = surface.closest_point_on_mesh(middle)
         if not found:
-            return refuse(self, "The sensing surface is empty")
+            return refuse(self, "The sensing surface has no faces; remove it and make another")
         _add(context, surface, point, normal)
         return {"FINISHED"}
 
@@ -146,7 +148,8 @@ def _add(
 
 
 class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
-    """Press nine balls where the camera sees them, as the active contact or as a new one"""
+    """Press nine indenters, spread over the camera's view: copies of the active contact, or
+    balls"""
 
     bl_idname = "optisense.nine_contacts"
     bl_label = "Nine Places"

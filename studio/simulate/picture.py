@@ -73,7 +73,7 @@ def enlarged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.f
 def kind(now: bpy.types.PropertyGroup) -> str:
     """Return the beginning of the line about the picture, if it is not a full one."""
     if now.is_stored:
-        return "Draft of the last time, "
+        return "Stored draft, "
     return "Draft, " if now.is_draft else "Relit, " if now.is_relit else ""
 
 

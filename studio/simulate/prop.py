@@ -12,12 +12,12 @@ from bpy.props import (
 )
 
 from ..scene import kinds
-from .exposing import exposure_changed
+from .exposure import exposure_changed
 
 SIZES = [
-    ("160", "160 pixels", "Of the longer side: a quick look"),
-    ("320", "320 pixels", "Of the longer side"),
-    ("640", "640 pixels", "Of the longer side"),
+    ("160", "160 pixels", "Length of the longer side, for a quick look"),
+    ("320", "320 pixels", "Length of the longer side"),
+    ("640", "640 pixels", "Length of the longer side"),
     ("CAMERA", "As the camera", "The camera's own resolution"),
 ]
 

@@ -12,7 +12,7 @@ from ..core.numbers import short
 from ..engine import session
 from ..scene.properties import when_relit
 from . import picture
-from .exposing import exposure, keep_exposure, shown_size, when_exposed
+from .exposure import exposure, keep_exposure, shown_size, when_exposed
 
 NAME = "relit"
 AGAIN = "Simulate again to see these lights"

@@ -7,11 +7,11 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..engine import handing, session
+from ..engine import design_transfer, session
 from ..scene.contacts import pressing
 from ..scene.objects_at import select
 from . import picture, relight
-from .exposing import exposure, keep_exposure, resolution, shown_size
+from .exposure import exposure, keep_exposure, resolution, shown_size
 
 LATEST = "picture"
 
@@ -27,8 +27,8 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
     """
     settings = scene.optisense_simulation
     asked: dict[str, Any] = {
-        "design": handing.design(scene),
-        "contacts": handing.contacts(scene),
+        "design": design_transfer.design(scene),
+        "contacts": design_transfer.contacts(scene),
         "noise": round(settings.noise, 3),
         "seed": settings.seed,
         "skin": settings.skin,

@@ -143,7 +143,7 @@ def _take(pixels: NDArray[np.float32]) -> None:
 
 
 class OPTISENSE_OT_pin_picture(polls.Checked, bpy.types.Operator):
-    """Keep this picture, to compare those that follow with it; meanwhile the exposure is fixed"""
+    """Keep this picture, to compare later ones with it; meanwhile the exposure is fixed"""
 
     bl_idname = "optisense.pin_picture"
     bl_label = "Pin"
@@ -230,7 +230,7 @@ def words(context: bpy.types.Context) -> list[str]:
     now, values = context.window_manager.optisense_picture, context.window_manager.optisense_view
     if not now.shown:
         return []
-    old = "Of the sensor that was open before: " if now.is_before else ""
+    old = "Sensor that was open before: " if now.is_before else ""
     lines = [f"{old}{picture.kind(now)}{now.summary}"]
     if values.pinned and values.compare == "WIPE":
         lines.append(f"On the left: the pinned picture ({values.pinned})")

@@ -15,7 +15,7 @@ from waiting import until
 
 from studio.core import cage as core
 from studio.core.mesh_file import Mesh
-from studio.engine import handing, session
+from studio.engine import design_transfer, session
 from studio.scene import cages
 from studio.scene.build import add_part
 from studio.scene.collections import object_of, objects_of
@@ -57,7 +57,7 @@ def test_the_shape_is_the_engines(mini: Any) -> None:
     shown = cages.shown_points(cage)
     cages.set_points(cage, shown + rng.uniform(-0.4, 0.4, shown.shape))
     cages.follow(mini, cage)
-    answer = session.ask_and_wait("open", design=handing.design(mini), name="bent")
+    answer = session.ask_and_wait("open", design=design_transfer.design(mini), name="bent")
     for name in ("skin", "gel"):
         engines = np.load(answer["shapes"][name]["vertices"])
         ours = cages.shown_vertices(object_of(mini, "PART", name).data)
@@ -102,7 +102,7 @@ def test_bounds_and_blend(mini: Any, select: Callable[..., None]) -> None:
     values = gather_document(mini)["cages"]["skin"]
     assert values["blend"] == 0.25 and "points" not in values
     assert values["c_max"][14]["z"] == 8.0
-    answer = session.ask_and_wait("check", design=handing.design(mini))
+    answer = session.ask_and_wait("check", design=design_transfer.design(mini))
     assert not answer["problems"]
     cage.data.vertices[14].co.z += 1.0  # a hand leaves the blend
     cage.data.update()

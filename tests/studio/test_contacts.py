@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from studio.engine import handing, session
+from studio.engine import design_transfer, session
 from studio.scene.collections import object_of, objects_of
 
 
@@ -98,7 +98,7 @@ def test_an_indenter_lies_as_it_is_drawn(sensor: str, scene: Any) -> None:
         contact.optisense.indenter, contact.optisense.rotation = "cylinder", 20.0
     bpy.context.view_layer.update()
     placed = session.ask_and_wait(
-        "place", design=handing.design(scene), contacts=handing.contacts(scene)
+        "place", design=design_transfer.design(scene), contacts=design_transfer.contacts(scene)
     )["contacts"]
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for contact, row in zip(objects_of(scene, "CONTACT"), placed, strict=True):
@@ -115,7 +115,7 @@ def test_a_tilted_plate_lies_as_it_is_drawn(mini: Any) -> None:
     contact.optisense.indenter = "plane"
     bpy.context.view_layer.update()
     (placed,) = session.ask_and_wait(
-        "place", design=handing.design(mini), contacts=handing.contacts(mini)
+        "place", design=design_transfer.design(mini), contacts=design_transfer.contacts(mini)
     )["contacts"]
     pressed = np.load(placed["mesh"]["vertices"])
     depsgraph = bpy.context.evaluated_depsgraph_get()

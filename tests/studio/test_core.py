@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from studio.core import cage, mesh_file, vary
+from studio.core import cage, mesh_file, search_parameters
 from studio.core.numbers import joined, kept, kept_array, short, split
 from studio.core.pose import matrix_of, pose_of
 from studio.core.rows import row_on_face
@@ -97,7 +97,7 @@ def test_a_row_of_lights_lies_on_its_face_and_shines_to_the_target() -> None:
 
 
 def test_the_curve_of_a_search_rises_to_the_right() -> None:
-    picture = vary.curve_picture([0.1, None, 0.4, 0.9], (64, 32))
+    picture = search_parameters.curve_picture([0.1, None, 0.4, 0.9], (64, 32))
     orange = np.argwhere((picture[..., 0] > 0.9) & (picture[..., 2] < 0.3))
     left, right = orange[orange[:, 1] < 20], orange[orange[:, 1] > 50]
     assert left[:, 0].max() < right[:, 0].max()

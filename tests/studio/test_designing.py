@@ -14,12 +14,12 @@ from waiting import until
 
 from studio.core.engine import EngineError
 from studio.engine import session
-from studio.lights.choosing import _follow
-from studio.scene import remembering
+from studio.lights.group_selection import _follow
+from studio.scene import selection_state
 from studio.scene.build import build
 from studio.scene.collections import object_of, objects_of
 from studio.simulate import drafts, picture
-from studio.simulate.exposing import resolution
+from studio.simulate.exposure import resolution
 
 
 def small(scene: Any) -> None:
@@ -134,9 +134,9 @@ def test_selection_and_what_is_hidden_outlive_a_better_design(
     object_of(mini, "PART", "tray").hide_set(True)
     select(lights[7], lights[3])
     was = [(each.optisense.group, each.location.copy()) for each in (lights[7], lights[3])]
-    looks = remembering.looks_of(mini)
+    looks = selection_state.looks_of(mini)
     build(mini, *mini_design, keep_others=True)
-    remembering.restore(mini, looks)
+    selection_state.restore(mini, looks)
     chosen = [(each.optisense.group, each.location) for each in bpy.context.selected_objects]
     assert sorted(chosen, key=str) == sorted(was, key=str)
     active = bpy.context.view_layer.objects.active

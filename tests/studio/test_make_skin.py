@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from studio.core import outer
+from studio.core import outer_faces
 from studio.core.mesh_file import Mesh
 from studio.engine import session
 from studio.scene.cages import cage_data, follow, shown_points
@@ -39,17 +39,19 @@ def without_skin(scene: Any) -> None:
 def test_the_top_of_a_box_and_no_side() -> None:
     box = solid(lambda made: bmesh.ops.create_cube(made, size=2.0))
     for way in ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)):
-        faces = outer.outer_faces(box, np.array(way))
+        faces = outer_faces.outer_faces(box, np.array(way))
         assert len(faces) == 2
-        skin = outer.skin_of(box, faces)
-        np.testing.assert_allclose(outer.face_normals(skin), [np.negative(way)] * 2, atol=1e-6)
+        skin = outer_faces.skin_of(box, faces)
+        np.testing.assert_allclose(
+            outer_faces.face_normals(skin), [np.negative(way)] * 2, atol=1e-6
+        )
         assert len(skin.vertices) == 4 and skin.vertices @ way == pytest.approx(1.0)
 
 
 def test_a_dome_goes_on_by_tangency_and_ends_at_its_foot() -> None:
     ball = solid(lambda made: bmesh.ops.create_icosphere(made, subdivisions=3, radius=1.0))
     ball.vertices[:, 2] = np.maximum(ball.vertices[:, 2], 0.0)  # a half, with a flat foot
-    faces = outer.outer_faces(ball, np.array((0.0, 0.0, 1.0)))
+    faces = outer_faces.outer_faces(ball, np.array((0.0, 0.0, 1.0)))
     tops = ball.vertices[ball.faces].mean(axis=1)[:, 2] > 1e-6
     assert set(faces) == set(np.flatnonzero(tops))
 
@@ -57,8 +59,8 @@ def test_a_dome_goes_on_by_tangency_and_ends_at_its_foot() -> None:
 def test_loose_corners_are_one() -> None:
     box = solid(lambda made: bmesh.ops.create_cube(made, size=2.0))
     loose = Mesh(box.vertices[box.faces].reshape(-1, 3), np.arange(36).reshape(-1, 3))
-    faces = outer.outer_faces(loose, np.array((0.0, 0.0, 1.0)))
-    assert len(faces) == 2 and len(outer.skin_of(loose, faces).vertices) == 4
+    faces = outer_faces.outer_faces(loose, np.array((0.0, 0.0, 1.0)))
+    assert len(faces) == 2 and len(outer_faces.skin_of(loose, faces).vertices) == 4
 
 
 def test_one_press_makes_the_skin_of_a_mini(mini: Any, select: Callable[..., None]) -> None:
@@ -72,7 +74,7 @@ def test_one_press_makes_the_skin_of_a_mini(mini: Any, select: Callable[..., Non
     made = part_mesh(skin, caged=False)
     np.testing.assert_allclose(made.vertices.min(axis=0), old.vertices.min(axis=0), atol=1e-4)
     np.testing.assert_allclose(made.vertices.max(axis=0), old.vertices.max(axis=0), atol=1e-4)
-    assert (outer.face_normals(made)[:, 2] < -0.99).all()  # it faces into the sensor
+    assert (outer_faces.face_normals(made)[:, 2] < -0.99).all()  # it faces into the sensor
     bpy.ops.optisense.check()
     assert not session.state().problem
 

@@ -12,8 +12,8 @@ import bpy
 import pytest
 from waiting import until
 
-from studio.engine import catalogue, handing, session
-from studio.optimise.suggesting import suggestions
+from studio.engine import catalogue, design_transfer, session
+from studio.optimise.suggestions import suggestions
 from studio.scene.collections import objects_of
 
 
@@ -27,7 +27,7 @@ def library() -> None:
 
 def parameters(scene: Any, text: str) -> list[dict[str, Any]]:
     """What the engine makes of a range."""
-    found = session.ask_and_wait("space", design=handing.design(scene), vary=[text])
+    found = session.ask_and_wait("space", design=design_transfer.design(scene), vary=[text])
     return list(found["parameters"])
 
 

@@ -192,7 +192,7 @@ def test_menus_are_filled_by_the_engine(scene: Any) -> None:
         ("search", "no sensor yet"),
         ("save", "no sensor yet"),
         ("clear_contacts", "no contacts"),
-        ("cancel", "Nothing is going on"),
+        ("cancel", "No job is running"),
         ("report", "Simulate a whole picture first"),
         ("hide_rays", "No rays"),
         ("show_picture", "Simulate first"),
@@ -212,9 +212,9 @@ def test_grey_buttons_say_why(operator: str, why: str, scene: Any) -> None:
         ("set_reference", "Select a mesh first"),
         ("set_group", "Select lights first"),
         ("keep_material", "Select a part first"),
-        ("search", "Choose what may vary first"),
+        ("search", "Add a parameter with Vary first"),
         ("resume", "There is no study yet"),
-        ("save", "It has no folder yet"),
+        ("save", "This sensor has no folder yet"),
     ],
 )
 def test_nothing_selected_is_said(

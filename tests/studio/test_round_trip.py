@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from studio.engine import handing, session
+from studio.engine import design_transfer, session
 from studio.scene import cages
 from studio.scene.collections import ALL, object_of, objects_of
 from studio.scene.gather import gather, gather_document
@@ -27,7 +27,7 @@ SENSORS = (
 def as_read(design: Any) -> tuple[dict[str, Any], dict[str, Any]]:
     """A design and its meshes as the engine reads them; an absent list is an empty one."""
     answer = session.ask_and_wait("open", design=design, name="as-read")
-    document = handing.without_nulls(answer["data"])
+    document = design_transfer.without_nulls(answer["data"])
     for cage in document["cages"].values():
         cage.setdefault("points", [])
     meshes = {
@@ -74,7 +74,7 @@ def test_the_reading_of_specularity_is_written_where_it_is_chosen(mini: Any) -> 
     assert "scattering" not in gather_document(mini)["coating"]
     coating.put("scattering", "conductor")
     assert gather_document(mini)["coating"]["scattering"] == "conductor"
-    assert session.ask_and_wait("check", design=handing.design(mini))["problems"] == []
+    assert session.ask_and_wait("check", design=design_transfer.design(mini))["problems"] == []
     coating.put("scattering", "blend")
     assert "scattering" not in gather_document(mini)["coating"]
 
@@ -143,7 +143,7 @@ def test_what_is_changed_no_longer_has_the_source_it_had(mini: Any) -> None:
     assert "parts.guide" not in after
     changed = {path for path in before if after.get(path) != before[path]}
     assert changed == {"camera.fov", "parts.guide"}
-    assert session.ask_and_wait("check", design=handing.design(mini))["problems"] == []
+    assert session.ask_and_wait("check", design=design_transfer.design(mini))["problems"] == []
 
 
 def test_copies_made_in_blender_join_the_sensor(mini: Any, select: Callable[..., None]) -> None:

@@ -10,7 +10,7 @@ import pytest
 from shown_picture import shown
 
 from studio.core import rows
-from studio.lights.choosing import lights_of
+from studio.lights.group_selection import lights_of
 from studio.lights.row_gizmo import frame
 from studio.looks.drawing import outline
 from studio.scene.collections import objects_of, select_only

@@ -11,7 +11,7 @@ import pytest
 from waiting import until
 
 from studio.engine import session
-from studio.optimise import following, offering
+from studio.optimise import search_progress, unfinished_studies
 from studio.optimise.operator import TITLE
 from studio.scene.collections import objects_of
 
@@ -53,7 +53,7 @@ def begin(scene: Any, goal: Path) -> Path:
     search.objective = f"{goal}:height"
     search.method, search.budget = "random", TRIALS
     assert bpy.ops.optisense.search(wait=False) == {"FINISHED"}
-    until(lambda: len(following._curve) >= 2 and ghosts(scene))
+    until(lambda: len(search_progress._curve) >= 2 and ghosts(scene))
     assert session.state().busy == TITLE
     return Path(search.study)
 
@@ -100,12 +100,12 @@ def test_a_search_goes_on_after_blender_was_closed(
     bpy.ops.wm.open_mainfile(filepath=file)
     scene = bpy.context.scene
     assert (scene.optisense_search.study == str(study)) is names_study
-    offering.offer(scene)
+    unfinished_studies.offer(scene)
     until(lambda: found().offer)
     assert study.name in found().offer and f"of {TRIALS} trials" in found().offer
     search = scene.optisense_search
     assert (search.study, search.budget, search.method) == (str(study), TRIALS, "random")
-    assert len(following._curve) >= len(before) and found().best
+    assert len(search_progress._curve) >= len(before) and found().best
 
     assert bpy.ops.optisense.resume(wait=False) == {"FINISHED"}
     until(lambda: not session.is_busy())
@@ -113,9 +113,9 @@ def test_a_search_goes_on_after_blender_was_closed(
     after = finished(study)
     assert sorted(after) == list(range(TRIALS + 1)), "the start, and as many as were asked for"
     assert {number: after[number] for number in before} == before, "what was done is not redone"
-    assert before.keys() <= following._curve.keys() <= after.keys()
+    assert before.keys() <= search_progress._curve.keys() <= after.keys()
 
-    offering.offer(scene)  # it is over: there is nothing to offer
+    unfinished_studies.offer(scene)  # it is over: there is nothing to offer
     session.ask_and_wait("study", study=str(study))
     assert not found().offer
 
@@ -124,6 +124,6 @@ def test_a_study_of_another_sensor_is_not_offered(saved: Any, goal: Path) -> Non
     study = begin(saved, goal)
     session.stop()
     saved.optisense.title = "another"
-    offering.offer(saved)
+    unfinished_studies.offer(saved)
     session.ask_and_wait("study", study=str(study))
-    assert not found().offer and not following.has_trials()
+    assert not found().offer and not search_progress.has_trials()

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 from waiting import until
 
-from studio.engine import handing, session
+from studio.engine import design_transfer, session
 from studio.scene.collections import object_of, objects_of
 from studio.simulate import drafts
 
@@ -53,18 +53,18 @@ def test_hidden_contacts_do_not_press(mini: Any) -> None:
         bpy.ops.optisense.add_contact()
     contact = objects_of(mini, "CONTACT")[0]
     folder = bpy.context.view_layer.layer_collection.children["Contacts"]
-    assert len(handing.contacts(mini)) == 2
+    assert len(design_transfer.contacts(mini)) == 2
     contact.hide_set(True)
-    assert len(handing.contacts(mini)) == 1
+    assert len(design_transfer.contacts(mini)) == 1
     contact.hide_set(False)
     contact.hide_viewport = True
-    assert len(handing.contacts(mini)) == 1
+    assert len(design_transfer.contacts(mini)) == 1
     contact.hide_viewport = False
     for hide in ("hide_viewport", "exclude"):
         setattr(folder, hide, True)
-        assert handing.contacts(mini) == []
+        assert design_transfer.contacts(mini) == []
         setattr(folder, hide, False)
-    assert len(handing.contacts(mini)) == 2
+    assert len(design_transfer.contacts(mini)) == 2
 
 
 def test_a_draft_that_can_not_be_made_selects_nothing_and_is_forgotten(

@@ -12,7 +12,7 @@ import pytest
 from recording import draw
 
 from studio.core import ledger as words
-from studio.engine import handing, session
+from studio.engine import design_transfer, session
 from studio.evaluate import ledger
 from studio.looks import markers
 from studio.materials.ui import OPTISENSE_PT_materials
@@ -25,11 +25,11 @@ def test_a_contact_is_pressed_by_force_dragged_and_turned(mini: Any) -> None:
     mini.optisense_simulation.noise = 50.0
     bpy.ops.optisense.add_contact()
     values = objects_of(mini, "CONTACT")[0].optisense
-    (given,) = handing.contacts(mini)
+    (given,) = design_transfer.contacts(mini)
     assert not {"force", "shift", "twist"} & set(given)
     values.press_by, values.force = "FORCE", 0.5
     values.shift, values.twist = (0.2, 0.0), 10.0
-    (given,) = handing.contacts(mini)
+    (given,) = design_transfer.contacts(mini)
     assert given["force"] == 0.5 and given["shift"] == [0.2, 0.0] and given["twist"] == 10.0
     assert bpy.ops.optisense.simulate() == {"FINISHED"}
     said = bpy.context.window_manager.optisense_picture.summary
@@ -55,10 +55,10 @@ def test_a_draft_tells_no_forces() -> None:
 def test_markers_are_printed_drawn_and_taken_off_again(mini: Any) -> None:
     assert markers.of_design(mini) is None
     bpy.ops.optisense.set_markers(columns=3, rows=2, pitch=1.5, radius=0.25)
-    assert handing.design(mini)["data"]["markers"] == {
+    assert design_transfer.design(mini)["data"]["markers"] == {
         "grid": [3, 2], "pitch": 1.5, "radius": 0.25,
     }  # fmt: skip
-    found = session.ask_and_wait("markers", design=handing.design(mini))
+    found = session.ask_and_wait("markers", design=design_transfer.design(mini))
     points = np.load(found["files"]["points"])
     normals = np.load(found["files"]["normals"])
     assert found["count"] == 6 and np.ptp(points, axis=0)[:2] == pytest.approx((3.0, 1.5))
@@ -71,7 +71,7 @@ def test_markers_are_printed_drawn_and_taken_off_again(mini: Any) -> None:
     )
     assert "Markers: 3 x 2, 1.5 mm apart" in draw(OPTISENSE_PT_materials).texts
     bpy.ops.optisense.remove_markers()
-    assert "markers" not in handing.design(mini)["data"]
+    assert "markers" not in design_transfer.design(mini)["data"]
 
 
 def test_the_ledger_tells_where_the_light_goes(mini: Any) -> None:

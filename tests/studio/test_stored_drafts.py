@@ -11,16 +11,16 @@ import pytest
 from shown_picture import shown
 from waiting import until
 
-from studio.simulate import drafts, picture, stored
+from studio.simulate import drafts, picture, stored_drafts
 
 
 def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
     mini: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = tmp_path / "drafts"
-    monkeypatch.setattr(stored, "folder", lambda: place)
+    monkeypatch.setattr(stored_drafts, "folder", lambda: place)
     now, settings = bpy.context.window_manager.optisense_picture, mini.optisense_simulation
-    assert not stored.show_kept(mini)
+    assert not stored_drafts.show_kept(mini)
     drafts._opened = True  # as when a window opens a sensor
     until(lambda: place.is_dir() and any(place.glob("*.npy")))
     assert now.is_draft and not now.is_stored and not settings.draft
@@ -28,16 +28,16 @@ def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
     assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
     assert now.is_before
     picture.show(np.zeros((4, 4, 4), dtype=np.float32))
-    assert stored.show_kept(mini)
+    assert stored_drafts.show_kept(mini)
     assert np.array_equal(shown(), fresh)
-    assert now.is_stored and not now.is_before and picture.kind(now).startswith("Draft of the last")
+    assert now.is_stored and not now.is_before and picture.kind(now).startswith("Stored draft")
 
     mini.optisense.light_groups[0].flux *= 2.0
-    assert not stored.show_kept(mini), "it is another sensor"
+    assert not stored_drafts.show_kept(mini), "it is another sensor"
     mini.optisense.light_groups[0].flux /= 2.0
     bpy.ops.optisense.add_contact()
-    assert not stored.show_kept(mini), "a ball presses on it"
+    assert not stored_drafts.show_kept(mini), "a ball presses on it"
     bpy.ops.optisense.clear_contacts()
     file = next(place.glob("*.npy"))
     file.write_bytes(b"damaged")
-    assert not stored.show_kept(mini)
+    assert not stored_drafts.show_kept(mini)

@@ -128,7 +128,7 @@ def test_it_is_offered_and_goes_on_by_one_click(bench: Bench) -> None:
     before = finished(bench.home / STUDY)
     bench.start(*bench.home.glob(FILE))
     bench.until(f"{TOLD}.offer")
-    assert f"{STUDY} is not over" in bench.see(f"{TOLD}.offer")
+    assert f"{STUDY} is not finished" in bench.see(f"{TOLD}.offer")
     assert not bench.see(GHOSTS)
     bench.bring("optisense.apply_best", 0.9, across=0.25)
     bench.photograph("offered")

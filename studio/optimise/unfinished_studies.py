@@ -13,7 +13,7 @@ from ..core.engine import EngineError
 from ..engine import session
 from ..scene.paths import absolute
 from ..sensor import opening
-from . import following
+from . import search_progress
 
 NOT_OVER = (None, "", "interrupted")
 """Reasons for the end of a study that can continue: it was stopped, or nothing recorded its end."""
@@ -44,7 +44,7 @@ def offer(scene: bpy.types.Scene) -> None:
     The study is the one that the scene names, otherwise the last one beside the design's folder:
     the .blend file may have been saved before the search began, or never.
     """
-    following.begin()
+    search_progress.begin()
     design, study = scene.optisense, study_of(scene)
     if not study and design.is_open and design.is_saved:
         study = next((str(each) for each in reversed(studies_beside(Path(design.folder)))), "")
@@ -64,13 +64,13 @@ def offer(scene: bpy.types.Scene) -> None:
             search.objective = ", ".join(result["objectives"])
             search.method = result["method"]
             search.require = ", ".join(result["requirements"])
-        following.take_curve(result["curve"])
+        search_progress.take_curve(result["curve"])
         done = sum(not row["start"] for row in result["curve"])
         far = f"{done} of {search.budget or result['budget']} trials"
         bpy.context.window_manager.optisense_found.offer = (
-            f"The search {Path(study).name} goes on without Blender: {far}. Resume follows it"
+            f"The search {Path(study).name} continues without Blender: {far}. Resume shows it"
             if running
-            else f"The search {Path(study).name} is not over: {far}. Resume goes on with it"
+            else f"The search {Path(study).name} is not finished: {far}. Resume continues it"
         )
         session.redraw()
 
@@ -82,8 +82,8 @@ def offer(scene: bpy.types.Scene) -> None:
 
 @bpy.app.handlers.persistent
 def _loaded(*_: Any) -> None:
-    if not bpy.app.background:  # scripts say themselves what they want
-        following.clear_ghosts(bpy.context.scene)
+    if not bpy.app.background:  # scripts ask for what they need
+        search_progress.clear_ghosts(bpy.context.scene)
         offer(bpy.context.scene)
 
 

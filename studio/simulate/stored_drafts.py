@@ -1,4 +1,4 @@
-"""The drafts of sensors that were open before, which are shown as soon as such a sensor is opened.
+"""Stored drafts of sensors, which are shown as soon as such a sensor is opened again.
 
 They are kept in the folder that Blender gives the extension for its own files.
 """
@@ -15,9 +15,9 @@ import bpy
 import numpy as np
 
 from ..core.engine import EngineError
-from ..engine import handing, session
+from ..engine import design_transfer, session
 from ..engine.preferences import PACKAGE
-from .exposing import exposure, shown_size
+from .exposure import exposure, shown_size
 from .picture import show
 
 MOST = 24
@@ -25,9 +25,7 @@ MOST = 24
 
 
 def folder() -> Path | None:
-    """Return the folder of the drafts; None if the extension is registered without being
-    installed, and then has no folder of its own.
-    """
+    """Return the folder of the drafts; None if the extension is not installed and has none."""
     try:
         return Path(bpy.utils.extension_path_user(PACKAGE, path="drafts"))
     except ValueError:
@@ -35,10 +33,9 @@ def folder() -> Path | None:
 
 
 def keep(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
-    """Keep the draft in the engine's answer as that of the scene's sensor, unless contacts press on
-    it.
+    """Store the draft in the engine's answer for the scene's sensor, unless it has contacts.
 
-    A draft that can't be written is not kept.
+    A draft that can't be written is not stored.
     """
     try:
         file = _file(scene)
@@ -56,7 +53,7 @@ def keep(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
 
 
 def show_kept(scene: bpy.types.Scene) -> bool:
-    """Show the draft that is kept of the scene's sensor; return whether there is one."""
+    """Show the stored draft of the scene's sensor; return whether there is one."""
     try:
         file = _file(scene)
         pixels = None if file is None else np.load(file)
@@ -83,8 +80,8 @@ def _file(scene: bpy.types.Scene) -> Path | None:
         EngineError: there is no engine, or the scene does not form a design.
     """
     place = folder()
-    if place is None or handing.contacts(scene):
+    if place is None or design_transfer.contacts(scene):
         return None
-    asked = [session.engine().version, exposure(scene), *handing.contents(scene)]
+    asked = [session.engine().version, exposure(scene), *design_transfer.contents(scene)]
     text = json.dumps(asked, sort_keys=True).encode()
     return place / f"{hashlib.blake2b(text, digest_size=16).hexdigest()}.npy"

@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..core import vary
+from ..core import search_parameters
 from ..core.engine import EngineError
 from ..core.numbers import duration
 from ..engine import session
@@ -26,7 +26,7 @@ def choose_objective(search: bpy.types.PropertyGroup) -> None:
     """Set the default objective that suits the parameters; an objective chosen by the user
     stays.
     """
-    texts = vary.texts_of(search.vary)
+    texts = search_parameters.texts_of(search.vary)
     if search.objective in (BY_RAYS, BY_PICTURES) and texts:
         bright = all(BRIGHTNESS.match(text) for text in texts)
         search.objective = BY_PICTURES if bright else search.objective
@@ -41,7 +41,7 @@ def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict
     answer = session.ask_and_wait(
         "advise",
         design=design,
-        vary=vary.texts_of(search.vary),
+        vary=search_parameters.texts_of(search.vary),
         objectives=[objective(each) for each in search.objective.split(",")],
         method=search.method,
         **fields,
@@ -53,7 +53,7 @@ def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict
 
 
 def is_flat(scores: list[float]) -> bool:
-    """Whether all trials of a search scored alike, so that the parameters have no effect."""
+    """Whether all trials of a search have the same score, so that the parameters have no effect."""
     return len(scores) >= LEAST and max(scores) - min(scores) <= ALIKE * max(map(abs, scores))
 
 

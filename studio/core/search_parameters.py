@@ -1,4 +1,4 @@
-"""Suggestions for the parameters of a search: what it may change of an object."""
+"""Suggested parameters of a search for each kind of object, and the curve of its scores."""
 
 from __future__ import annotations
 

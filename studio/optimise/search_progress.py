@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.vary import curve_picture
+from ..core.search_parameters import curve_picture
 from ..engine import session
 from ..scene.collections import collection, object_of, objects_of
 from ..scene.kinds import GHOST
@@ -20,7 +20,8 @@ CURVE_SIZE = (220, 150)
 """Width and height of the picture of a search's curve, pixels; as wide as the sidebar."""
 GHOSTS = "Best so far"
 COLOUR = (0.1, 0.85, 0.95, 0.4)
-"""Colour of ghosts (red, green, blue, opacity); no light, part or outline has it."""
+"""Colour (red, green, blue, opacity) of ghosts, the transparent parts of the best design; no light,
+part or outline has it."""
 
 SAME_PLACE = 1e-3
 """Distance in mm below which a vertex counts as unmoved and is not drawn."""

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ..core.engine import EngineError, Request
-from . import handing, session
+from . import design_transfer, session
 
 
 class LatestRequest:
@@ -22,7 +22,11 @@ class LatestRequest:
     """
 
     def __init__(self, rest: float = 0.0) -> None:
-        """Args: rest: seconds without a change after which the request is sent."""
+        """Create the request, which is sent after the first change.
+
+        Args:
+            rest: time without a change after which the request is sent, s.
+        """
         self.open: Request | None = None
         self._rest = rest
         self._when: float | None = None
@@ -75,7 +79,7 @@ class LatestRequest:
         """
         self.drop()
         try:
-            design = handing.design(bpy.context.scene)
+            design = design_transfer.design(bpy.context.scene)
         except EngineError as error:
             refused(error)
             return

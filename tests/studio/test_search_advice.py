@@ -11,7 +11,7 @@ from recording import draw
 
 from studio.core.numbers import duration
 from studio.engine import session
-from studio.optimise import advising, following
+from studio.optimise import search_advice, search_progress
 from studio.optimise.ui import OPTISENSE_PT_optimise
 
 
@@ -37,11 +37,11 @@ def test_an_objective_that_was_chosen_stays(mini: Any) -> None:
 
 
 def test_how_long_it_takes_is_told(mini: Any) -> None:
-    from studio.engine import handing
+    from studio.engine import design_transfer
 
     search = mini.optisense_search
     bpy.ops.optisense.vary(label="View", text="camera.fov=40:70")
-    few = advising.advice(handing.design(mini), search, {"budget": 30})
+    few = search_advice.advice(design_transfer.design(mini), search, {"budget": 30})
     assert few.startswith("30 trials usually take ")
     assert duration(7300.0) == "2 hours" and duration(100.0) == "2 minutes"
     assert duration(20.0) == "20 seconds" and duration(0.1) == "1 seconds"
@@ -49,11 +49,11 @@ def test_how_long_it_takes_is_told(mini: Any) -> None:
 
 def test_a_flat_curve_is_told(mini: Any) -> None:
     rows = [{"number": each, "scores": {"aoap": 0.9}, "start": each == 0} for each in range(6)]
-    following.take_curve(rows[:4])
-    assert not advising.is_flat(following.known_scores())
-    following.take_curve(rows)
+    search_progress.take_curve(rows[:4])
+    assert not search_advice.is_flat(search_progress.known_scores())
+    search_progress.take_curve(rows)
     layout = draw(OPTISENSE_PT_optimise)
     assert layout is not None and any("All trials score alike" in text for text in layout.texts)
-    following.take_curve([*rows, {"number": 6, "scores": {"aoap": 0.91}, "start": False}])
-    assert not advising.is_flat(following.known_scores())
-    following.begin()
+    search_progress.take_curve([*rows, {"number": 6, "scores": {"aoap": 0.91}, "start": False}])
+    assert not search_advice.is_flat(search_progress.known_scores())
+    search_progress.begin()
