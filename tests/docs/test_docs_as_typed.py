@@ -1,13 +1,13 @@
 """Everything that README and docs show to type works, typed page by page and block by block.
 
-`make docs-as-typed` also types the blocks that take minutes.
+`python` and `optisense` are forks of one process, except on the pages that activate an environment
+themselves. `make docs-as-typed` types with the real ones, also the blocks that take minutes.
 """
 
 from __future__ import annotations
 
 import os
 import re
-import resource
 import shlex
 import shutil
 import sys
@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
+from warm_python import can_fork, warm_python
 
 from optisense.cli import app
 from paper.__main__ import app as paper_app
@@ -24,6 +25,8 @@ from .markdown import RUN, Block, blocks, code_spans
 from .terminal import Outcome, Terminal, reader_environment
 
 ROOT = Path(__file__).parents[2]
+PROGRAMS = Path(sys.executable).parent
+"""Folder of the programs of the tests' environment."""
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 BLOCKS = {page: blocks(page) for page in PAGES}
 
@@ -76,10 +79,20 @@ def ids(page: Path) -> str:
     return page.stem
 
 
+@pytest.fixture(scope="module")
+def programs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The folder of the programs `python` and `optisense`."""
+    if not can_fork():
+        yield PROGRAMS
+        return
+    with warm_python(reader_environment(tmp_path_factory.mktemp("own"))) as folder:
+        yield folder
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if typed(page)], ids=ids)
-def test_a_page_works_as_typed(page: Path, tmp_path: Path) -> None:
-    type_page(page, [block for block in typed(page) if not block.long], tmp_path)
+def test_a_page_works_as_typed(page: Path, programs: Path, tmp_path: Path) -> None:
+    type_page(page, [block for block in typed(page) if not block.long], tmp_path, programs)
 
 
 @pytest.mark.long
@@ -87,7 +100,7 @@ def test_a_page_works_as_typed(page: Path, tmp_path: Path) -> None:
     "page", [page for page in PAGES if any(block.long for block in BLOCKS[page])], ids=ids
 )
 def test_a_page_works_as_typed_with_its_long_commands(page: Path, tmp_path: Path) -> None:
-    type_page(page, typed(page), tmp_path)
+    type_page(page, typed(page), tmp_path, PROGRAMS)
 
 
 def test_a_long_block_says_how_long_it_takes_and_has_a_quick_variant_beside_it() -> None:
@@ -148,19 +161,20 @@ def test_commands_that_are_not_typed_exist_with_their_options() -> None:
             assert result.exit_code == 0, f"{place}: {command}\n{result.output}"
 
 
-def type_page(page: Path, shown: list[Block], work: Path) -> None:
-    """Type the blocks in the folder of a clone, or in an empty one, as the page says."""
+def type_page(page: Path, shown: list[Block], work: Path, programs: Path) -> None:
+    """Type the blocks in the folder of a clone, or in an empty one, as the page says.
+
+    `programs` has the programs that the shell finds first, before those of the tests' environment.
+    """
     folder = work / "folder"
     folder.mkdir()
     if page.name in IN_THE_CLONE:
         clone(folder)
     environment = reader_environment(work / "own")
-    programs = str(Path(sys.executable).parent)
-    found = [each for each in environment["PATH"].split(os.pathsep) if each != programs]
+    found = [each for each in environment["PATH"].split(os.pathsep) if each != str(PROGRAMS)]
     if page.name not in ACTIVATING:
-        found.insert(0, programs)
+        found[:0] = [str(programs), str(PROGRAMS)]
     environment["PATH"] = os.pathsep.join(found)
-    before = processor_seconds()
     with Terminal(folder, environment) as terminal:
         for block in shown:
             for command, outcome in type_block(block, terminal):
@@ -169,13 +183,6 @@ def type_page(page: Path, shown: list[Block], work: Path) -> None:
                     f"{block.place}: {command}\nexit code {outcome.exit_code}, "
                     f"not {block.exit_code}\n{outcome.output[-4000:]}"
                 )
-    print(f"{page.name}: {processor_seconds() - before:.0f} processor seconds")
-
-
-def processor_seconds() -> float:
-    """What the ended children of this process took of the processors, their children included."""
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return spent.ru_utime + spent.ru_stime
 
 
 def clone(folder: Path) -> None:
