@@ -150,18 +150,22 @@ class _Remainder:
         self.whole[full] = False
         rows = np.flatnonzero(~np.isin(pairs[:, 0], full))
         rows = rows[np.argsort(pairs[rows, 0], kind="stable")]
-        faces, starts = np.unique(pairs[rows, 0], return_index=True)
-        for face, group in zip(faces.tolist(), np.split(rows, starts[1:]), strict=False):
-            outline = self.partial.get(face, shapely.Polygon(frames.corners[group[0]]))
-            cover = _united(overlay.second.faces[pairs[group, 1]], corners[group])
-            rest = _without_slivers(shapely.difference(outline, cover, grid_size=_GRID))
-            if rest.is_empty and self.whole[face]:
-                taken_whole.append(face)
+        faces, starts, group = np.unique(pairs[rows, 0], return_index=True, return_inverse=True)
+        outlines = shapely.polygons(frames.corners[rows[starts]])
+        for k in np.flatnonzero(~self.whole[faces]):
+            outlines[k] = self.partial[int(faces[k])]
+        covers = _united(overlay.second.faces[pairs[rows, 1]], corners[rows], group)
+        rests = _without_slivers(shapely.difference(outlines, covers, grid_size=_GRID))
+        free = shapely.is_empty(rests)
+        cut_up = ~(free & self.whole[faces])
+        shared = shapely.intersection(outlines[cut_up], covers[cut_up], grid_size=_GRID)
+        taken_whole += faces[~cut_up].tolist()
+        taken |= zip(faces[cut_up].tolist(), shared, strict=True)
+        self.whole[faces] = False
+        for face, rest, is_free in zip(faces.tolist(), rests, free, strict=True):
+            if is_free:
+                self.partial.pop(face, None)
             else:
-                taken[face] = shapely.intersection(outline, cover, grid_size=_GRID)
-            self.whole[face] = False
-            self.partial.pop(face, None)
-            if not rest.is_empty:
                 self.partial[face] = rest
         return _assembled(self.mesh, np.array(taken_whole, dtype=np.int64), taken)
 
@@ -273,20 +277,30 @@ def _inward(triangles: FloatArray, points: FloatArray) -> FloatArray:
     return result
 
 
-def _united(faces: NDArray[np.int32], corners: FloatArray) -> Any:
-    """Return the union of flat triangles (g, 3, 2) whose vertices are numbered by `faces` (g, 3).
+def _united(
+    faces: NDArray[np.int32], corners: FloatArray, group: NDArray[np.int64]
+) -> NDArray[np.object_]:
+    """Return the union of the flat triangles of each group.
 
-    Edges between two of the faces cancel, so that only their outline needs an overlay.
+    Edges between two of the faces of a group cancel, so that only their outline needs an overlay.
+
+    Args:
+        faces: (g, 3) numbers of the triangles' vertices.
+        corners: (g, 3, 2) the triangles.
+        group: (g,) number of each triangle's group, ascending from 0.
     """
-    size = int(faces.max()) + 1
-    starts, ends = faces.reshape(-1).astype(np.int64), np.roll(faces, -1, axis=1).reshape(-1)
-    outer = ~np.isin(starts * size + ends, ends * np.int64(size) + starts)
+    size = np.int64(faces.max(initial=0)) + 1
+    starts, ends = faces.astype(np.int64), np.roll(faces, -1, axis=1).astype(np.int64)
+    first = group[:, None] * size
+    outer = ~np.isin((first + starts) * size + ends, (first + ends) * size + starts).ravel()
     lines = np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2, 2)[outer]
-    outline = shapely.build_area(shapely.multilinestrings(lines))
+    edges = shapely.multilinestrings(shapely.linestrings(lines), indices=np.repeat(group, 3)[outer])
+    united: NDArray[np.object_] = shapely.build_area(edges)
     triangles = shapely.polygons(corners)
-    if abs(outline.area - shapely.area(triangles).sum()) <= 1e-9 * outline.area:
-        return outline
-    return shapely.union_all(triangles, grid_size=_GRID)
+    area = np.bincount(group, shapely.area(triangles), len(united))
+    for k in np.flatnonzero(np.abs(shapely.area(united) - area) > 1e-9 * area):
+        united[k] = shapely.union_all(triangles[group == k], grid_size=_GRID)
+    return united
 
 
 def _heights(points: FloatArray, triangles: FloatArray) -> FloatArray:
@@ -305,9 +319,13 @@ def _is_shape(polygons: Any) -> NDArray[np.bool_]:
     return shape
 
 
-def _without_slivers(shape: Any) -> Any:
-    parts = shapely.get_parts(shape)
-    return shapely.multipolygons(parts[_is_shape(parts)])
+def _without_slivers(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
+    """Return the parts of each of some shapes (k,) that are polygons larger than rounding."""
+    parts, shape = shapely.get_parts(shapes, return_index=True)
+    kept = _is_shape(parts)
+    found = np.full(len(shapes), shapely.MultiPolygon(), dtype=object)
+    shapely.multipolygons(parts[kept], indices=shape[kept], out=found)
+    return found
 
 
 def _assembled(
@@ -318,8 +336,9 @@ def _assembled(
     pieces = [kept.compacted()]
     faces = np.array(list(patches), dtype=np.int64)
     frames = _Frames.of(mesh, faces)
+    shapes = _without_slivers(np.array(list(patches.values()), dtype=object))
     for k, face in enumerate(faces.tolist()):
-        for polygon in shapely.get_parts(_without_slivers(patches[face])):
+        for polygon in shapely.get_parts(shapes[k]):
             rings = [polygon.exterior, *polygon.interiors]
             signs = [1] + [-1] * len(polygon.interiors)
             flat = [
