@@ -95,7 +95,7 @@ def test_apply_writes_the_better_design(study: Path, tmp_path: Path) -> None:
     )
     assert other.exit_code == 0
     assert ots.load(tmp_path / "last").coating.specularity == 1.0
-    for which, said in (("99", "Trials 0 to 11"), ("worst", "best, start, or its number")):
+    for which, said in (("99", "trials 0 to 11"), ("worst", "best, start, or its number")):
         wrong = CliRunner().invoke(app, ["apply", str(study), "--trial", which, "--out", "x"])
         assert wrong.exit_code == 2
         assert said in wrong.output

@@ -15,7 +15,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchProgress
-from optisense.search.study.promotion import LEAST_MOST
+from optisense.search.study.promotion import LEAST_PROMOTED
 from optisense.search.study.stages import FRESH
 
 FULL = {"resolution": [640, 480], "photons": 1_000_000}
@@ -52,7 +52,7 @@ def test_the_best_by_full_scores_is_found_although_coarse_ones_are_biased(
 ) -> None:
     result = found_by(mini, biased)
     promoted = [trial for trial in result.trials if trial.fresh and not trial.is_start]
-    assert len(promoted) <= LEAST_MOST < len(result.trials) / 3
+    assert len(promoted) <= LEAST_PROMOTED < len(result.trials) / 3
     assert result.best.values["coating.specularity"] == pytest.approx(BEST, abs=0.06)
     assert len(result.best.fresh) == 3
     assert len(result.start.fresh) == 1  # it is so far behind that one score tells

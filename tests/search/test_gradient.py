@@ -15,7 +15,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.methods.base import Problem
 from optisense.search.methods.checked_gradients import (
     DIFFERENCES,
-    FEW,
+    FEW_PARAMETERS,
     GRADIENT_BY,
     GRADIENT_HOLDS,
     LAYERS,
@@ -172,7 +172,7 @@ def test_a_transparent_part_that_moves_is_climbed_by_differences() -> None:
     usual = DesignEvaluator(bound, ["2to3pw"], {"ray_resolution": (32, 24)}, apart=False)
     evaluator = found.evaluator(usual)
     assert isinstance(evaluator, GradientEvaluator)
-    assert bound.size > FEW
+    assert bound.size > FEW_PARAMETERS
     with pytest.raises(NoDerivativeError, match="gel"):
         evaluator.gradient(bound.start)
     outcome = evaluator(bound.start, 0)

@@ -96,7 +96,7 @@ def test_the_best_is_made_as_a_design(result: SearchResult) -> None:
 
 def test_an_evaluator_travels_without_its_images(result: SearchResult) -> None:
     evaluator = RelitEvaluator(DesignEvaluator(result.study.space, ["rgb2normal"], QUICK))
-    evaluator._lit[0] = object()  # type: ignore[assignment]
+    evaluator._images[0] = object()  # type: ignore[assignment]
     there = pickle.loads(pickle.dumps(evaluator))
     assert there.names == ["rgb2normal"]
     assert not there._lit
