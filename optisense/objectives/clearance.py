@@ -39,7 +39,7 @@ MOST_FACES = 1000
 """Number of faces among which the nearest point is searched, which takes about a ms."""
 
 MOST_CLEARANCE = 1e4
-"""Value (mm) if no two parts are apart; larger than any sensor."""
+"""Value (mm) if no two parts are apart: ten metres, larger than any sensor."""
 
 
 @objective("clearance", title="Clearance", range=(0.0, MOST_CLEARANCE), unit="mm", rays_only=True)
@@ -101,6 +101,7 @@ class _Places(NamedTuple):
 
     @staticmethod
     def of(mesh: TriangleMesh) -> _Places:
+        """Return the places on a mesh, with a tree to find the nearest ones."""
         corners = mesh.triangles
         edges = 0.5 * (corners + np.roll(corners, -1, axis=1))
         places = np.concatenate([corners, edges, corners.mean(axis=1, keepdims=True)], axis=1)

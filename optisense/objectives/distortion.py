@@ -79,7 +79,7 @@ def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str,
 
 
 def seen_footprints(rays: ChiefRays) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return length and width of the footprints of chief rays, as in `footprints`.
+    """Return length and width (h-1, w-1), mm, of the footprints of chief rays; see `footprints`.
 
     Raises:
         ObjectiveError: fewer than `LEAST_FOOTPRINTS` lie on the sensing surface.

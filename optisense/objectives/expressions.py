@@ -86,6 +86,9 @@ class _Term:
     strength: int
 
     def within(self, strength: int) -> str:
+        """Return the text as an operand of an operation, in brackets if that binds more
+        strongly.
+        """
         return f"({self.text})" if self.strength < strength else self.text
 
 
@@ -179,6 +182,11 @@ class _Parser:
         self._found: dict[ScoreTerm, None] = {}
 
     def expression(self) -> Expression:
+        """Parse the whole text.
+
+        Raises:
+            ObjectiveError: the text is not an expression; the message marks the place.
+        """
         tree = self._sum()
         token = self._peek()
         if token.kind != "end":

@@ -38,13 +38,18 @@ does not state. Here both are degrees on the sphere of normals (see `azimuth_on_
 equal weights."""
 
 LEAST_TILT = 1.0
-"""Smallest change (degrees) of a pixel's normal with which the pixel counts as indented."""
+"""Smallest change (degrees) of a pixel's normal with which the pixel counts as indented; a reader
+can hardly tell smaller ones from the untouched surface.
+"""
 
 POLE = 2.0
-"""Tilt (degrees) below which the azimuth of a normal is undefined."""
+"""Tilt (degrees) below which the azimuth of a normal counts as undefined: two such normals differ
+by at most 4 degrees, whatever their azimuths.
+"""
 
 CELL = 3.0
-"""Angle (degrees) between neighbouring normals of the grid on which the confusion is evaluated."""
+"""Angle (degrees) between neighbouring normals of the grid on which the confusion is evaluated, far
+below the confusion of the built-in sensors (34 degrees and more)."""
 
 RING = 10_000
 """Multiplier of the number of a ring in the number of a normal, larger than the number of normals
@@ -268,8 +273,8 @@ def _angles_between(
 
 
 def azimuth_on_sphere(arc: ArrayLike, theta: ArrayLike) -> FloatArray:
-    """Return the angle (degrees) between two normals of polar angle `theta` whose azimuths differ
-    by `arc`.
+    """Return the angles (...), degrees, between two normals of polar angle `theta` whose azimuths
+    differ by `arc`, both (...), degrees.
 
     A range of azimuths has little effect on a normal of small tilt. It is therefore converted to
     the angle between the normals: sin(theta) * arc for small arcs, and at most 2 theta.

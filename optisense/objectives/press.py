@@ -18,7 +18,9 @@ FloatArray = NDArray[np.float64]
 Value = TypeVar("Value")
 
 MOST_CLIPPED = 0.25
-"""Largest share of overexposed pixels of a press that can be scored."""
+"""Largest share of overexposed pixels of a press that can be scored: where more are overexposed,
+the others no longer represent the contact.
+"""
 
 CLIPPED = 254.5 / 255
 """Value from which on a channel is stored as 255 of 255 levels and counts as saturated."""
@@ -95,7 +97,7 @@ class Press:
             ObjectiveError: the press was created without `respond_untouched`.
         """
         if self.respond_untouched is None:
-            raise ObjectiveError(f"nobody knows how {self.name} looks untouched")
+            raise ObjectiveError(f"the untouched response of {self.name} is unknown")
         return self.respond_untouched()
 
     @cached_property

@@ -137,7 +137,7 @@ def _read(evaluation: Evaluation, noise: float) -> list[ReadPress]:
     presses = evaluation.calibration_presses
     if len(presses) < LEAST_PRESSES:
         raise ObjectiveError(
-            f"{len(presses)} presses can't show what a reader makes of one that it has not seen",
+            f"{len(presses)} presses are too few to calibrate a reader and to test it",
             hint=f"Press at {LEAST_PRESSES} places or more",
         )
     known = [press.derived("pixels to read", partial(_KnownPress.of, press)) for press in presses]

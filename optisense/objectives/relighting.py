@@ -109,13 +109,13 @@ class Relighting:
         return self._as_image(_mixed(self._untouched, flux))
 
     def image(self, flux: ArrayLike) -> TactileImage:
-        """Return the image of the untouched sensor under these lights."""
+        """Return the image of the untouched sensor under lights of a power (groups, 3), mW."""
         given = np.asarray(flux, dtype=np.float64)
         return self._image.relight(dict(zip(self.groups, given, strict=True)))
 
     def exposure(self, flux: ArrayLike) -> float:
-        """Return the exposure (factor from radiance to the camera's response) under these
-        lights.
+        """Return the exposure (factor from radiance to the camera's response) under lights of a
+        power (groups, 3), mW.
         """
         return self._exposure(self.untouched(flux), self._contacts(flux))
 
@@ -140,7 +140,13 @@ class Relighting:
     def presses_exposed(
         self, flux: ArrayLike, exposure: float, *, whole: bool = False
     ) -> list[Press]:
-        """Return the presses under a given exposure; they may be overexposed or black."""
+        """Return the presses under lights of a power (groups, 3), mW, with a given exposure; they
+        may be overexposed or black.
+
+        Args:
+            flux, whole: see `presses`.
+            exposure: factor from radiance to the camera's response.
+        """
         return self._lit_presses(self.untouched(flux), self._contacts(flux), exposure, whole)
 
     def _lit_presses(

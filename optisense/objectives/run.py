@@ -73,8 +73,9 @@ def evaluate(
     if isinstance(sensor, Evaluation):
         if shared:
             raise ObjectiveError(
-                "images and rays of an evaluation are settled: " + ", ".join(shared),
-                hint="Make a new evaluation with these settings",
+                "the images and rays of an existing evaluation have their settings already: "
+                + ", ".join(shared),
+                hint="Create a new evaluation with these settings",
             )
         evaluation = sensor
     else:

@@ -55,7 +55,7 @@ def run_objective(
     except Exception as error:
         return failed(f"{type(error).__name__}: {error} ({place_of(error)})")
     if not math.isfinite(value):
-        return failed(f"the objective returned {value}, which is no score")
+        return failed(f"the objective returned {value}, which is not a finite number")
     if not low <= value <= high:
         return failed(
             f"the objective returned {value:g}, which is outside its range from {low:g} to {high:g}"

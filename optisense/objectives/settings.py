@@ -92,7 +92,7 @@ class Settings:
             )
         if not (is_number(self.depth) and is_number(self.radius) and 0 < self.depth < self.radius):
             raise ObjectiveError(
-                f"a ball of radius {self.radius!r} mm can't be judged {self.depth!r} mm deep",
+                f"a ball of radius {self.radius!r} mm can't be pressed {self.depth!r} mm deep",
                 hint="Press deeper than 0 and less deep than the radius",
             )
         if self.radius > MOST_RADIUS:

@@ -36,15 +36,29 @@ class Rays(Protocol):
     """
 
     @property
-    def codes(self) -> NDArray[np.uint32]: ...
+    def codes(self) -> NDArray[np.uint32]:
+        """Path codes (h, w)."""
+        ...
+
     @property
-    def cosine(self) -> FloatArray: ...
+    def cosine(self) -> FloatArray:
+        """Cosines (k,) of incidence."""
+        ...
+
     @property
-    def weight(self) -> FloatArray: ...
+    def weight(self) -> FloatArray:
+        """Areas (k,), pixels."""
+        ...
+
     @property
-    def points(self) -> FloatArray: ...
+    def points(self) -> FloatArray:
+        """End points (k, 3), mm."""
+        ...
+
     @property
-    def density(self) -> FloatArray: ...
+    def density(self) -> FloatArray:
+        """Triangles per area (k,), 1/mm²."""
+        ...
 
 
 class Slopes(NamedTuple):

@@ -116,17 +116,21 @@ class ObjectiveContract:
         return contract._kept
 
     def test_it_is_found_by_its_name(self) -> None:
+        """The registry returns the same objective for its name."""
         found = self.found()
         assert find(found.name) is found
 
     def test_its_settings_have_defaults(self) -> None:
+        """Every setting has a name and a default."""
         assert all(isinstance(name, str) for name in self.found().settings)
 
     def test_it_says_what_it_measures(self) -> None:
+        """It has a title and a description."""
         assert self.found().title
         assert len(self.found().summary) > 10
 
     def test_it_scores_a_gelsight_mini(self) -> None:
+        """The score of a GelSight Mini is finite."""
         score = self.kept_score()
         assert score.failure is None
         assert isinstance(score.value, float)
@@ -134,14 +138,17 @@ class ObjectiveContract:
         assert score.seconds >= 0.0
 
     def test_the_same_images_give_the_same_score(self) -> None:
+        """The score depends on nothing but the images."""
         assert self.score().value == self.kept_score().value
 
     def test_its_parts_can_be_written_as_json(self) -> None:
+        """The score and its parts are valid JSON."""
         score = self.kept_score()
         text = json.dumps(score.to_dict(), allow_nan=False)
         assert json.loads(text)["value"] == score.value
 
     def test_it_can_be_drawn_and_shown(self) -> None:
+        """It has a figure, and a table for notebooks."""
         score = self.kept_score()
         buffer = io.BytesIO()
         score.figure().savefig(buffer, format="png", dpi=30)
@@ -149,16 +156,19 @@ class ObjectiveContract:
         assert score.name in score._repr_html_()
 
     def test_it_leaves_the_sensor_as_it_was(self) -> None:
+        """Scoring does not change the design."""
         before = gelsight_mini().design.model_dump_json()
         self.score()
         assert gelsight_mini().design.model_dump_json() == before
 
     def test_its_range_is_told_and_kept(self) -> None:
+        """The score lies within the range that the objective states."""
         low, high = self.found().bounds(self.settings)
         assert low < high
         assert low <= self.kept_score().value <= high
 
     def test_cameras_that_see_little_give_a_score_in_its_range_or_a_reason(self) -> None:
+        """Unusual cameras give a valid score, or a failure with a reason."""
         low, high = self.found().bounds(self.settings)
         for path, value in ODD_CAMERAS:
             score = evaluate(odd_evaluation(path, value), self.found(), **self.settings)
@@ -169,6 +179,7 @@ class ObjectiveContract:
                 assert len(score.failure) > 10, f"{path} = {value}"
 
     def test_a_sensor_without_light_gives_a_score_or_a_reason(self) -> None:
+        """A dark sensor gives a valid score, or a failure with a reason."""
         score = evaluate(unlit_evaluation(), self.found(), **self.settings)
         if score.failure is None:
             assert math.isfinite(score.value)

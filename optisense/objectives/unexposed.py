@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from optisense.optics import TactileImage
 
 GAP = 0.5
-"""Smallest distance (mm) between contacts that share an image."""
+"""Smallest distance (mm) between contacts that share an image: more than a pixel of every built-in
+sensor, so that no pixel sees two contacts."""
 
 
 class UnexposedPress(NamedTuple):
@@ -36,8 +37,8 @@ def radiance_in(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.flo
 
 
 def box_around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
-    """Return the rows and columns of a box around a mask's true pixels, extended by `reach`
-    pixels.
+    """Return the rows and columns of a box around the true pixels of a mask (h, w), extended by
+    `reach` pixels.
     """
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return (

@@ -17,7 +17,9 @@ DIM, BRIGHT = 5.0, 95.0
 The extremes would be single pixels beside a light or in a corner."""
 
 UNLIT = 0.01
-"""Share of the brightest colour's level below which a colour counts as unlit."""
+"""Share of the brightest colour's level below which a colour counts as unlit: a few levels of 255,
+little more than the camera's noise.
+"""
 
 COLOURS = ("red", "green", "blue")
 

@@ -37,7 +37,9 @@ JUDGING = {
 """Processor time (s) of the built-in objectives in addition to rendering."""
 
 OWN_JUDGING = 0.2
-"""Expected processor time (s) of a user's objective in addition to rendering."""
+"""Expected processor time (s) of a user's objective in addition to rendering, about that of
+NormDiff; its true time is unknown before it has run.
+"""
 
 REBUILDING = 0.02
 """Time (s) to build the scene of a design that differs from the last one, measured on GelSight

@@ -123,7 +123,7 @@ def influences(trials: Sequence[Trial], name: str) -> list[Influence]:
 
 
 def rank_correlation(one: ArrayLike, other: ArrayLike) -> float:
-    """Return Spearman's rank correlation; 0 if one of both is constant."""
+    """Return Spearman's rank correlation of two samples (n,); 0 if one of them is constant."""
     from scipy.stats import rankdata
 
     first, second = rankdata(one), rankdata(other)
@@ -133,8 +133,8 @@ def rank_correlation(one: ArrayLike, other: ArrayLike) -> float:
 
 
 def correlation_ratio(groups: ArrayLike, values: ArrayLike) -> float:
-    """Return the root of the share of the values' variance that lies between groups; 0 if there is
-    none.
+    """Return the correlation ratio (eta) of values (n,) in groups (n,): the root of the share of
+    their variance that lies between the groups; 0 if they are constant.
     """
     member, given = np.asarray(groups), np.asarray(values, dtype=np.float64)
     total = float(((given - given.mean()) ** 2).sum())
@@ -232,7 +232,7 @@ def front(
     if marks is not None:
         marks.add(axes, numbers, *values.T)
     if len(edge):
-        label = "not beaten in both" if len(names) == 2 else "not beaten in all"
+        label = "Pareto front"
         style = "o-" if len(names) == 2 else "o"
         axes.plot(
             *edge.T, style, color=BLUE, ms=5, lw=1.2, drawstyle="steps-pre", label=label, zorder=3

@@ -21,7 +21,9 @@ MOST_TRIALS = 200
 """Largest number of trials in the table, the best ones; a page with thousands would load slowly."""
 
 MOST_CHANGES = 40
-"""Largest number of parameters in the list of changes, the largest change first."""
+"""Largest number of parameters in the list of changes, the largest change first; a longer list is
+not read.
+"""
 
 MOST_CAUSES = 10
 """Largest number of causes of failure in the table, the most frequent ones; the others are counted
@@ -29,7 +31,9 @@ together.
 """
 
 WORSE = 0.02
-"""Relative change of a ray measure below which it does not count as worse."""
+"""Relative change of a ray measure below which it does not count as worse; smaller changes may come
+from the rounding of rays and triangles.
+"""
 
 NONE = "–"
 """Text of a cell without a number."""
@@ -121,7 +125,7 @@ def why_no_fresh(study: Study, trials: Sequence[Trial]) -> str:
         "seeds",
     }
     reason = reasons.get(study.store.fact("ended"), "No trial was scored with fresh seeds")
-    return f"{reason}: the best score may be partly luck."
+    return f"{reason}: the best score may be partly due to chance."
 
 
 def ray_figures(before: RayFigures | None, after: RayFigures | None) -> Table | None:

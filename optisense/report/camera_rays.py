@@ -59,8 +59,11 @@ class CameraRays:
         return self.rays[columns // 2 :: columns]
 
     def segments(self) -> dict[str, NDArray[np.float32]]:
-        """Return pairs of ends, (2 k, 3) mm, of every second ray in both directions: "seen" for
-        those that reach the sensing surface, and "lost" for the others.
+        """Return the ends of the segments of every second ray along rows and columns.
+
+        Returns:
+            Pairs of ends (2 k, 3), mm: "seen" for rays that reach the sensing surface, and "lost"
+            for the others.
         """
         found: dict[str, list[NDArray[np.float64]]] = {"seen": [], "lost": []}
         for row in range(0, self.shape[0], 2):

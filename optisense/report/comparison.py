@@ -27,13 +27,17 @@ some tens of levels of 255.
 """
 
 GREY = 128.0
-"""Level of a response of 0 in the pictures."""
+"""Level of a response of 0 in the pictures: the middle of 255 levels."""
 
 CUT = 2.4
-"""Half of the side of the pictures of a press, in radii of the contact."""
+"""Half of the side of the pictures of a press, in radii of the contact: it includes the ring, which
+ends at 1.6 radii.
+"""
 
 LEAST_CUT = 24
-"""Smallest half of the side of the pictures of a press, in pixels."""
+"""Smallest half of the side of the pictures of a press, in pixels; a smaller picture shows no
+detail.
+"""
 
 COLOURS = {"R": "#c0392b", "G": "#2e8b57", "B": "#1f6fb2"}
 """Colours of the curves of the channels."""
@@ -171,14 +175,20 @@ def press_section(found: Comparison, index: int) -> dict[str, Any]:
 
 
 def shown(levels: FloatArray) -> NDArray[np.uint8]:
-    """Return levels as a picture."""
+    """Return levels (h, w, 3), 0 to 255, as a picture (h, w, 3); others are clipped."""
     return np.clip(np.round(levels), 0, 255).astype(np.uint8)
 
 
 def profile_figure(
     real: FloatArray, model: FloatArray, centre: tuple[float, float], radius: float
 ) -> Figure:
-    """Draw the responses along the row and the column through a contact's middle."""
+    """Draw the responses along the row and the column through a contact's middle.
+
+    Args:
+        real, model: responses (h, w, 3) of the photograph and of the model, levels of 255.
+        centre: column and row of the middle, pixels.
+        radius: radius of the contact, pixels.
+    """
     figure = new_figure(10.0, 2.6)
     height, width = real.shape[:2]
     column, row = min(int(centre[0]), width - 1), min(int(centre[1]), height - 1)

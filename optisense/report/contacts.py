@@ -15,7 +15,8 @@ from optisense.report.pictures import data_uri
 from optisense.writing import write_text
 
 USUAL_RADIUS = 0.1
-"""Radius of the circle in a photograph without a contact, as a share of the picture's width."""
+"""Radius of the circle in a photograph without a contact, as a share of the picture's width;
+about that of usual contacts, so that it needs little change."""
 
 DOT = 0.006
 """Radius of the dot in a contact's middle, as a share of the picture's width; the handle has twice

@@ -61,6 +61,6 @@ def swatch_of(colour: Sequence[float]) -> str:
 
 
 def encoded(values: NDArray[Any], dtype: Any) -> str:
-    """Encode an array for a page's script: little-endian numbers as base64 text."""
+    """Encode an array (any shape) for a page's script: little-endian numbers as base64 text."""
     little_endian = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
     return base64.b64encode(little_endian.tobytes()).decode("ascii")

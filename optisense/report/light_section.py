@@ -30,7 +30,9 @@ of a render.
 """
 
 PHOTONS_PER_LIGHT = 100
-"""Smallest number of photons per light of a ledger."""
+"""Smallest number of photons per light of a ledger, so that no light goes unnoticed beside many
+others.
+"""
 
 LEAST_DRAWN = 0.005
 """Smallest share of a group's light for which a place is drawn on its own; smaller ones are drawn

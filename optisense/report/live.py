@@ -13,6 +13,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from optisense.errors import OutputError
 
 HERE = "127.0.0.1"
+"""Address of this machine, to which the server listens; others can't reach it."""
 
 MOST_WAITING = 16
 """Largest number of pictures in the queue; a reader looks at one at a time."""
@@ -49,7 +50,7 @@ class LiveServer:
             self._server = ThreadingHTTPServer((HERE, port), self._handler())
         except (OSError, OverflowError) as error:
             raise OutputError(
-                f"port {port} can't be had: {error}", hint="Leave --port out for a free one"
+                f"port {port} is not available: {error}", hint="Leave --port out for a free one"
             ) from error
         self._server.daemon_threads = True
         self.port = int(self._server.server_address[1])

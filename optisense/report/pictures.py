@@ -50,7 +50,7 @@ def png(picture: ByteArray) -> bytes:
 
 
 def data_uri(picture: ByteArray) -> str:
-    """Return a picture as the address of an ``<img>`` that contains its data."""
+    """Return a picture (h, w, 3) as the address of an ``<img>`` that contains its data as PNG."""
     return "data:image/png;base64," + base64.b64encode(png(picture)).decode("ascii")
 
 
@@ -108,8 +108,8 @@ def pressure_colours(pressure: FloatArray) -> ByteArray:
 
 
 def mask_overlay(picture: ByteArray, mask: NDArray[np.bool_]) -> ByteArray:
-    """Return the picture in grey with the masked pixels in their own colours and a white
-    outline.
+    """Return a picture (h, w, 3) in grey, with the pixels of a mask (h, w) in their own colours and
+    a white outline.
     """
     grey = (picture.astype(np.float64) @ [0.299, 0.587, 0.114] * 0.45)[..., None]
     shown = np.where(mask[..., None], picture, grey.astype(np.uint8))

@@ -85,7 +85,7 @@ def render_study(
     Args:
         study: study, finished or not.
         looks: views of the designs "before" and "after", if they were rendered.
-        pictures: pictures of some trials, by number.
+        pictures: pictures (h, w, 3) of some trials, by number.
         named: the study's folder as the user names it.
         live: version of the page, if a `LiveServer` serves it: the page then refreshes itself, and
             requests the pictures of trials from the server.
@@ -238,7 +238,7 @@ def _unfinished(study: Study, trials: Sequence[Trial]) -> str:
         return "No trial has a score yet."
     if ended is None:
         return "This search is not finished: the page shows the trials so far."
-    return "This search was interrupted: it can go on." if ended == "interrupted" else ""
+    return "This search was interrupted: it can be resumed." if ended == "interrupted" else ""
 
 
 def _robust(study: Study) -> str:

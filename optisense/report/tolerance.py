@@ -136,4 +136,4 @@ def _interval(each: Estimate, shape: str = ".4g") -> str:
 
 
 def _kind(kind: str) -> str:
-    return "standard deviation" if kind == "normal" else "limit, all alike up to it"
+    return "standard deviation" if kind == "normal" else "limit of a uniform distribution"

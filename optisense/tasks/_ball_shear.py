@@ -84,8 +84,8 @@ class BallShear(BallPress):
         return contact, (float(force @ surface.u_axis), float(force @ surface.v_axis))
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """Return the mean and standard deviation of the dots' motion across and down the picture,
-        pixels.
+        """Return the mean and standard deviation of the dots' motion across and down a picture
+        (h, w, 3), pixels: four numbers.
 
         Raises:
             TaskError: too few dots are found.

@@ -37,10 +37,14 @@ MOST_SAMPLES = 20_000
 time of the fit."""
 
 ATTEMPTS = 50
-"""Number of presses tried for each one that is needed, as some miss the surface or the view."""
+"""Number of presses tried for each one that is needed, as some miss the surface or the view; where
+50 fail, the sensor or the settings are at fault.
+"""
 
 LEAST_PIXELS = 20
-"""Smallest number of pixels of a contact that counts as seen."""
+"""Smallest number of pixels of a contact that counts as seen; fewer contribute little to the fit of
+a reader.
+"""
 
 QUIET = 3.0
 """Difference from the untouched picture (levels of 255, in each channel) below which the tilt is
@@ -192,8 +196,8 @@ class CalibratedSensor:
                 break
         else:
             raise TaskError(
-                f"no ball of {settings.radius:g} mm could be pressed where the camera looks",
-                hint="Press less deep, or check where the camera looks",
+                f"no ball of {settings.radius:g} mm could be pressed within the camera's view",
+                hint="Press less deep, or check the camera's direction",
             )
         assert image is not None
         colours, places = self._features(self._picture(image, [settings.seed, index, _CAMERA]))

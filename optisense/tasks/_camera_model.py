@@ -107,7 +107,12 @@ class Pinhole:
         return self.focal * bent + self.centre, seen[:, 2]
 
     def errors(self, points: FloatArray, pixels: FloatArray) -> dict[str, float]:
-        """Return the root-mean-square and largest errors in pixels, and in mm at the points."""
+        """Return the root-mean-square and largest errors, in pixels and in mm at the points.
+
+        Args:
+            points: points (n, 3), mm.
+            pixels: columns and rows (n, 2) at which the points are seen.
+        """
         seen, along = self.project(points)
         apart = np.linalg.norm(seen - pixels, axis=1)
         real = apart * along / float(self.focal.mean())

@@ -24,7 +24,9 @@ from optisense.errors import TaskError
 FloatArray = NDArray[np.float64]
 
 BIN = 4.0
-"""Width of a bin of the table, levels of 255."""
+"""Width of a bin of the table, levels of 255: a few times the noise of the camera (1 to 2 levels),
+so that noise moves a colour by at most one bin.
+"""
 
 LAYERS = (32, 32)
 """Numbers of neurons of the network's hidden layers. Larger networks overfit: their errors on
@@ -69,7 +71,7 @@ class ColourTable:
         self._tilts = np.stack([np.bincount(which, column) / count for column in tilts.T], axis=1)
 
     def tilts(self, colours: FloatArray, places: FloatArray) -> FloatArray:
-        """Return tilts; see `TiltReader`. The places have no effect."""
+        """Return the tilts (n, 2); see `TiltReader.tilts`. The places have no effect."""
         return self._tilts[self._tree.query(colours / BIN)[1]]
 
 
@@ -101,7 +103,7 @@ class ColourNetwork:
             self._network.fit(np.hstack([colours, places]), tilts)
 
     def tilts(self, colours: FloatArray, places: FloatArray) -> FloatArray:
-        """Return tilts; see `TiltReader`."""
+        """Return the tilts (n, 2); see `TiltReader.tilts`."""
         read: FloatArray = self._network.predict(np.hstack([colours, places]))
         return read
 
@@ -109,7 +111,14 @@ class ColourNetwork:
 def fit_reader(
     method: str, colours: FloatArray, places: FloatArray, tilts: FloatArray, seed: int = 0
 ) -> TiltReader:
-    """Fit a reader by one of METHODS; see `TiltReader.tilts` for the arrays.
+    """Fit a reader by one of METHODS.
+
+    Args:
+        method: name of the method.
+        colours: colour differences (n, 3), levels of 255.
+        places: places (n, 2) in the picture, -1 to 1 across its width and height.
+        tilts: known tilts (n, 2).
+        seed: seed of the network.
 
     Raises:
         TaskError: there is no such method.

@@ -80,11 +80,16 @@ class CylinderRadius:
         return contact, (radius,)
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """Return the standard deviation of each channel over the contact, in levels of 255."""
+        """Return the standard deviation of each channel of a picture (h, w, 3) over the contact, in
+        levels of 255.
+
+        Raises:
+            TaskError: fewer than LEAST_PIXELS show the contact.
+        """
         inside = image.contact_mask
         if inside.sum() < LEAST_PIXELS:
             raise TaskError(
                 f"only {inside.sum()} pixels show the contact",
-                hint="Use a higher resolution, or look at where the camera looks",
+                hint="Use a higher resolution, or check the camera's direction",
             )
         return spread_of_colours(picture[inside])

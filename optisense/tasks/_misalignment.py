@@ -18,14 +18,16 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
 
 THICKNESS = 2.0
-"""Thickness in mm of the plate; only its face touches the skin."""
+"""Thickness in mm of the plate, which has no effect, as only its face touches the skin."""
 
 RAYS = 32, 24
 """Grid of chief rays (columns, rows) that find the extent of the view and the part that a plane
 covers."""
 
 MARGIN = 0.5
-"""Distance (mm) by which the plate extends beyond the outermost of these rays."""
+"""Distance (mm) by which the plate extends beyond the outermost of these rays, so that it covers
+the whole view at all angles.
+"""
 
 LEAST_SHARE = 0.9
 """Smallest share of the cropped picture that must show the plate; with less, the features would
@@ -113,7 +115,7 @@ class Misalignment:
         return plane_contact(model, angles[0], angles[1], self.depth), angles
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """Return the mean of each channel over the crop, in levels of 255.
+        """Return the mean of each channel of a picture (h, w, 3) over the crop, in levels of 255.
 
         Raises:
             TaskError: less than LEAST_SHARE of the crop shows the plane.

@@ -28,7 +28,7 @@ class ForestReading:
         predictions: (n, t) predicted targets.
         error: mean absolute error over samples and targets.
         spread: standard deviation of the error among folds.
-        guess: mean absolute error of predicting the mean.
+        guess: mean absolute error of the baseline that predicts the mean of the fitted targets.
     """
 
     predictions: FloatArray

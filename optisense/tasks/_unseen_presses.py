@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 CANDIDATES = 1500
-"""Number of places on the skin from which those of presses are chosen."""
+"""Number of places on the skin from which those of presses are chosen: far more than presses, so
+that they may lie anywhere.
+"""
 
 CHOICES = 12
 """Number of places drawn for each press, of which the one farthest from all earlier presses is
@@ -38,7 +40,9 @@ ONE_SKIN = 0.1
 presses."""
 
 SAMPLED = 200
-"""Number of vertices of a sensing surface whose distance from the other surface is computed."""
+"""Number of vertices of a sensing surface whose distance from the other surface is computed, spread
+over it; skins that differ do so over large areas.
+"""
 
 FITS = 0.8
 """Largest length of an object as a share of the narrower side of the skin in view; all objects are

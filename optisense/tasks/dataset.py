@@ -110,7 +110,7 @@ class Dataset:
         folder = Path(folder)
         if not is_file(folder / INFO):
             raise TaskError(
-                "there is no dataset here",
+                "there is no dataset in this folder",
                 where=str(folder),
                 hint=f"Name a folder that holds a {INFO}",
             )
@@ -168,8 +168,9 @@ class Dataset:
         return self._arrays(BACKGROUND, BACKGROUND_ARRAYS)
 
     def camera_rays(self) -> dict[str, NDArray[Any]]:
-        """Return the ray of each pixel inside the gel; see
-        `optisense.tasks._camera_model.ray_arrays`.
+        """Return the ray of each pixel inside the gel, in the frame of the design: "points" (h, w,
+        3), mm, on the skin at rest, and "directions" (h, w, 3), unit vectors away from the skin;
+        NaN where the camera sees none.
 
         Raises:
             TaskError: its file is missing, as in datasets of release 0.1, or damaged.
@@ -202,7 +203,7 @@ class Dataset:
             raise TaskError(
                 f"'{brief(name)}' leads out of the dataset's folder",
                 where=str(self.folder / LABELS),
-                hint="A stranger may have made it so: copy files that you trust into the folder",
+                hint="The dataset may be manipulated: use only files that you trust",
             )
         if not is_file(path):
             raise TaskError(

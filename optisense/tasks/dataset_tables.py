@@ -134,7 +134,9 @@ def read_labels(folder: Path) -> list[dict[str, Any]]:
     for line, row in enumerate(labels, start=2):
         if row["index"] in seen or row["index"] < 0:
             raise TaskError(
-                f"sample {row['index']} is there twice" if row["index"] >= 0 else "no such sample",
+                f"sample {row['index']} is listed twice"
+                if row["index"] >= 0
+                else f"the index {row['index']} is negative",
                 where=f"{path}:{line}",
                 hint="Delete the line",
             )

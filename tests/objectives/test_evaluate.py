@@ -302,7 +302,7 @@ def test_a_camera_that_looks_away_has_a_reason(name: str) -> None:
 
 
 def test_settings_of_a_settled_evaluation_can_not_change(evaluation: Evaluation) -> None:
-    with pytest.raises(ObjectiveError, match="settled: depth"):
+    with pytest.raises(ObjectiveError, match="settings already: depth"):
         evaluate(evaluation, "aoap", depth=0.2)
 
 

@@ -145,7 +145,7 @@ def test_colours_that_change_steadily_over_the_picture_are_followed(
 def test_four_presses_are_needed(nine: Callable[..., Presses]) -> None:
     few = nine(lambertian)
     few.calibration_presses = few.calibration_presses[:3]
-    with pytest.raises(ObjectiveError, match="3 presses can't show"):
+    with pytest.raises(ObjectiveError, match="3 presses are too few"):
         reading(few)
 
 

@@ -46,7 +46,7 @@ def test_percentiles_and_shares_are_on_the_page(found: Tolerance) -> None:
     for source, share in spread.shares.items():
         assert share is not None
         assert f'<code>{source}</code></td><td class="tight"><b>{share.value:.2f}</b>' in page
-    assert "limit, all alike up to it" in page
+    assert "limit of a uniform distribution" in page
     assert len(re.findall(r'<img [^>]*src="data:image/png', page)) == 1
 
 

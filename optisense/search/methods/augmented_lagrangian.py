@@ -70,7 +70,13 @@ class AugmentedLagrangian:
     def initial(
         requirements: Sequence[Requirement], score: float, offsets: FloatArray
     ) -> AugmentedLagrangian:
-        """Return the merit function of the first ascent; `score` is the score of the start."""
+        """Return the merit function of the first ascent.
+
+        Args:
+            requirements: the conditions.
+            score: score of the start.
+            offsets: see the attribute, (m,).
+        """
         weight = WEIGHT * max(abs(score), CONDITION_TOLERANCE)
         return AugmentedLagrangian(
             tuple(requirements), np.zeros(len(requirements)), weight, offsets
