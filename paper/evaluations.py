@@ -92,7 +92,7 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
     found = {}
     for letters in inputs["colourings"]:
         design = coloured(model.design, inputs["groups"], letters)
-        evaluation = relighting.lit(design, whole=False)
+        evaluation = relighting.relit(design, whole=False)
         found[letters] = _scores(evaluate(evaluation, list(inputs["objectives"]), **own))
         found[letters]["normdiff_variants"] = {
             name: _scores({"": evaluate(evaluation, "normdiff", **variant)})["scores"][""]

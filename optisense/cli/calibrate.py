@@ -62,7 +62,7 @@ def calibrate(
                     raise typer.BadParameter(
                         f"'{name}' is none of " + ", ".join(FAMILIES), param_hint=option
                     )
-        asked = tuple(_asked(text) for text in options.fit)
+        asked = tuple(_parsed_range(text) for text in options.fit)
         sensor = load(design)
         photographs = read_photographs(photos, options.ball)
         take_folder(out)
@@ -146,7 +146,7 @@ def _figures(found: Realism) -> list[str]:
     return [*(f"{found.median(name):.3f}" for name in COLUMNS), f"{found.background.ratio:.1f}"]
 
 
-def _asked(text: str) -> tuple[str, float, float]:
+def _parsed_range(text: str) -> tuple[str, float, float]:
     try:
         return read_range(text)
     except ValueError:

@@ -34,7 +34,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     if len(problems) > MOST_WARNINGS:
         output.print(f"warning: {len(problems) - MOST_WARNINGS:,} more like these", style="yellow")
     if any(part.role == "mirror" for part in sensor.parts.values()):
-        _tell_views(sensor)
+        _print_views(sensor)
     if contacts:
         from optisense.optics import OpticalModel
 
@@ -47,7 +47,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     output.print("The design is in order.", style="green")
 
 
-def _tell_views(design: SensorDesign) -> None:
+def _print_views(design: SensorDesign) -> None:
     """Trace chief rays, and print by which mirrors they go and which mirrors are not used."""
     try:
         from optisense.optics import OpticalModel

@@ -11,7 +11,7 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-_HOMES = {
+_MODULES = {
     "new": "new",
     "check": "check",
     "render": "render",
@@ -44,7 +44,7 @@ class _Commands(MutableMapping[str, Any]):
         self._made: dict[str, Any] = {}
 
     def __getitem__(self, name: str) -> Any:
-        if name not in self._made and name in _HOMES:
+        if name not in self._made and name in _MODULES:
             self._made[name] = _command(name)
         return self._made[name]
 
@@ -55,10 +55,10 @@ class _Commands(MutableMapping[str, Any]):
         del self._made[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(_HOMES)
+        return iter(_MODULES)
 
     def __len__(self) -> int:
-        return len(_HOMES)
+        return len(_MODULES)
 
 
 class Commands(TyperGroup):
@@ -70,7 +70,7 @@ class Commands(TyperGroup):
 
 
 def _command(name: str) -> Any:
-    home = getattr(import_module(f"optisense.cli.{name}"), _HOMES[name])
+    home = getattr(import_module(f"optisense.cli.{name}"), _MODULES[name])
     alone = typer.Typer(add_completion=False, rich_markup_mode="rich")
     if isinstance(home, typer.Typer):
         alone.add_typer(home, name=name)

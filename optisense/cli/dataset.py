@@ -14,10 +14,10 @@ from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
     LOADING,
+    load_sensor,
     loading_steps,
+    sample_progress,
     sample_steps,
-    sensor_to_press,
-    shown_samples,
 )
 from optisense.commands.options import MOST_ITEMS
 from optisense.commands.sampling import DatasetOptions
@@ -99,8 +99,8 @@ def dataset(
 
             settings = DatasetSettings(**options.settings())
             settings.contacts.parsed()
-            model = sensor_to_press(line, design, out, variant, steps)
-            show = shown_samples(line, model, SAMPLES, "reading the dataset")
+            model = load_sensor(line, design, out, variant, steps)
+            show = sample_progress(line, model, SAMPLES, "reading the dataset")
             made = generate(model, out, count, settings, show, mend=mend)
             if parquet:
                 line.begin(WRITING, text="writing Parquet files")

@@ -63,7 +63,7 @@ def add_entry(
 
     if tuning is not None:
         _refuse(ies, "it can't be combined with --tuning")
-        _say_added(_from_tuning(file, tuning, camera, name, description))
+        _print_added(_from_tuning(file, tuning, camera, name, description))
         return
     if str(file) == "camera" and not file.exists():
         raise typer.BadParameter(
@@ -77,11 +77,11 @@ def add_entry(
             raise typer.BadParameter(
                 "it needs an .ies file or --tuning", param_hint="--description"
             )
-        _say_added(library.add_file(file, kind, name))
+        _print_added(library.add_file(file, kind, name))
         return
     if kind not in (None, "light", "lights"):
         raise typer.BadParameter("an .ies file is a light", param_hint="--kind")
-    _say_added(_from_ies(file, ies, name, description))
+    _print_added(_from_ies(file, ies, name, description))
 
 
 def _refuse(given: IesOptions | TuningOptions, why: str) -> None:
@@ -187,7 +187,7 @@ def _from_tuning(
     )
 
 
-def _say_added(added: Added) -> None:
+def _print_added(added: Added) -> None:
     output.print(f"{added.kind} {added.name}: {added.file}", markup=False)
     unsourced = added.entry.unsourced()
     if unsourced:

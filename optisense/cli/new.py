@@ -101,7 +101,7 @@ def _from_built_in(name: str, folder: Path, overwrite: bool) -> None:
     design = build(name)
     is_new = _take_folder(folder, overwrite)
     save_design(design, folder, new=is_new)
-    _say_what_next(folder)
+    _print_next_steps(folder)
 
 
 def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrite: bool) -> None:
@@ -145,7 +145,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
     except OptiSenseError:
         if asked or guessed:  # answers need not be given again; wrong guesses can be corrected
             save_recipe(recipe, folder / RECIPE_FILE)
-            _say_guesses(recipe, guessed)
+            _print_guesses(recipe, guessed)
             what = "Your answers are" if asked else "The guessed recipe is"
             messages.print(
                 f"{what} saved in {folder / RECIPE_FILE}. Correct it or the CAD files, then:\n"
@@ -159,8 +159,8 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
         messages.print(f"note: {note}", markup=False, style="yellow")
     for problem in problems:
         messages.print(f"warning: {problem}", markup=False, style="yellow")
-    _say_guesses(recipe, guessed)
-    _say_what_next(folder, folder / RECIPE_FILE)
+    _print_guesses(recipe, guessed)
+    _print_next_steps(folder, folder / RECIPE_FILE)
 
 
 def _at_terminal() -> bool:
@@ -192,7 +192,7 @@ def _take_folder(folder: Path, overwrite: bool) -> bool:
     return False
 
 
-def _say_guesses(recipe: Recipe, guessed: bool) -> None:
+def _print_guesses(recipe: Recipe, guessed: bool) -> None:
     """Print the guesses that were made without a question."""
     if not guessed:
         return
@@ -206,7 +206,7 @@ def _say_guesses(recipe: Recipe, guessed: bool) -> None:
     messages.print(f"guessed: lights {groups}; camera {recipe.camera.model}", markup=False)
 
 
-def _say_what_next(folder: Path, recipe: Path | None = None) -> None:
+def _print_next_steps(folder: Path, recipe: Path | None = None) -> None:
     output.print(f"{folder / 'design.yaml'}", markup=False)
     if recipe is not None:
         output.print(f"{recipe}", markup=False)

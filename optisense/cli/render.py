@@ -17,7 +17,7 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
-from optisense.cli.sampling import BUILDING, LOADING, expect_here, loading_steps
+from optisense.cli.sampling import BUILDING, LOADING, loading_steps, set_expected_durations
 from optisense.commands.rendering import RenderOptions
 from optisense.quality import PICTURE_PHOTONS
 from optisense.time_left import TimedStep
@@ -72,7 +72,7 @@ def render(
         line.begin(BUILDING)
         width, height = size or sensor.camera.resolution
         pixels = width * height
-        expect_here(line, sensor, lambda times: _steps(times, options, pixels))
+        set_expected_durations(line, sensor, lambda times: _steps(times, options, pixels))
         model = OpticalModel(sensor, variant=variant)
         interrupt.raise_if_requested()
         stages = RenderStages(line)
@@ -98,7 +98,7 @@ def render(
         real = None
         if has_real_picture(sensor) and not image.interrupted and not interrupt.requested:
             line.say(COMPARING)
-            real = _beside_real(model, image, interrupt)
+            real = _compare_with_real(model, image, interrupt)
         light = None
         if not image.interrupted and not interrupt.requested:
             line.say(FOLLOWING)
@@ -159,7 +159,7 @@ def _waits(line: ProgressLine) -> str:
     return f"finishing the picture{about(rest)}"
 
 
-def _beside_real(
+def _compare_with_real(
     model: OpticalModel, image: TactileImage, interrupt: Interrupt
 ) -> RealComparison | None:
     """Return the comparison with the real picture of this sensor, or None if Ctrl-C ended it."""

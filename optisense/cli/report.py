@@ -101,10 +101,10 @@ def report(
         ensure_writable(page.parent)
         count = trial_pictures if pictures else 0
         with progress_line(*_steps(options.photons, pictures, count)) as line:
-            looks = _looks(opened, options.photons, pictures, line)
+            views = _design_views(opened, options.photons, pictures, line)
             shown = _pictures(opened, count, line)
             line.begin(WRITING)
-            write_study_report(page, opened, looks, pictures=shown, named=str(study))
+            write_study_report(page, opened, views, pictures=shown, named=str(study))
     finally:
         opened.close()
     output.print(f"report: {page}", markup=False)
@@ -143,7 +143,9 @@ def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray
     return found
 
 
-def _looks(study: Study, photons: int, pictures: bool, line: ProgressLine) -> dict[str, DesignView]:
+def _design_views(
+    study: Study, photons: int, pictures: bool, line: ProgressLine
+) -> dict[str, DesignView]:
     """Return chief rays of the start and of the best trial, with pictures if they are asked for.
 
     Raises:

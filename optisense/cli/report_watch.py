@@ -60,7 +60,7 @@ class _Watched:
         self._study, self._named, self._server = study, named, server
         self._pictures = TrialPictures(study) if pictures else None
         self._version = ""
-        self._looks: dict[int, DesignView] = {}
+        self._views: dict[int, DesignView] = {}
 
     def refresh(self) -> None:
         """Update the page if the study's files have changed."""
@@ -100,11 +100,11 @@ class _Watched:
         if best is not None:
             designs[best.number] = ("after", best.design)
         settings = self._study.settings.settings
-        self._looks = {
-            number: self._looks.get(number) or design_view(design, settings, pictures=False)
+        self._views = {
+            number: self._views.get(number) or design_view(design, settings, pictures=False)
             for number, (_, design) in designs.items()
         }
-        return {label: self._looks[number] for number, (label, _) in designs.items()}
+        return {label: self._views[number] for number, (label, _) in designs.items()}
 
 
 def _version_of(study: Study) -> str:

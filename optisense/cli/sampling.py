@@ -65,7 +65,7 @@ def sample_steps(
     ]
 
 
-def sensor_to_press(
+def load_sensor(
     line: ProgressLine,
     source: str,
     out: Path | None,
@@ -93,11 +93,11 @@ def sensor_to_press(
     from optisense.optics import OpticalModel
 
     line.begin(BUILDING)
-    expect_here(line, design, lambda times: steps(times, design))
+    set_expected_durations(line, design, lambda times: steps(times, design))
     return OpticalModel(design, variant)
 
 
-def expect_here(
+def set_expected_durations(
     line: ProgressLine, design: SensorDesign, steps: Callable[[UsualTimes], list[TimedStep]]
 ) -> None:
     """Set the expected durations for this sensor on this machine, once both are known.
@@ -112,7 +112,7 @@ def expect_here(
         line.time_left.expect(step.name, seconds=step.seconds)
 
 
-def shown_samples(
+def sample_progress(
     line: ProgressLine, model: OpticalModel, name: str, after: str
 ) -> Callable[[int, int], None]:
     """Return a callback that takes the number of finished samples and that of all.

@@ -99,10 +99,10 @@ def search(
 
     with ExitStack() as stack:
         # It may ask whether code is trusted, so it comes before the progress.
-        study = _resumed(out, design, options.as_stored(), trust) if resume else None
+        study = _resumed_study(out, design, options.as_stored(), trust) if resume else None
         with search_progress(workers if cluster is None else 0) as (line, show):
             if study is None:
-                study = _begun(out, design, options, line)
+                study = _new_study(out, design, options, line)
             from optisense.search import run_study
 
             stack.callback(study.close)
@@ -161,7 +161,7 @@ def _verify(study: Path, variant: str) -> None:
         messages.print(f"the best design can't be verified: {error}", style="yellow", markup=False)
 
 
-def _begun(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:
+def _new_study(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:
     """Return a new study of the given options."""
     from optisense.sensors import load
 
@@ -182,7 +182,7 @@ def _begun(out: Path, design: str | None, options: SearchOptions, line: Progress
     return Study.create(out, sensor, plan)
 
 
-def _resumed(out: Path, design: str | None, wanted: dict[str, Any], trust: bool) -> Study:
+def _resumed_study(out: Path, design: str | None, wanted: dict[str, Any], trust: bool) -> Study:
     """Return the study in a folder, after a check that given options are those that it was begun
     with.
     """
@@ -194,12 +194,12 @@ def _resumed(out: Path, design: str | None, wanted: dict[str, Any], trust: bool)
     study.expect(wanted)
     named = {*wanted.get("objectives", ()), *wanted.get("rules", ())}
     strange = [each for each in not_trusted(study.references) if each not in named]
-    if trust or not strange or _may_run(strange):
+    if trust or not strange or _ask_trust(strange):
         study.trust()
     return study
 
 
-def _may_run(strange: list[str]) -> bool:
+def _ask_trust(strange: list[str]) -> bool:
     """Ask whether Python code that the user has not named may be run; False without a terminal."""
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False

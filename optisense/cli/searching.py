@@ -59,7 +59,7 @@ def search_progress(workers: int) -> Iterator[SearchLine]:
 
         def show(progress: SearchProgress) -> None:
             last[:] = [progress]
-            line.show(*what(progress), progress.seconds_left, notes(progress))
+            line.show(*stage_text(progress), progress.seconds_left, notes(progress))
 
         yield SearchLine(line, show)
 
@@ -110,7 +110,7 @@ def usual_trials(
     return UsualTrials.of(usual, usual.building + usual.whole, usual.whole)
 
 
-def what(progress: SearchProgress) -> tuple[str, int | None, int | None]:
+def stage_text(progress: SearchProgress) -> tuple[str, int | None, int | None]:
     """Return the text of the current stage, the number of finished pieces and that of all."""
     if progress.stage == "start":
         return "scoring the start", None, None

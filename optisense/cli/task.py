@@ -16,10 +16,10 @@ from optisense.cli.options import DesignArgument, VariantOption, out_option, par
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
     LOADING,
+    load_sensor,
     loading_steps,
+    sample_progress,
     sample_steps,
-    sensor_to_press,
-    shown_samples,
 )
 from optisense.cli.task_result import print_perception, print_reconstruction
 from optisense.commands.sampling import CylinderOptions, ReconstructionOptions, SampleOptions
@@ -238,8 +238,8 @@ def reconstruction(
     with progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here())) as line:
         line.begin(LOADING)
         settings = tasks.ReconstructionSettings(**options.model_dump())
-        model = sensor_to_press(line, design, out, variant, steps)
-        show = shown_samples(line, model, PICTURES, "comparing")
+        model = load_sensor(line, design, out, variant, steps)
+        show = sample_progress(line, model, PICTURES, "comparing")
         result = tasks.reconstruct(model, settings, contacts, show)
     if out is not None:
         from optisense.tasks.figures import draw_reconstruction
@@ -249,7 +249,7 @@ def reconstruction(
         _print_json(result.to_dict())
     else:
         print_reconstruction(result)
-        _say_where(out)
+        _print_folder(out)
 
 
 def _perceive(
@@ -273,16 +273,16 @@ def _perceive(
 
     results = []
     line_of_steps = progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here()))
-    with _keeping(out), line_of_steps as line:
+    with _kept_samples_note(out), line_of_steps as line:
         line.begin(LOADING)
         settings = tasks.SampleSettings(**options.settings())
         made = [make() for make in wanted.values()]
-        model = sensor_to_press(line, design, out, variant, steps)
+        model = load_sensor(line, design, out, variant, steps)
         from optisense.tasks.figures import draw_perception
 
         for task in made:
             folder = out if out is None or len(wanted) == 1 else inside(out, task.name)
-            show = shown_samples(line, model, task.name, f"{task.name}: reading the samples")
+            show = sample_progress(line, model, task.name, f"{task.name}: reading the samples")
             results.append(tasks.perceive(task, model, settings, options.neighbours, folder, show))
             if folder is not None:
                 _write(folder, results[-1].to_dict(), draw_perception(results[-1]))
@@ -291,11 +291,11 @@ def _perceive(
         _print_json(values[0] if len(values) == 1 else {"tasks": values})
     else:
         print_perception(results)
-        _say_where(out)
+        _print_folder(out)
 
 
 @contextmanager
-def _keeping(out: Path | None) -> Iterator[None]:
+def _kept_samples_note(out: Path | None) -> Iterator[None]:
     """Print after Ctrl-C that finished samples are kept."""
     try:
         yield
@@ -317,6 +317,6 @@ def _print_json(values: dict[str, Any]) -> None:
     print(json.dumps(values, indent=2, allow_nan=False))
 
 
-def _say_where(out: Path | None) -> None:
+def _print_folder(out: Path | None) -> None:
     if out is not None:
         output.print(f"results: {out}", markup=False)

@@ -86,7 +86,7 @@ def tolerance(
 
         def show(done: int, count: int, left: float, doing: str) -> None:
             last[:] = [(done, left / max(1, count - done))]
-            line.show(*what(done, count), left, [doing] if doing else [])
+            line.show(*stage_text(done, count), left, [doing] if doing else [])
 
         found = find_tolerance(
             sensor,
@@ -120,7 +120,7 @@ def tolerance(
         raise typer.Exit(EXIT_INTERRUPTED)
 
 
-def what(done: int, count: int) -> tuple[str, int, int]:
+def stage_text(done: int, count: int) -> tuple[str, int, int]:
     """Return the text of what is being scored, the number of finished scores and that of all.
 
     The scores of the nominal design come first, and are not counted as sensors.

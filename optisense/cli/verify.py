@@ -12,7 +12,7 @@ from optisense.cli.console import handles_errors, output
 from optisense.cli.options import VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
-from optisense.cli.sampling import BUILDING, LOADING, loading_steps, sample_steps, shown_samples
+from optisense.cli.sampling import BUILDING, LOADING, loading_steps, sample_progress, sample_steps
 from optisense.cli.verify_result import conditions_of, print_conditions, print_verification
 from optisense.commands.sampling import VerifyOptions
 from optisense.time_left import TimedStep
@@ -128,7 +128,7 @@ def compare(
         def show(side: int, done: int, of: int) -> None:
             if side not in shown:
                 after = "reading the other sensor" if side == 0 else "comparing"
-                shown[side] = shown_samples(line, models[side], SIDES[side], after)
+                shown[side] = sample_progress(line, models[side], SIDES[side], after)
             shown[side](done, count)
 
         found = compared_by_objects((models[0], models[1]), settings, names, show)

@@ -62,7 +62,7 @@ def aoap(
             perpendicular rays.
     """
     refuse_outside("coverage_weight", coverage_weight, 0.0, 1.0)
-    rays = evaluation.judged_rays
+    rays = evaluation.checked_rays
     hit = rays.hit
     if np.count_nonzero(hit) < LEAST_PIXELS:
         raise ObjectiveError(

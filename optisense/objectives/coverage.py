@@ -36,7 +36,7 @@ def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, A
     Args:
         evaluation: the sensor.
     """
-    rays = evaluation.judged_rays
+    rays = evaluation.checked_rays
     seen = triangles_seen(evaluation)
     areas = evaluation.model.sensing.face_areas
     parts = {
@@ -51,6 +51,6 @@ def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, A
 
 def triangles_seen(evaluation: Evaluation) -> NDArray[np.bool_]:
     """Return a mask (f,) of the triangles of the sensing surface on which a chief ray arrives."""
-    rays, faces = evaluation.judged_rays, evaluation.sensing_faces
+    rays, faces = evaluation.checked_rays, evaluation.sensing_faces
     seen: NDArray[np.bool_] = np.bincount(rays.face[rays.hit], minlength=faces)[:faces] > 0
     return seen

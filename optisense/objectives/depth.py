@@ -18,9 +18,9 @@ from optisense.objectives.reader import (
     LEAST_PIXELS,
     LEAST_PRESSES,
     ReadPress,
-    over_places,
     pixels_to_read,
     read_presses,
+    summarise_places,
 )
 from optisense.objectives.registry import objective
 from optisense.reading.integration import NormalIntegrator
@@ -73,7 +73,7 @@ def depth(
             }
         )
         maps.append({"read": _along_middle(read, inside), "true": _along_middle(true, inside)})
-    value, parts = over_places(places)
+    value, parts = summarise_places(places)
     return value, parts, {"profiles": maps}
 
 

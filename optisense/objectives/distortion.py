@@ -60,7 +60,7 @@ def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str,
     Args:
         evaluation: the sensor.
     """
-    rays = evaluation.judged_rays
+    rays = evaluation.checked_rays
     long, wide = seen_footprints(rays)
     known = np.isfinite(long)
     ratio = long / np.maximum(wide, long / MOST_ANISOTROPY)

@@ -130,7 +130,7 @@ class Evaluation(CachedValues):
         )
 
     @property
-    def judged_rays(self) -> ChiefRays:
+    def checked_rays(self) -> ChiefRays:
         """The chief rays, after a check that the camera sees enough for a score.
 
         Raises:

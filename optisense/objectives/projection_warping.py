@@ -80,7 +80,7 @@ def projection_warping(
             gap, and its triangles are left out.
     """
     refuse_outside("jump", jump, 1.0, MOST_JUMP, open_low=True)
-    rays = evaluation.judged_rays
+    rays = evaluation.checked_rays
     found = triangle_areas(rays.points, rays.hit, jump)
     areas = found.areas[np.isfinite(found.areas)].astype(np.float64)
     if len(areas) < LEAST_TRIANGLES:

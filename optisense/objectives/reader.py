@@ -116,7 +116,7 @@ def read_presses(evaluation: Evaluation, camera_noise: float = CAMERA_NOISE) -> 
     )
 
 
-def over_places(places: Sequence[Mapping[str, Any]]) -> tuple[float, dict[str, Any]]:
+def summarise_places(places: Sequence[Mapping[str, Any]]) -> tuple[float, dict[str, Any]]:
     """Return the median of the places' errors, and a summary of the places.
 
     Args:

@@ -11,9 +11,9 @@ from optisense.objectives.reader import (
     CAMERA_NOISE,
     LEAST_PIXELS,
     LEAST_PRESSES,
-    over_places,
     pixels_to_read,
     read_presses,
+    summarise_places,
 )
 from optisense.objectives.registry import objective
 from optisense.reading.tilts import angles_between
@@ -70,6 +70,6 @@ def reading(
             }
         )
         maps.append({"errors": np.where(each.mask, angles, np.nan)})
-    value, parts = over_places(places)
+    value, parts = summarise_places(places)
     parts["level_skin"] = float(np.mean([place["level_skin"] for place in places]))
     return value, parts, {"maps": maps}

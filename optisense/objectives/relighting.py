@@ -169,7 +169,7 @@ class Relighting:
             found.append(press)
         return found
 
-    def lit(self, design: SensorDesign, *, whole: bool = True) -> Evaluation:
+    def relit(self, design: SensorDesign, *, whole: bool = True) -> Evaluation:
         """Return an evaluation of a design that differs only in the colours and powers of its
         lights.
 

@@ -50,7 +50,7 @@ def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, 
     Args:
         evaluation: the sensor.
     """
-    rays = evaluation.judged_rays
+    rays = evaluation.checked_rays
     long, wide = seen_footprints(rays)
     known = np.isfinite(long)
     across = rays.hit.shape[1]

@@ -48,7 +48,7 @@ FEW_CHANGES = 8
 def write_study_report(
     path: str | Path,
     study: Study,
-    looks: Mapping[str, DesignView] | None = None,
+    views: Mapping[str, DesignView] | None = None,
     *,
     pictures: Mapping[int, NDArray[np.uint8]] | None = None,
     named: str | None = None,
@@ -58,7 +58,7 @@ def write_study_report(
     Args:
         path: path of the file, which is written whole or not at all.
         study: study, finished or not.
-        looks: views of the designs "before" and "after", if they were rendered.
+        views: views of the designs "before" and "after", if they were rendered.
         pictures: pictures (h, w, 3) of some trials, by number (`TrialPictures`), shown on a click.
         named: the study's folder as the user names it, for the commands on the page.
 
@@ -68,13 +68,13 @@ def write_study_report(
     Raises:
         OutputError: the file can't be written.
     """
-    write_text(Path(path), render_study(study, looks, pictures=pictures, named=named))
+    write_text(Path(path), render_study(study, views, pictures=pictures, named=named))
     return Path(path)
 
 
 def render_study(
     study: Study,
-    looks: Mapping[str, DesignView] | None = None,
+    views: Mapping[str, DesignView] | None = None,
     *,
     pictures: Mapping[int, NDArray[np.uint8]] | None = None,
     named: str | None = None,
@@ -84,7 +84,7 @@ def render_study(
 
     Args:
         study: study, finished or not.
-        looks: views of the designs "before" and "after", if they were rendered.
+        views: views of the designs "before" and "after", if they were rendered.
         pictures: pictures (h, w, 3) of some trials, by number.
         named: the study's folder as the user names it.
         live: version of the page, if a `LiveServer` serves it: the page then refreshes itself, and
@@ -110,8 +110,8 @@ def render_study(
             drawn[name] = label
     if front:
         figures_of.draw("front", partial(study_figures.front, trials, front, names, best))
-    looks = looks or {}
-    figures = [looks.get(label, DesignView()).figures for label in ("before", "after")]
+    views = views or {}
+    figures = [views.get(label, DesignView()).figures for label in ("before", "after")]
     after = _design(best)
     cages = [] if after is None else cage_changes(study.space.design, after)
     changes = tables.changes(study, start, best, bool(cages))
@@ -131,7 +131,7 @@ def render_study(
         front=figures_of.uri("front"),
         front_rows=[_front_row(trial, names) for trial in front[: tables.MOST_TRIALS]],
         names=names,
-        sides=_sides(study, best, looks),
+        sides=_sides(study, best, views),
         overlay=_overlay(study, best),
         scores=tables.scores(study, start, best),
         coarse=study.settings.coarse_first,
@@ -259,7 +259,7 @@ def _front_row(trial: Trial, names: Sequence[str]) -> list[str]:
 
 
 def _sides(
-    study: Study, best: Trial | None, looks: Mapping[str, DesignView]
+    study: Study, best: Trial | None, views: Mapping[str, DesignView]
 ) -> list[dict[str, Any]]:
     """Return the views before and after: the picture with its balls, and the section with chief
     rays.
@@ -270,7 +270,7 @@ def _sides(
         if design is None:
             continue
         is_start = label == "before" or best is None or best.is_start
-        seen = looks.get(label, DesignView())
+        seen = views.get(label, DesignView())
         rays = seen.rays.in_section(along_rows(design)) if seen.rays is not None else ()
         found.append(
             {

@@ -167,7 +167,9 @@ class CalibratedSensor:
         normals = normals_of(tilts, *self._frames, self.untouched.normals)
         return normals, self._integrator.depths(normals)
 
-    def look(self, contact: Contact, number: int = 0) -> tuple[TactileImage, NDArray[np.uint8]]:
+    def take_picture(
+        self, contact: Contact, number: int = 0
+    ) -> tuple[TactileImage, NDArray[np.uint8]]:
         """Return the image of a contact, and the picture (h, w, 3) that the camera stores.
 
         Args:

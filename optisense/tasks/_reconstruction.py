@@ -245,7 +245,7 @@ def reconstruct_one(
     Raises:
         TaskError: the camera does not see the contact.
     """
-    image, picture = sensor.look(contact, number)
+    image, picture = sensor.take_picture(contact, number)
     # At the border of the view, a pixel may see the contact but not the untouched skin.
     mask = image.contact_mask & sensor.untouched.seen
     if mask.sum() < LEAST_PIXELS:

@@ -78,7 +78,7 @@ def read_press(
         readers: number of the sensor's readers, all of which are used.
         keeps: whether the pictures are kept.
     """
-    image, picture = sensor.look(contact, number)
+    image, picture = sensor.take_picture(contact, number)
     mask = image.contact_mask & (areas > 0.0)
     true = image.normals.astype(np.float64)
     true_depth = sensor.untouched.image_depth(image).astype(np.float64)

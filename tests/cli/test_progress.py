@@ -39,17 +39,17 @@ SEARCHES = [
 @pytest.mark.parametrize("columns", [20, 40, 60, 80, 200])
 @pytest.mark.parametrize("told", SEARCHES)
 def test_a_search_fits_the_terminal(told: SearchProgress, columns: int) -> None:
-    from optisense.cli.searching import notes, what
+    from optisense.cli.searching import notes, stage_text
 
     clock = Clock()
     line = ProgressLine(clock=clock)
     clock.now = 4321.0
-    line.show(*what(told), told.seconds_left, notes(told))
+    line.show(*stage_text(told), told.seconds_left, notes(told))
     text = line.text(columns - 1).plain
     assert len(text) < columns
     assert CLOCK_AND_LEFT.search(text) or columns < 40
     if columns >= 60:
-        assert text.startswith(what(told)[0])
+        assert text.startswith(stage_text(told)[0])
         if told.stage == "trials":
             assert f"{told.done}/{told.total}" in text
         if math.isfinite(told.seconds_left):
@@ -147,7 +147,7 @@ def test_times_in_words(seconds: float, words: str) -> None:
 
 
 def test_the_bar_of_a_tolerance_counts_the_sensors_that_its_page_tells_of() -> None:
-    from optisense.cli.tolerance import what
+    from optisense.cli.tolerance import stage_text
     from optisense.search.tolerance.analysis import tolerance
     from optisense.sensors import load
 
@@ -160,7 +160,7 @@ def test_the_bar_of_a_tolerance_counts_the_sensors_that_its_page_tells_of() -> N
         flux,
         {"lights.red.flux": 0.1, "lights.blue.flux": 0.1},
         sensors=30,
-        progress=lambda done, count, left, doing: told.append(what(done, count)),
+        progress=lambda done, count, left, doing: told.append(stage_text(done, count)),
     )
     assert told[0] == ("scoring the nominal design", 0, 4)
     assert told[-1] == ("scoring sensors", found.sensors, found.sensors)

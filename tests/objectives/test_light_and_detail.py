@@ -41,7 +41,7 @@ def flat(pitch: float, stretch: float, blur: float | None, across: int = 400) ->
     if blur is not None:
         focus = SimpleNamespace(in_pixels=lambda window: np.full((30, 40), blur))
     return SimpleNamespace(
-        judged_rays=rays,
+        checked_rays=rays,
         design=SimpleNamespace(camera=SimpleNamespace(resolution=(across, 300))),
         model=SimpleNamespace(picture_chain=SimpleNamespace(focus=focus)),
     )
@@ -134,7 +134,7 @@ def test_the_shadow_is_that_of_the_lights_that_shine(mini: Evaluation) -> None:
     dark = design
     for name in red:
         dark = set_value(dark, f"lights.{name}.flux", 0.0)
-    relit = Relighting(Evaluation(mini.model, mini.settings)).lit(dark)
+    relit = Relighting(Evaluation(mini.model, mini.settings)).relit(dark)
     parts = evaluate(relit, "shadow").parts
     assert parts["red"] == 0.0
     assert parts["blue"] == pytest.approx(evaluate(mini, "shadow").parts["blue"], abs=0.01)

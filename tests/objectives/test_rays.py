@@ -46,13 +46,13 @@ class RaysOf:
 
     def __init__(self, plate: TriangleMesh, rays: ChiefRays | None = None) -> None:
         self.model = PlateModel(plate)
-        self.chief_rays = self.judged_rays = rays or self.model.chief_rays(PIXELS)
+        self.chief_rays = self.checked_rays = rays or self.model.chief_rays(PIXELS)
         self.sensing_faces = len(plate.faces)
 
 
 def evaluation(plate: TriangleMesh, rays: ChiefRays | None = None) -> Any:
     stand_in: Any = RaysOf(plate, rays)
-    assert hasattr(Evaluation, "judged_rays")
+    assert hasattr(Evaluation, "checked_rays")
     assert hasattr(Evaluation, "sensing_faces")
     return stand_in
 
@@ -247,7 +247,7 @@ def test_footprints_that_leap_over_a_gap_are_left_out() -> None:
         np.concatenate([left.vertices + [-5.0, 0, 0], lower.vertices + [5.0, 0, -8.0]]),
         np.concatenate([left.faces, lower.faces + len(left.vertices)]),
     )
-    rays = evaluation(both).judged_rays
+    rays = evaluation(both).checked_rays
     long, wide = footprints(rays.points, rays.hit)
     known = np.isfinite(long)
     assert 0 < np.count_nonzero(~known) < 4 * PIXELS[1]

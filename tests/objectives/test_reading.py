@@ -214,8 +214,8 @@ def test_presses_under_other_lights_read_the_same_whether_cut_or_whole(
     one_colour, usual = design, ots.load("gelsight-mini-ideal")
     values = []
     for each in (usual, one_colour):
-        whole = evaluate(relighting.lit(each), ["reading", "depth"])
-        cut = evaluate(relighting.lit(each, whole=False), ["reading", "depth"])
+        whole = evaluate(relighting.relit(each), ["reading", "depth"])
+        cut = evaluate(relighting.relit(each, whole=False), ["reading", "depth"])
         for name, score in cut.items():
             assert score.failure is None and whole[name].failure is None
             assert score.value == pytest.approx(whole[name].value, rel=1e-9)
@@ -227,7 +227,7 @@ def test_relit_presses_read_as_rendered_ones(relighting: Relighting) -> None:
     usual = ots.load("gelsight-mini-ideal")
     rendered = Evaluation(OpticalModel(usual), relighting.settings)
     direct = evaluate(rendered, "reading").value
-    assert evaluate(relighting.lit(usual), "reading").value == pytest.approx(direct, rel=0.02)
+    assert evaluate(relighting.relit(usual), "reading").value == pytest.approx(direct, rel=0.02)
 
 
 def test_the_exposure_is_that_of_the_untouched_skin() -> None:

@@ -46,7 +46,7 @@ def recoloured(seed: int, brightness: float = 1.0) -> SensorDesign:
 def test_presses_are_those_of_a_rendering_under_these_lights(relighting: Relighting) -> None:
     design = recoloured(1)
     rendered = Evaluation(OpticalModel(design), SMALL)
-    relit = relighting.lit(design)
+    relit = relighting.relit(design)
     assert relit.exposure == pytest.approx(rendered.exposure, rel=1e-5)
     for one, other in zip(relit.presses, rendered.presses, strict=True):
         assert (one.mask == other.mask).all()
@@ -96,8 +96,8 @@ def test_scores_of_cut_presses_are_those_of_whole_ones(
     """Also of one light after another, whose presses share what follows from their shape."""
     for seed in range(3, 7):
         design = recoloured(seed)
-        whole = evaluate(relighting.lit(design), name, **own)
-        cut = evaluate(relighting.lit(design, whole=False), name, **own)
+        whole = evaluate(relighting.relit(design), name, **own)
+        cut = evaluate(relighting.relit(design, whole=False), name, **own)
         assert whole.failure is None and cut.failure is None
         assert cut.value == pytest.approx(whole.value, rel=1e-12)
         for one, other in zip(cut.parts["places"], whole.parts["places"], strict=True):
@@ -111,7 +111,7 @@ def test_brighter_lights_of_the_same_colours_change_nothing(relighting: Relighti
     for name, group in design.lights.items():
         brighter = set_value(brighter, f"lights.{name}.flux", 7.0 * group.flux)
     for name in ("rgb2normal", "normdiff"):
-        one, other = (evaluate(relighting.lit(each), name).value for each in (design, brighter))
+        one, other = (evaluate(relighting.relit(each), name).value for each in (design, brighter))
         assert one == pytest.approx(other, rel=SCORE_ROUNDING)
 
 
@@ -125,7 +125,7 @@ def test_one_colour_for_all_pixels_tells_no_normal(
 
 def test_darkness_is_a_failure_and_not_a_score(relighting: Relighting) -> None:
     design = recoloured(9, brightness=1e-12)
-    relit = relighting.lit(set_value(design, "name", "dark"))
+    relit = relighting.relit(set_value(design, "name", "dark"))
     assert evaluate(relit, "rgb2normal").failure is None  # the exposure follows
     flux = np.zeros((len(relighting.groups), 3))
     with pytest.raises(ObjectiveError, match="is black"):
@@ -136,4 +136,4 @@ def test_other_light_groups_are_refused(relighting: Relighting) -> None:
     design = ots.load("gelsight-mini-ideal")
     del design.lights[next(iter(design.lights))]
     with pytest.raises(ObjectiveError, match="other light groups"):
-        relighting.lit(design)
+        relighting.relit(design)

@@ -135,7 +135,7 @@ class _SeedImages:
 
     def scores(self, design: SensorDesign, only: Collection[str] | None = None) -> dict[str, Score]:
         """Return the scores by all objectives, or by those named in `only`."""
-        cut, whole = (self._relighting.lit(design, whole=each) for each in (False, True))
+        cut, whole = (self._relighting.relit(design, whole=each) for each in (False, True))
         found = {}
         for each in self._objectives:
             if only is not None and each.name not in only:

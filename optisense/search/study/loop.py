@@ -212,7 +212,7 @@ class StudyRun:
     def _watch_reading(self, *, last: bool = False) -> None:
         """Read the best design so far, unless the method looks for a front."""
         if not self.method.multi_objective:
-            self._watch.look(last=last)
+            self._watch.update(last=last)
 
     def _score_start(self, runner: Runner) -> None:
         store = self.study.store

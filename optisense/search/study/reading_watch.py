@@ -47,7 +47,7 @@ class ReadingWatch:
         self._due = self._began + FIRST_SECONDS
         self._reader: DesignEvaluator | None = None
 
-    def look(self, *, last: bool = False) -> None:
+    def update(self, *, last: bool = False) -> None:
         """Read the start and the best design, if it is time to and they were not read before.
 
         Args:
