@@ -65,8 +65,8 @@ class BallPress:
     def __post_init__(self) -> None:
         if not (self.radius > 0 and 0 < self.least < self.most and self.aside >= 0):
             raise TaskError(
-                f"a ball of {self.radius:g} mm and depths of {self.least:g} to {self.most:g} make "
-                "no sense",
+                f"a ball of {self.radius:g} mm and depths of {self.least:g} to "
+                f"{self.most:g} mm are impossible",
                 hint="Give a radius above 0 mm, and depths above 0 mm, the smaller first",
             )
 

@@ -49,6 +49,6 @@ class DatasetSettings:
         for text in self.hold_out:
             if text not in self.contacts.indenters:
                 raise TaskError(
-                    f"'{text}' is held out, but nothing is pressed in with it",
+                    f"'{text}' is held out, but it is not one of the indenters",
                     hint="Indenters: " + ", ".join(self.contacts.indenters),
                 )

@@ -23,7 +23,8 @@ KEPT = "Free space on this disk or choose another folder; finished samples are k
 
 MOST_SHOWN = 5
 """Largest number of differences between settings that a message lists; further ones are only
-counted."""
+counted, so that the message stays readable.
+"""
 
 
 def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
@@ -156,9 +157,9 @@ def refuse_differences(
         return
     more = f" and {len(found) - MOST_SHOWN} more" if len(found) > MOST_SHOWN else ""
     raise TaskError(
-        f"the folder holds {what} made otherwise: " + "; ".join(found[:MOST_SHOWN]) + more,
+        f"the folder holds {what} with other settings: " + "; ".join(found[:MOST_SHOWN]) + more,
         where=str(folder),
-        hint="Name another folder, or give the settings it was begun with to continue it",
+        hint="Name another folder, or repeat the settings of this one to continue it",
     )
 
 

@@ -106,7 +106,7 @@ class TestBadInput:
         assert "aoap" in str(told.value.hint)
         with pytest.raises(SearchError, match="named twice"):
             DesignEvaluator(space, ["aoap", "aoap"])
-        with pytest.raises(SearchError, match="nothing to search for"):
+        with pytest.raises(SearchError, match="the search has no objective"):
             DesignEvaluator(space, [])
         with pytest.raises(ObjectiveError) as told:
             DesignEvaluator(space, ["aoap"], {"photns": 3})

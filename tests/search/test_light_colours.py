@@ -99,7 +99,7 @@ def test_an_evaluator_travels_without_its_images(result: SearchResult) -> None:
     evaluator._images[0] = object()  # type: ignore[assignment]
     there = pickle.loads(pickle.dumps(evaluator))
     assert there.names == ["rgb2normal"]
-    assert not there._lit
+    assert not there._images
 
 
 class TestOrder:
