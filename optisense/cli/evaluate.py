@@ -55,7 +55,7 @@ def evaluate(
     ] = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Score a sensor: how well its images tell the shape of what touches it.
+    """Score a sensor: how well its images show the shape of what touches it.
 
     Objectives share images and rays. If one fails, the output says why, the others are still
     evaluated, and the exit code is 1.

@@ -45,7 +45,7 @@ def export(
         float | None,
         typer.Option(
             metavar="GRAMS",
-            help="With --for: what the whole sensor weighs; that of its parts if left out.",
+            help="With --for: mass of the whole sensor in g; the sum of its parts if left out.",
             show_default=False,
         ),
     ] = None,

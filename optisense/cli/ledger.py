@@ -51,7 +51,7 @@ def ledger(
     ] = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Show where the light of each group goes: to the skin, into which part, or out of which.
+    """Show how much light of each group reaches the skin, is absorbed, or escapes, by part.
 
     The table is in per cent of the power of each group, without contacts; its lines add up to
     100 %. --at also explains why a point of the skin is dark or bright: which groups light it, what

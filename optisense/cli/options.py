@@ -24,8 +24,9 @@ ContactOption = Annotated[
         "--contact",
         "-c",
         metavar="KIND:SIZE@U,V:DEPTH",
-        help="What presses on the sensor, for example sphere:1.5@0,0:0.8 (a ball of 1.5 mm "
-        "radius, at the middle, 0.8 mm deep). May be given several times.",
+        help="A contact: an indenter, its place on the skin and its depth, for example "
+        "sphere:1.5@0,0:0.8 (a ball of 1.5 mm radius, in the middle, 0.8 mm deep). May be given "
+        "several times.",
         show_default=False,
     ),
 ]

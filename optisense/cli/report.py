@@ -78,7 +78,7 @@ def report(
         ),
     ] = 0,
 ) -> None:
-    """Write an HTML page about a search: its course, its result, and the trials.
+    """Write an HTML page about a search: its convergence, its result, and its trials.
 
     A search may still be running: the page shows the trials so far.
     """

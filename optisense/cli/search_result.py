@@ -13,10 +13,14 @@ if TYPE_CHECKING:
     from optisense.search import SearchResult, Study, Trial
 
 MOST_CAUSES = 4
-"""Largest number of causes of failure that are printed; the report lists more."""
+"""Largest number of causes of failure that are printed, so that the result fits on a screen; the
+report lists more.
+"""
 
 MOST_VALUES = 12
-"""Largest number of parameters of the best trial that are printed; all are in the study."""
+"""Largest number of parameters of the best trial that are printed, so that the result fits on a
+screen; all are in the study.
+"""
 
 
 def summary(result: SearchResult) -> dict[str, Any]:

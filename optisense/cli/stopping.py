@@ -30,10 +30,14 @@ EXIT_TERMINATED = 143
 """Exit code after SIGTERM: 128 and the number of the signal, as shells count."""
 
 SILENCE = 1.0
-"""Time after Ctrl-C in which a command may end without printing what it waits for, s."""
+"""Time after Ctrl-C in which a command may end without printing what it waits for, s; most end
+sooner.
+"""
 
 GRACE = 1.5
-"""Time after a second signal in which the command may still end by itself, s."""
+"""Time after a second signal in which the command may still end by itself, s: enough to remove
+temporary files.
+"""
 
 
 AGAIN = 0.02

@@ -59,10 +59,13 @@ GelSight Mini.
 """
 
 LIBRARIES_TIME = 1.0
-"""Time to load the libraries of the tasks, s."""
+"""Time to load scikit-learn and the other libraries of the tasks, s, for the estimate of the time
+left.
+"""
 
 USUAL_OBJECTS = 3
-"""Number of unseen objects that a reconstruction task presses by default."""
+"""Number of objects that a reconstruction task presses by default, those of
+`optisense.tasks._reconstruction.unseen_objects`, which loads slowly."""
 
 READING_TIME, FITTING_TIME = 1.0, 3.0
 """Time after the samples of the tasks to read them, and after the pictures of a reconstruction to

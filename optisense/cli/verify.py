@@ -31,10 +31,12 @@ PICTURE_WORK = 0.4
 """Processor time of a picture with an object and of reading it, s; measured on GelSight Mini."""
 
 LIBRARIES_TIME = 1.0
-"""Time to load the libraries of the tasks, s."""
+"""Time to load scikit-learn and the other libraries of the tasks, s, for the estimate of the time
+left.
+"""
 
 FITTING_TIME = 5.0
-"""Time of the fits of the readers, s."""
+"""Time of the fits of a sensor's three readers, s, for the estimate of the time left."""
 
 
 @handles_errors
@@ -65,10 +67,10 @@ def verify(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Test whether a sensor reads better than another, on objects that no score uses.
+    """Test whether a sensor reads shapes better than another, on objects that no score uses.
 
     Both sensors are calibrated with presses of balls. Then screws, coins, letters and other objects
-    are pressed into both at the same places, and the errors of the normals and depth decide.
+    are pressed into both at the same places, and the errors of normals and depth are compared.
     """
     compared = compare(first, second, trial, options, out, variant)
     if as_json:

@@ -96,7 +96,7 @@ class DatasetOptions(EstimatorOptions):
 
     indenter: Annotated[list[str], OptionNotation("KIND:SIZE")] = Field(
         ["sphere:1.5"],
-        description="What presses (sizes in mm): sphere:1.5, cylinder:2,6, plane or mesh:FILE. "
+        description="An indenter (sizes in mm): sphere:1.5, cylinder:2,6, plane or mesh:FILE. "
         "May be given several times; all are equally likely.",
     )
     depth: Range = Field(

@@ -25,7 +25,8 @@ Glue and tape of the built-in sensors have no gap."""
 
 BEGINNINGS = 2
 """Number of pairs of near vertices from which the search for the nearest points of two parts
-starts."""
+starts, as the nearest pair may lead to a local minimum.
+"""
 
 SAMPLED = 1500
 """Number of places of each part among which these pairs are found; all distances between them take

@@ -48,10 +48,13 @@ a reader.
 
 QUIET = 3.0
 """Difference from the untouched picture (levels of 255, in each channel) below which the tilt is
-read as 0; otherwise small errors over a wide, flat surface would add up in the depth."""
+read as 0, twice the usual noise of a pixel; otherwise small errors over a wide, flat surface would
+add up in the depth.
+"""
 QUIET_BLUR = 1.5
 """Standard deviation (pixels) of the Gaussian blur of a picture before it is compared with the
-untouched one."""
+untouched one; it averages the noise of some 28 pixels.
+"""
 
 _PLACE, _CAMERA, _SAMPLES, _SENSOR = 5, 6, 7, 10
 """Numbers that are hashed with the seed, one for each kind of random draw, so that the draws are

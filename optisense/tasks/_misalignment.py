@@ -22,7 +22,8 @@ THICKNESS = 2.0
 
 RAYS = 32, 24
 """Grid of chief rays (columns, rows) that find the extent of the view and the part that a plane
-covers."""
+covers, each to a few per cent.
+"""
 
 MARGIN = 0.5
 """Distance (mm) by which the plate extends beyond the outermost of these rays, so that it covers

@@ -46,11 +46,11 @@ over it; skins that differ do so over large areas.
 
 FITS = 0.8
 """Largest length of an object as a share of the narrower side of the skin in view; all objects are
-scaled to it."""
+scaled to it, so that skin remains visible around them."""
 
 RIM = 0.12
 """Margin between a press and the border of the skin, as a share of the narrower side of the skin in
-view."""
+view, so that the border affects the shape of the skin little."""
 
 VIEW_RIM = 0.2
 """Margin between a press and the border of a camera's view, as a share of the narrower side of the

@@ -75,7 +75,7 @@ def test_names_of_strangers_are_shown_and_not_obeyed(found: Verification) -> Non
 def test_notes_are_told(found: Verification) -> None:
     page = render_verification(replace(found, scale=0.5, same_places=False), AXES)
     assert "scaled to 50 %" in page
-    assert "other skins" in page
+    assert "sensing surfaces differ" in page
     assert "notice" not in re.sub(
         r"<style>.*?</style>", "", render_verification(found, AXES), flags=re.S
     )

@@ -106,7 +106,12 @@ class ProcessPool(Runner):
             threading.Thread(target=self._supervise, args=(place,), daemon=True).start()
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Submit a trial to the next free worker; see `Runner.submit`."""
+        """Submit a trial to the next free worker; see `Runner.submit`.
+
+        Args:
+            vector: point (n,).
+            seed: seed of the objectives.
+        """
         task = _Task(vector, seed, Future())
         with self._changed:
             if self._error is not None:

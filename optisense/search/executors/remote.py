@@ -55,7 +55,12 @@ class ExecutorRunner(Runner):
         self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Submit a trial to the executor; see `Runner.submit`."""
+        """Submit a trial to the executor; see `Runner.submit`.
+
+        Args:
+            vector: point (n,).
+            seed: seed of the objectives.
+        """
         return self._executor.submit(score_trial, self._key, self._blob, vector, seed)
 
     def close(self) -> None:
@@ -94,7 +99,12 @@ class DaskRunner(Runner):
         self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Submit a trial to the cluster; see `Runner.submit`."""
+        """Submit a trial to the cluster; see `Runner.submit`.
+
+        Args:
+            vector: point (n,).
+            seed: seed of the objectives.
+        """
         given = self._executor.submit(score_trial, self._key, None, vector, seed)
         future: Future[Outcome] = Future()
         given.add_done_callback(lambda done: _settle(done, future))

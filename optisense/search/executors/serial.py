@@ -37,7 +37,11 @@ class SerialRunner(Runner):
         self._before: Callable[[int, FrameType | None], object] | int | None = None
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:
-        """Score the trial and return a finished future.
+        """Score a trial and return a finished future.
+
+        Args:
+            vector: point (n,).
+            seed: seed of the objectives.
 
         Raises:
             KeyboardInterrupt: Ctrl-C was pressed before this trial, or twice during it.

@@ -101,8 +101,11 @@ class AugmentedLagrangian:
         return self._signs() * (values[1:] + self.offsets - limits) + LIMIT_MARGIN
 
     def updated(self, values: FloatArray, offsets: FloatArray) -> AugmentedLagrangian:
-        """Return the merit function of the next ascent, where the last one ended at these values (1
-        + m,).
+        """Return the merit function of the next ascent.
+
+        Args:
+            values: score and limited quantities, (1 + m,), at the end of the last ascent.
+            offsets: see the attribute, (m,).
         """
         violation = self.violations(values)
         most = float(violation.max())

@@ -12,7 +12,7 @@ from optisense.search.study.store import START, Row
 
 ALL_FAIL = 20
 """Number of first trials that must all fail for a study to stop early, if the starting design has a
-score.
+score. Where three quarters of the space are forbidden, so many fail by chance once in 300 searches.
 """
 
 ALL_FAIL_WITH_START = 5
