@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from optisense.cli.console import messages
 from optisense.cli.progress import ProgressLine, about, progress_line
 from optisense.quality import TRIAL_PHOTONS
 from optisense.time_left import TimedStep
@@ -35,6 +36,14 @@ USUAL_FRESH, FRESH_SEEDS = 9, 3
 are those of `optisense.search.study.stages`, which loads slowly.
 """
 
+WORTH_STOPPING = 20.0
+"""Time left (s) from which on a search is worth stopping. With less left, warnings are left to its
+result, which says the same.
+"""
+
+CONDITIONS = "conditions"
+"""Key of the warning that no trial meets the conditions."""
+
 
 class SearchLine(NamedTuple):
     """Progress line of a search, and the function that shows its progress there."""
@@ -57,8 +66,12 @@ def search_progress(workers: int) -> Iterator[SearchLine]:
     with progress_line(loading, *searching, waits=waits) as line:
         line.begin(LOADING)
 
+        warnings = EarlyWarnings()
+
         def show(progress: SearchProgress) -> None:
             last[:] = [progress]
+            for warning in warnings.of(progress):
+                messages.print(f"note: {warning}", markup=False, style="yellow")
             line.show(*stage_text(progress), progress.seconds_left, notes(progress))
 
         yield SearchLine(line, show)
@@ -127,7 +140,7 @@ def notes(progress: SearchProgress) -> list[str]:
     if math.isfinite(progress.best):
         parts.append(f"best {_score(progress.best)} (start {_score(progress.start)})")
         if progress.worsened:
-            parts.append(f"but {', '.join(progress.worsened)}")
+            parts.append(f"but {_listed(progress.worsened)}")
     elif progress.nearest:
         parts.append(f"no trial meets the conditions yet, nearest: {progress.nearest}")
     if progress.broken:
@@ -139,6 +152,38 @@ def notes(progress: SearchProgress) -> list[str]:
     elif progress.doing:
         parts.append(progress.doing)
     return parts
+
+
+class EarlyWarnings:
+    """Warnings that a search runs the wrong way, told once and while there is time to stop it."""
+
+    def __init__(self) -> None:
+        self._told: set[str] = set()
+
+    def of(self, progress: SearchProgress) -> list[str]:
+        """Return the warnings that were not told before."""
+        if progress.stage != "trials" or not progress.seconds_left >= WORTH_STOPPING:
+            return []
+        found = []
+        new = progress.worsened.keys() - self._told
+        if new:
+            self._told |= new
+            found.append(
+                "the score improves, but the best trial so far has "
+                f"{_listed(progress.worsened)}. Ctrl-C stops the search; --require makes another "
+                "one keep such a quantity"
+            )
+        if progress.generations and progress.nearest and CONDITIONS not in self._told:
+            self._told.add(CONDITIONS)
+            found.append(
+                f"none of the first {progress.done} trials meets all conditions; the nearest one "
+                f"breaks {progress.nearest}"
+            )
+        return found
+
+
+def _listed(worsened: Mapping[str, str]) -> str:
+    return ", ".join(f"{name} {values}" for name, values in worsened.items())
 
 
 def _waits(last: list[SearchProgress]) -> str:

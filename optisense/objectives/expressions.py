@@ -262,7 +262,9 @@ class _Parser:
             if math.isinf(number):
                 raise self._error(token, f"{token.text} is too large a number")
             return _Term(lambda known: number, repr(number).removesuffix(".0"), VALUE)
-        if token.text in _FUNCTIONS and self._take("("):
+        if token.kind == "name" and self._take("("):
+            if token.text not in _FUNCTIONS:
+                raise self._error(token, f"there is no function '{token.text}'")
             return self._call(token)
         quantity = _quantity(token)
         self._found[quantity] = None

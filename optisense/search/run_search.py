@@ -170,8 +170,12 @@ def _hint_after(error: OptiSenseError, study: Study) -> str | None:
         advice = f"The study keeps its {kept}: continue with --resume --out {study.folder}"
     else:
         study.discard()
-        advice = "No trial was finished, so the study was removed: run the same command again"
-    return f"{error.hint}. {advice}" if error.hint else advice
+        advice = "No trial was finished, so the study was removed"
+        if not error.hint:
+            advice += ": run the same command again"
+    if not error.hint:
+        return advice
+    return f"{error.hint}{'' if error.hint.endswith('?') else '.'} {advice}"
 
 
 def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:

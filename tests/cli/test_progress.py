@@ -164,3 +164,34 @@ def test_the_bar_of_a_tolerance_counts_the_sensors_that_its_page_tells_of() -> N
     )
     assert told[0] == ("scoring the nominal design", 0, 4)
     assert told[-1] == ("scoring sensors", found.sensors, found.sensors)
+
+
+def test_a_search_that_runs_the_wrong_way_is_told_once_and_in_time() -> None:
+    from optisense.cli.searching import WORTH_STOPPING, EarlyWarnings
+
+    def told(
+        left: float, worsened: dict[str, str], generations: int = 0, nearest: str = ""
+    ) -> SearchProgress:
+        return SearchProgress(
+            *("trials", 20, 90, 0, 0.6, 0.3, 0.0, left),
+            worsened=worsened,
+            generations=generations,
+            nearest=nearest,
+        )
+
+    warnings = EarlyWarnings()
+    stretched = {"distortion": "2.1 (start 1.15)"}
+    assert warnings.of(told(0.5 * WORTH_STOPPING, stretched)) == []
+    assert warnings.of(told(math.nan, {})) == []
+    (first,) = warnings.of(told(2.0 * WORTH_STOPPING, stretched))
+    assert "distortion 2.1 (start 1.15)" in first
+    assert warnings.of(told(2.0 * WORTH_STOPPING, stretched)) == []
+    worse = {**stretched, "coverage": "0.35 (start 0.57)"}
+    (second,) = warnings.of(told(2.0 * WORTH_STOPPING, worse))
+    assert "coverage 0.35" in second
+    broken = "coverage >= 0.9 (is 0.57)"
+    assert warnings.of(told(2.0 * WORTH_STOPPING, worse, 0, broken)) == []
+    (third,) = warnings.of(told(2.0 * WORTH_STOPPING, worse, 1, broken))
+    assert "none of the first 20 trials" in third
+    assert broken in third
+    assert warnings.of(told(2.0 * WORTH_STOPPING, worse, 2, broken)) == []

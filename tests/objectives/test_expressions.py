@@ -93,7 +93,7 @@ def test_random_expressions_keep_their_value_when_they_are_written_out() -> None
         ("aoap ^ 2", 5, "can't be read"),
         ("min(aoap)", 0, "two numbers or more"),
         ("sqrt(aoap, 2)", 0, "one number"),
-        ("__import__('os')", 10, "not expected"),
+        ("1 + __import__('os')", 4, "no function '__import__'"),
         ("3 + 4", 0, "names no objective"),
         ("aoap + 1e999", 7, "too large a number"),
         ("", 0, "something is missing"),

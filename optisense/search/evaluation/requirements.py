@@ -56,17 +56,16 @@ class Requirement:
         """
         found = re.fullmatch(r"(?P<what>[^<>=]*)(?P<sign>>=|<=)(?P<limit>[^<>=]*)", text)
         if found is None:
-            signs = re.search(r"[<>=]+", text)
-            where = len(text.rstrip()) if signs is None else signs.start()
-            problem = "a condition has one '>=' or '<='"
-            raise SearchError(str(marked(text, where, problem).message), hint=HINT)
+            raise _without_comparison(text)
         try:
             limit = float(found["limit"])
         except ValueError:
             limit = math.nan
         if not math.isfinite(limit):
-            problem = "the limit of a condition is a number"
-            raise SearchError(marked(text, found.start("limit"), problem).message, hint=HINT)
+            raise _without_limit(text, found)
+        if not found["what"].strip():
+            problem = f"nothing is named before '{found['sign']}'"
+            raise SearchError(marked(text, 0, problem).message, hint=HINT)
         try:
             quantity = Expression.parse(found["what"]).text
         except ObjectiveError as error:
@@ -99,11 +98,57 @@ class Requirement:
         try:
             for name in named_in([self.quantity]):
                 if name not in names():
-                    hint = suggestion(name, names())
-                    raise SearchError(f"the condition '{self}' names no objective", hint=hint)
+                    problem = f"there is no objective '{name}', which the condition '{self}' names"
+                    raise SearchError(problem, hint=suggestion(name, names()))
             return objective_of(self.quantity)
         except ObjectiveError as error:
             raise SearchError(error.message, where=str(self), hint=error.hint) from None
+
+
+def _without_comparison(text: str) -> SearchError:
+    """Return the error of a condition that does not compare a quantity with a number."""
+    signs = re.search(r"[<>=]+", text)
+    if signs is None:
+        problem = "a condition needs '>=' or '<=' and a number"
+        hint = f"{HINT}, with the quotes: without them the shell takes what follows '>' or '<'"
+        return SearchError(marked(text, len(text.rstrip()), problem).message, hint=hint)
+    problem = "a condition has one '>=' or '<='"
+    second = re.search(r"[<>=]+", text[signs.end() :])
+    place = signs.end() + second.start() if second and signs[0] in (">=", "<=") else signs.start()
+    return SearchError(marked(text, place, problem).message, hint=HINT)
+
+
+def _without_limit(text: str, found: re.Match[str]) -> SearchError:
+    """Return the error of a condition whose right side is not a finite number."""
+    place = found.start("limit")
+    number = re.match(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*", found["limit"])
+    if number is not None:
+        hint = "Give the number alone"
+        unit = _unit_of(found["what"])
+        if found["limit"][number.end() :].strip() == "%":
+            hint += f", which is {float(number[0]) / 100:g} for {number[0].strip()} %"
+        elif unit:
+            hint += f", in {unit}"
+        problem = "the limit of a condition is a number without a unit"
+        return SearchError(marked(text, place + number.end(), problem).message, hint=hint)
+    problem, hint = "the limit of a condition is a number", HINT
+    try:
+        limit = float(found["what"])
+    except ValueError:
+        place += len(found["limit"]) - len(found["limit"].lstrip())
+    else:
+        other = "<=" if found["sign"] == ">=" else ">="
+        problem = "the limit of a condition stands on its right side"
+        hint = f"Write it as '{found['limit'].strip()}{other}{limit:g}'"
+    return SearchError(marked(text, place, problem).message, hint=hint)
+
+
+def _unit_of(quantity: str) -> str:
+    """Return the unit of an objective, or an empty text if nothing is known about it."""
+    try:
+        return objective_of(quantity.strip()).unit
+    except ObjectiveError:
+        return ""
 
 
 def requirements_of(texts: Iterable[str]) -> list[Requirement]:

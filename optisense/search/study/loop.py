@@ -120,6 +120,7 @@ class StudyRun:
         self._trials_an_hour = 0.0
         self._doing = ""
         self._pace = math.nan
+        self._generations = 0
 
     def run(self) -> SearchResult:
         """Run to the end, or until Ctrl-C; the caller unlocks the study.
@@ -206,7 +207,7 @@ class StudyRun:
                 return "the budget is spent"
             outcomes = [row.outcome for row in whole if row.outcome is not None]
             self.method.tell(np.array([row.vector for row in whole]), outcomes)
-            generation += 1
+            generation = self._generations = generation + 1
             self._watch_reading()
 
     def _watch_reading(self, *, last: bool = False) -> None:
@@ -382,6 +383,7 @@ class StudyRun:
                 broken=tally.broken,
                 nearest=tally.nearest_note(),
                 worsened=tally.worsened(),
+                generations=self._generations,
                 best=tally.best,
                 start=tally.start,
                 trials_per_hour=self._trials_an_hour,

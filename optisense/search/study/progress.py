@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,8 +24,9 @@ class SearchProgress:
         broken: number of finished trials that break a condition.
         nearest: conditions that the trial nearest to feasibility breaks; empty as soon as a trial
             meets them all.
-        worsened: watched quantities, such as coverage, that are worse in the best trial so far
-            than in the start.
+        worsened: watched quantities, such as coverage, that are worse in the best trial so far than
+            in the start, each by name with its value and that of the start.
+        generations: number of finished generations of the method.
         best: best score so far of trials that meet all conditions; NaN before there is one.
         start: score of the start.
         trials_per_hour: rate of the last trials; 0 before it is known.
@@ -47,7 +48,8 @@ class SearchProgress:
     doing: str = ""
     broken: int = 0
     nearest: str = ""
-    worsened: tuple[str, ...] = ()
+    worsened: Mapping[str, str] = field(default_factory=dict)
+    generations: int = 0
 
 
 @dataclass(frozen=True)

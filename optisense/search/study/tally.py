@@ -108,13 +108,13 @@ class Tally:
         if number == self._best_number:
             self._best_outcome = outcome
 
-    def worsened(self) -> tuple[str, ...]:
-        """Return the watched quantities that are worse in the best trial so far than in the
-        start.
+    def worsened(self) -> dict[str, str]:
+        """Return the watched quantities that are worse in the best trial so far than in the start,
+        by name: "0.41 (start 0.57)".
         """
         leading = self.leading()
         if not leading:
-            return ()
+            return {}
         (_, start), (_, best) = leading
         worse = worsened(best, start)
-        return tuple(f"{name} {now:.3g} (start {was:.3g})" for name, (now, was) in worse.items())
+        return {name: f"{now:.3g} (start {was:.3g})" for name, (now, was) in worse.items()}
