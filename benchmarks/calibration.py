@@ -86,7 +86,7 @@ def measure(name: str) -> dict[str, Any]:
                 "found": number.after,
                 "uncertainty": number.uncertainty,
                 "determined": number.determined,
-                "share_of_range": abs(off) / (RANGE * each.spread),
+                "share_of_range": abs(off) / (RANGE * each.plausible_range),
                 "deviations": abs(number.after - truth) / number.uncertainty,
             }
         )
@@ -106,7 +106,7 @@ def hidden_steps(chosen: list[FitQuantity]) -> NDArray[np.float64]:
     rng = np.random.default_rng(SEED)
     found = rng.uniform(-HIDDEN, HIDDEN, len(chosen))
     for index, each in enumerate(chosen):
-        if not each.logarithmic and each.start + each.spread * found[index] < each.low:
+        if not each.logarithmic and each.start + each.plausible_range * found[index] < each.low:
             found[index] *= -1.0  # such as a level in the dark, which is not below 0
     return found
 

@@ -21,8 +21,8 @@ from optisense.geometry import TriangleMesh
 FloatArray = NDArray[np.float64]
 
 FLAT = 0.2
-"""Largest deviation of a flat gel's skin from its plane, mm; the real one of GelSight Mini sags as
-much.
+"""Largest deviation of a flat gel's skin from its plane, mm: the skin of a real GelSight Mini sags
+by as much.
 """
 
 STRAIGHT = 1e-3
@@ -31,13 +31,16 @@ rounding errors, and far below any bend that is meant.
 """
 
 EDGE_ANGLE = 30.0
-"""Largest angle between the faces of an edge and one of the four sides of the picture, degrees."""
+"""Largest angle between the normals of an edge's faces and the direction of one of the four sides
+of the picture, degrees: more than edges are slanted, and less than half of the angle between
+sides."""
 
 EDGE = "edge-"
 """Beginning of the names of faces that are edges."""
 
 WIDEST_ANGLE = 89.0
-"""Largest angle from its axis to which a spot is widened, degrees."""
+"""Largest angle from its axis to which a spot is widened, degrees: at 90 it would be a
+half-space."""
 
 
 def with_lights_moved(design: SensorDesign, group: str, along: float) -> SensorDesign:
@@ -110,7 +113,9 @@ def _with_lights(design: SensorDesign, group: str, change) -> SensorDesign:  # t
 
 
 def turned(vector: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
-    """Return a vector turned about a unit axis (Rodrigues)."""
+    """Return a vector (3,) rotated by an angle (degrees) about a unit axis (3,), by Rodrigues'
+    formula.
+    """
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     along = axis * float(axis @ vector) * (1.0 - cosine)
     return np.asarray(vector * cosine + np.cross(axis, vector) * sine + along)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from optisense.calibration.body_changes import with_single_lights
 from optisense.calibration.comparing import Comparison, usable
+from optisense.calibration.cross_readings import realism_and_readings
 from optisense.calibration.families import LEDS
 from optisense.calibration.fit_rounds import FitRounds, Progress
 from optisense.calibration.fitted_numbers import FittedNumber, correlated_pairs, fitted_numbers
@@ -17,7 +18,6 @@ from optisense.calibration.model_pictures import model_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.quantity import FitQuantity
-from optisense.calibration.reading_both_ways import realism_and_readings
 from optisense.calibration.result import Calibration
 from optisense.calibration.seen_contacts import check_shape
 from optisense.calibration.settings import CalibrationSettings
@@ -27,13 +27,15 @@ from optisense.errors import CalibrationError
 FloatArray = NDArray[np.float64]
 
 LEAST_PRESSES = 2
-"""Smallest number of presses of a fit; a single ball could be explained by its position."""
+"""Smallest number of presses of a fit: the response of a single ball could be explained by its
+position alone."""
 
 FEW_PRESSES = 6
-"""Recommended number of presses, a third of which are held out."""
+"""Recommended number of presses: a third of them are held out, and four are fitted."""
 
 FEW_FITTED = 4
-"""Number of fitted presses below which a note says that the fit rests on few."""
+"""Number of fitted presses below which a note says that the fit rests on few: that of the
+recommended number of presses."""
 
 
 def calibrate(
@@ -116,10 +118,13 @@ def _refuse_too_few(
     """
     count = len(photographs.presses) - len(held_out)
     if not chosen:
-        raise CalibrationError("nothing may change", hint="Keep less as it is")
+        raise CalibrationError(
+            "there is no number to fit, as all families are kept as they are",
+            hint="Keep fewer families, or name further numbers to fit",
+        )
     if count < LEAST_PRESSES:
         raise CalibrationError(
-            f"{count} press{'' if count == 1 else 'es'} can't tell {len(chosen)} numbers",
+            f"{count} press{'' if count == 1 else 'es'} can't determine {len(chosen)} numbers",
             hint=f"Photograph at least {LEAST_PRESSES}, better {FEW_PRESSES}, at different places",
         )
     notes = []
@@ -127,7 +132,8 @@ def _refuse_too_few(
         notes.append("no press is held out: the figures are those of the presses that were fitted")
     if count < FEW_FITTED:
         notes.append(
-            f"the fit rests on {count} presses; {FEW_PRESSES} at different places tell more"
+            f"the fit rests on {count} presses; {FEW_PRESSES} at different places determine the "
+            "numbers better"
         )
     return notes
 

@@ -21,13 +21,11 @@ UNCORRELATED = 0.1
 picture scatters by about as much.
 """
 
-
 FARTHEST = 0.2
 """Largest distance over which a correlation is summed, as a share of the picture's width: one
 picture contains too few independent errors of a larger extent to tell it, and without this limit a
 model that is wrong everywhere would not be fitted to the background at all.
 """
-
 
 LEAST_ERROR = 1.0
 """Smallest error by which residuals are divided, in levels: the noise of a photograph that is
@@ -35,7 +33,8 @@ averaged to half its width.
 """
 
 TO_DEVIATION = 1.4826
-"""Ratio of the standard deviation of a normal distribution to the median of its absolute values."""
+"""Ratio of the standard deviation of a normal distribution to the median of its absolute values,
+one over its third quartile, 0.6745."""
 
 LEAST_PIXELS = 9.0
 """Smallest number of pixels for which there is one independent error: cameras interpolate colours
@@ -43,7 +42,8 @@ from neighbouring pixels, and dust and overexposure bias more than the residuals
 """
 
 SCALE_CHANGE = 0.1
-"""Relative difference up to which two scales of errors are alike."""
+"""Relative difference up to which two scales of errors are alike: the weights of the residuals then
+change by less than a fifth, and another descent hardly changes the fit."""
 
 
 @dataclass(frozen=True)

@@ -90,11 +90,11 @@ class Family:
     usual: bool = True
 
 
-def _powers(design: SensorDesign, spread: float = POWER_RANGE) -> list[FitQuantity]:
+def _powers(design: SensorDesign, plausible_range: float = POWER_RANGE) -> list[FitQuantity]:
     return [
         FitQuantity(
             f"lights.{name}.flux", f"power of the {name} lights", "mW", group.flux,
-            1e-3 * group.flux, min(1e6, 1e3 * group.flux), spread, True,
+            1e-3 * group.flux, min(1e6, 1e3 * group.flux), plausible_range, True,
         )
         for name, group in design.lights.items()
         if group.flux > 0.0

@@ -195,8 +195,8 @@ class FitRounds:
         names = [self._small.presses[index].name for index in self._used]
         usual = float(np.median(solution.outlying))
         return [
-            f"{name}: it is explained worse than the others, by {error:.1f} levels where they have "
-            f"{usual:.1f}; check its ball and whether it slipped"
+            f"{name}: the fit explains it worse than the others, with an error of {error:.1f} "
+            f"levels instead of {usual:.1f}; check its ball and whether it slipped"
             for name, error in zip(names, solution.outlying, strict=True)
             if error > OUTLYING * usual
         ]

@@ -13,11 +13,12 @@ from optisense.design import SensorDesign
 
 UNDETERMINED = 0.7
 """Ratio of uncertainty to plausible range from which on photographs are said not to determine a
-number.
+number: they then carry about as much information as the plausible range itself (1 / sqrt(2)).
 """
 
 TOLD_APART = 0.85
-"""Correlation of two numbers from which on photographs are said not to distinguish them."""
+"""Correlation of two numbers from which on photographs are said not to distinguish them: the
+uncertainty of each is then twice what it would be if the other were known."""
 
 
 @dataclass(frozen=True)

@@ -35,8 +35,8 @@ noise.
 """
 
 HUBER = 2.0
-"""Residual, in units of the root mean square, beyond which it counts linearly instead of
-quadratically (Huber 1964).
+"""Residual, in units of the usual error, beyond which it counts linearly instead of quadratically
+(Huber 1964): 5 % of normally distributed residuals are larger.
 """
 
 LEVELS = 2.0, 253.0
@@ -45,7 +45,8 @@ so that they do not show how dark or bright it is.
 """
 
 STEP = 0.02
-"""Step of a number's difference quotient, in plausible ranges."""
+"""Step of a number's difference quotient, in plausible ranges: small enough for pictures to change
+linearly, and, as they are not rounded, far above the rounding of their levels."""
 
 CONTACT_SPREAD = (2.0, 2.0, 0.1)
 """Plausible ranges of a contact's column and row, in pixels at a width of 320, and of the logarithm
@@ -75,9 +76,8 @@ LARGEST_STEP = 1.0
 
 TRUST = 2.5
 """Largest change over which layers are extrapolated by their difference quotients, in plausible
-ranges.
+ranges; the next round renders them anew.
 """
-
 
 Scales = tuple[ErrorScale, ErrorScale]
 """Errors of the background and of the responses."""
@@ -149,7 +149,14 @@ class LayeredFit:
         return len(self._chosen)
 
     def pictures(self, steps: FloatArray, contacts: FloatArray) -> list[FloatArray]:
-        """Return the levels of the background and of each press, within those that are compared."""
+        """Return the levels (h, w, 3) of the background and of each press, within those that are
+        compared.
+
+        Args:
+            steps: (n,) steps of the quantities, in plausible ranges from their starts.
+            contacts: (presses, 3) changes of column and row, pixels, and of the logarithm of the
+                radius.
+        """
         return [self._shown(-1, steps, None)] + [
             self._shown(index, steps, contacts[index]) for index in range(len(self._masks))
         ]
@@ -185,7 +192,12 @@ class LayeredFit:
         contacts: FloatArray,
         progress: Callable[[], None] = lambda: None,
     ) -> Solution:
-        """Run damped Gauss-Newton steps until the sum of squares stops falling."""
+        """Run damped Gauss-Newton steps until the sum of squares stops falling.
+
+        Args:
+            steps, contacts: start of the descent, as in `pictures`.
+            progress: function that is called before each step.
+        """
         for _ in range(MOST_DESCENTS):
             steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
             # The errors are smaller now, and so are the scales of the residuals.

@@ -52,7 +52,7 @@ class KeptRenderings:
         settings: Sequence[object],
         render: Callable[[], dict[str, FloatArray]],
     ) -> dict[str, FloatArray]:
-        """Return layers by light group: stored ones, or else new ones, which are stored.
+        """Return layers (h, w, 3) by light group: stored ones, or else new ones, which are stored.
 
         Args:
             design: design to render.

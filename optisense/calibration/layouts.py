@@ -70,7 +70,7 @@ def read_photographs(folder: str | Path, diameter: float | None = None) -> Photo
         if is_file(place / name):
             return read(place, diameter)
     raise CalibrationError(
-        "the folder tells of no presses",
+        "the folder has no table of presses",
         where=str(place),
         hint=f"Put {BACKGROUND} and {PRESSES} into it, the latter with the columns file and "
         "diameter; folders of gs_sdk and Taxim's dataPack.npz are read as they are",
@@ -122,7 +122,7 @@ def _read_taxim(folder: Path, diameter: float | None) -> Photographs:
     path = folder / DATA_PACK
     if diameter is None:
         raise CalibrationError(
-            "Taxim's data pack does not say how large its ball is",
+            "Taxim's data pack does not state the diameter of its ball",
             where=str(path),
             hint="Give its diameter in mm: --ball 4",
         )
@@ -199,7 +199,7 @@ def _rows(path: Path) -> list[dict[str, str]]:
         raise CalibrationError(
             f"the table has {len(rows):,} presses; at most {MOST_PRESSES:,} are read",
             where=str(path),
-            hint="Leave some out: six say all there is",
+            hint="Leave some out: six determine a sensor",
         )
     return rows
 
@@ -224,7 +224,9 @@ def _number(row: Mapping[str, Any], column: str, where: str) -> float | None:
         return _length(float(value), where, column)
     except ValueError:
         raise CalibrationError(
-            f"'{brief(value)}' under '{column}' is no number", where=where, hint="Mend the table"
+            f"'{brief(value)}' under '{column}' is no number",
+            where=where,
+            hint="Correct the table",
         ) from None
 
 

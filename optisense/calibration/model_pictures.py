@@ -83,7 +83,9 @@ def model_pictures(
 
 
 def levels_of(radiance: NDArray[np.floating], chain: PictureChain, exposure: float) -> FloatArray:
-    """Return the levels that a camera stores for radiance, (h, w, 3), 0 to 255, not rounded."""
+    """Return the levels (h, w, 3) that a camera stores for radiance (h, w, 3), mW/(mm^2 sr): 0 to
+    255, not rounded.
+    """
     return 255.0 * np.asarray(chain.curve(chain.respond(exposure * radiance)), dtype=np.float64)
 
 
@@ -91,6 +93,11 @@ def matched_exposure(
     radiance: NDArray[np.floating], chain: PictureChain, photograph: NDArray[np.uint8]
 ) -> float:
     """Return the factor on radiance whose picture is closest to a photograph, by least squares.
+
+    Args:
+        radiance: (h, w, 3) radiance, mW/(mm^2 sr).
+        chain: picture chain of the camera.
+        photograph: (h, w, 3) uint8.
 
     Raises:
         CalibrationError: the radiance is 0 everywhere.

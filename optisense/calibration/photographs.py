@@ -23,7 +23,7 @@ pixels wide, and a picture renders in about half a second.
 """
 
 LEAST_SIDE = 32
-"""Smallest shorter side of a photograph, in pixels: contacts can't be made out in smaller ones."""
+"""Smallest shorter side of a photograph, in pixels: in smaller ones, contacts have a few pixels."""
 
 FULL_LEVEL, FULL_SHARE = 255, 0.005
 """Level of a saturated channel, and the share of saturated pixels above which a picture counts as
@@ -171,8 +171,8 @@ class Photographs:
             full = float((picture.max(axis=2) >= FULL_LEVEL).mean())
             if full > FULL_SHARE:
                 found.append(
-                    f"{name}: {100 * full:.1f} % of the pixels are overexposed; they say nothing "
-                    "of how bright it was there"
+                    f"{name}: {100 * full:.1f} % of the pixels are overexposed, and do not show "
+                    "how bright the light was there"
                 )
             bright = float(np.percentile(picture.max(axis=2), BRIGHTEST))
             if bright < DARK_LEVEL:

@@ -43,7 +43,8 @@ def quantities_of(
     unknown = [name for name in families if name not in FAMILIES]
     if unknown:
         raise CalibrationError(
-            f"there is nothing called '{unknown[0]}' to fit", hint="Use " + ", ".join(FAMILIES)
+            f"there is nothing called '{unknown[0]}' that can be fitted",
+            hint="Use " + ", ".join(FAMILIES),
         )
     found: list[FitQuantity] = []
     for name in FAMILIES:
@@ -66,7 +67,7 @@ def _asked(design: SensorDesign, path: str, low: float, high: float) -> FitQuant
         )
     if not low <= value <= high or not low < high:
         raise CalibrationError(
-            f"the range {low:g} to {high:g} of '{path}' does not hold its value, {value:g}",
+            f"the range {low:g} to {high:g} of '{path}' does not contain its value, {value:g}",
             hint="Give a range about the design's value",
         )
     return FitQuantity(path, path, "", float(value), low, high, 0.25 * (high - low), renders=True)
@@ -80,7 +81,7 @@ def designed(
     Args:
         design: design of the quantities.
         chosen: quantities.
-        steps: distance of each from its start, in plausible ranges.
+        steps: (n,) distance of each from its start, in plausible ranges.
 
     Raises:
         DesignError: the numbers do not fit together.
@@ -120,7 +121,13 @@ def _prepared(design: SensorDesign, values: dict[str, float]) -> SensorDesign:
 def chain_with(
     chain: PictureChain, chosen: Sequence[FitQuantity], steps: FloatArray
 ) -> PictureChain:
-    """Return the picture chain of the fitted design, without building the design."""
+    """Return the picture chain of the fitted design, without building the design.
+
+    Args:
+        chain: picture chain of the design that the quantities are of.
+        chosen: quantities.
+        steps: (n,) distance of each from its start, in plausible ranges.
+    """
     matrix: FloatArray | None = None
     changed: dict[str, Any] = {}
     shading: dict[str, Any] = {}

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from optisense.design import SensorDesign
 
 LARGEST_POWER = 20.0
-"""Largest logarithm of the factor on a number's start, so that no trial step overflows; the limits
-of each number are far narrower.
+"""Largest logarithm of the factor on a number's start, a factor of 5e8, so that no trial step
+overflows; the limits of each number are far narrower.
 """
 
 
@@ -25,7 +25,8 @@ class FitQuantity:
         unit: unit of the number; empty if it has none.
         start: value before the fit.
         low, high: limits.
-        spread: plausible range about the start, of its logarithm if `logarithmic`.
+        plausible_range: standard deviation of the number's prior, a normal distribution about the
+            start; of its logarithm if `logarithmic`.
         logarithmic: whether it varies by factors.
         renders: whether a change needs a new rendering.
         moves_contacts: whether balls must be pressed in anew after a change, so that they touch
@@ -43,7 +44,7 @@ class FitQuantity:
     start: float
     low: float
     high: float
-    spread: float
+    plausible_range: float
     logarithmic: bool = False
     renders: bool = False
     moves_contacts: bool = False
@@ -56,10 +57,10 @@ class FitQuantity:
     def value(self, step: float) -> float:
         """Return the number at a distance of `step` plausible ranges from its start."""
         if self.logarithmic:
-            power = min(max(self.spread * step, -LARGEST_POWER), LARGEST_POWER)
+            power = min(max(self.plausible_range * step, -LARGEST_POWER), LARGEST_POWER)
             found = self.start * math.exp(power)
         else:
-            found = self.start + self.spread * step
+            found = self.start + self.plausible_range * step
         return min(max(found, self.low), self.high)
 
     def limits(self) -> tuple[float, float]:
@@ -69,9 +70,9 @@ class FitQuantity:
 
     def _step(self, value: float) -> float:
         if not self.logarithmic:
-            return (value - self.start) / self.spread
-        return math.log(value / self.start) / self.spread if value > 0.0 else -math.inf
+            return (value - self.start) / self.plausible_range
+        return math.log(value / self.start) / self.plausible_range if value > 0.0 else -math.inf
 
     def slope(self, step: float) -> float:
         """Return the change of the number per plausible range."""
-        return self.spread * (self.value(step) if self.logarithmic else 1.0)
+        return self.plausible_range * (self.value(step) if self.logarithmic else 1.0)

@@ -24,7 +24,9 @@ from optisense.calibration.seen_contacts import SeenContact
 FloatArray = NDArray[np.float64]
 
 RING = 1.1, 1.6
-"""Inner and outer edge of the ring, in radii of the contact."""
+"""Inner and outer edge of the ring, in radii of the contact: the inner edge leaves out the
+contact's own edge, which labels give to a tenth, and an elastic skin is steepest inside the outer
+one."""
 
 PATCH = 1.35
 """Radius of the patch over which the unexplained energy and the similarity are measured, in radii
@@ -32,7 +34,8 @@ of the contact: it contains the contact and the steepest part of the skin around
 """
 
 FAR = 3.0
-"""Distance beyond which a press should change nothing, in radii of the contact."""
+"""Distance beyond which a press should change nothing, in radii of the contact: well outside the
+ring, where the skin is pulled in."""
 
 SIMILARITY_WINDOW = 0.2
 """Standard deviation of the similarity's window, in radii of the contact: about six pixels of a
@@ -46,9 +49,9 @@ LEVELS = 255.0
 SIMILARITY_CONSTANTS = (0.01 * LEVELS) ** 2, (0.03 * LEVELS) ** 2
 """Constants that keep the similarity finite in dark and uniform places (Wang et al. 2004)."""
 
-
 NOISE_SEED = 0
-"""Seed of the noise with which the similarity of a model without errors is computed."""
+"""Seed of the noise with which the similarity of a model without errors is computed, so that the
+same photographs give the same figures."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ class PressRealism:
 
 
 @dataclass(frozen=True)
-class ReadBothWays:
+class CrossReading:
     """Readings of one contact by readers that were calibrated on the other's pictures.
 
     Attributes:
@@ -158,7 +161,7 @@ class Realism:
     background: BackgroundRealism
     presses: tuple[PressRealism, ...]
     exposure: float
-    readings: tuple[ReadBothWays, ...] = ()
+    readings: tuple[CrossReading, ...] = ()
 
     def median(self, name: str) -> float:
         """Return the median over the presses of one of their figures."""
@@ -255,7 +258,9 @@ def _noise_figures(real: FloatArray, seen: SeenContact, noise: float) -> NoiseFi
 
 
 def distances(shape: tuple[int, ...], seen: SeenContact) -> FloatArray:
-    """Return the distances (h, w) of pixels from the contact's middle, in its radii."""
+    """Return the distances (h, w) of the pixels of a picture of a shape (h, w) from the contact's
+    middle, in its radii.
+    """
     rows, columns = np.mgrid[: shape[0], : shape[1]] + 0.5
     found = np.hypot(columns - seen.centre[0], rows - seen.centre[1])
     return np.asarray(found / max(seen.radius, 1e-9))

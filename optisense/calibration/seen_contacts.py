@@ -29,7 +29,8 @@ the skin's pressure is computed resolves contacts to about 1 %.
 """
 
 DOUBTFUL = 0.5
-"""Asymmetry from which on the difference of a photograph does not look like that of a ball."""
+"""Asymmetry (`FoundContact.asymmetry`) from which on the difference of a photograph does not look
+like that of a ball, for which it is 0.05 to 0.2; it is about 1 where there is no contact."""
 
 LABEL_OFF = 0.6
 """Distance of a label's centre from that of the detected contact, in radii, and relative difference
@@ -89,10 +90,13 @@ def doubts(photographs: Photographs) -> list[str]:
             other = find_another(press.picture, photographs.background, wide)
             twice += other is not None and other.asymmetry < DOUBTFUL
         if seen is None:
-            found.append(f"{press.name}: no contact is to be seen; it is left out")
+            found.append(f"{press.name}: it shows no contact and is left out")
             continue
         if seen.asymmetry > DOUBTFUL:
-            found.append(f"{press.name}: what is to be seen does not look like a ball")
+            found.append(
+                f"{press.name}: its difference from the background does not look like the contact "
+                "of a ball"
+            )
         if press.centre is not None:
             off = math.dist(press.centre, seen.centre)
             if off > LABEL_OFF * max(seen.radius, press.radius or 0.0):
@@ -104,8 +108,8 @@ def doubts(photographs: Photographs) -> list[str]:
         labelled = seen.radius if press.radius is None else press.radius
         if not 1.0 / (1.0 + LABEL_OFF) < labelled / max(seen.radius, 1e-9) < 1.0 + LABEL_OFF:
             found.append(
-                f"{press.name}: its label says a radius of {labelled:.0f} pixels, and the "
-                f"picture shows {seen.radius:.0f}"
+                f"{press.name}: its label has a radius of {labelled:.0f} pixels, and the contact "
+                f"in the picture one of {seen.radius:.0f}"
             )
     common = _common_place(denied)
     if 2 * twice > len(photographs.presses):

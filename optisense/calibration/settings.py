@@ -23,7 +23,7 @@ only.
 
 HELD_OUT = 3
 """Interval of held-out presses: every third press is held out and only evaluated, if there are at
-least as many.
+least as many. Of the recommended six presses, four are then fitted.
 """
 
 
@@ -56,7 +56,7 @@ class CalibrationSettings:
         return self.photons if last else max(round(EARLIER_PHOTONS * self.photons), 1)
 
     def indices_held_out(self, photographs: Photographs) -> list[int]:
-        """Indices of the presses that are held out.
+        """Return the indices of the presses that are held out.
 
         Raises:
             CalibrationError: there is no press of a name.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 MEDIAN_SQUARE = 0.455
-"""Median of the square of a normally distributed number of variance 1."""
+"""Median of the square of a normally distributed number of variance 1 (0.6745 squared)."""
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,10 @@ def photograph_model(
     """
     for contact in contacts:
         if not isinstance(contact.indenter, Sphere):
-            raise CalibrationError("only balls are photographed", hint="Press a Sphere")
+            raise CalibrationError(
+                "only contacts of balls can be photographed for a calibration",
+                hint="Press a Sphere",
+            )
     blank = model.render(resolution=resolution, photons=photons, seed=seed, partial=False)
     factor = blank.auto_exposure() if exposure is None else exposure
     rng = np.random.default_rng([seed, 17])

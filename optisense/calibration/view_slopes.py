@@ -39,7 +39,8 @@ def view_changes(
     before: CoveredView,
     after: CoveredView,
 ) -> list[NDArray[np.float32]]:
-    """Return the changes of the layers of the background and of each press by a change of the view.
+    """Return the changes (groups, h, w, 3) of the layers of the background and of each press by a
+    change of the view.
 
     Contacts stay where the photographs show them. A contact of the same radius in pixels covers
     more of the skin if a pixel does, and the tilts of a ball's surface grow in proportion: so does

@@ -69,7 +69,7 @@ def hidden_steps(chosen: list) -> np.ndarray:  # type: ignore[type-arg]
     for each in chosen:
         value = HIDDEN.get(each.path, each.start)
         off = np.log(value / each.start) if each.logarithmic else value - each.start
-        found.append(off / each.spread)
+        found.append(off / each.plausible_range)
     return np.array(found)
 
 
@@ -110,7 +110,7 @@ def test_a_number_leaves_its_limit_where_the_photographs_ask_for_it(
     chosen = quantities_of(ots.load("gelsight-mini-ideal"), ["shading"])
     still, start = np.zeros((len(seen), 3)), np.zeros(len(chosen))
     truth, stuck = start.copy(), start.copy()
-    truth[0], stuck[0] = (0.6 - 0.2) / chosen[0].spread, chosen[0].limits()[1]
+    truth[0], stuck[0] = (0.6 - 0.2) / chosen[0].plausible_range, chosen[0].limits()[1]
     made = LayeredFit(photographs, seen, layers, chosen, 250.0, start, {})
     pictures = [np.round(levels).astype(np.uint8) for levels in made.pictures(truth, still)]
     presses = [
@@ -168,7 +168,7 @@ def test_fitted_numbers_become_a_design() -> None:
     ("families", "asked", "words"),
     [
         (["colors"], [], "nothing called 'colors'"),
-        ([], [("camera.fov", 60.0, 70.0)], "does not hold its value"),
+        ([], [("camera.fov", 60.0, 70.0)], "does not contain its value"),
         (["view"], [("camera.fov", 20.0, 70.0)], "fitted twice"),
         ([], [("camera.projection", 0.0, 1.0)], "is no number"),
     ],
@@ -181,10 +181,10 @@ def test_what_makes_no_sense_is_refused(
 
 
 def test_too_few_photographs_are_refused_before_the_work(photographs: Photographs) -> None:
-    with pytest.raises(CalibrationError, match="1 press can't tell"):
+    with pytest.raises(CalibrationError, match="1 press can't determine"):
         calibrate(ots.load("gelsight-mini-ideal"), photographs.subset([0]))
     others = CalibrationSettings(held_out=("press-01.png", "press-02.png"))
-    with pytest.raises(CalibrationError, match="1 press can't tell"):
+    with pytest.raises(CalibrationError, match="1 press can't determine"):
         calibrate(ots.load("gelsight-mini-ideal"), photographs, others)
     misspelt = CalibrationSettings(held_out=("press-1.png",))
     with pytest.raises(CalibrationError, match=r"no press 'press-1\.png'") as raised:

@@ -19,7 +19,7 @@ def changed(design: SensorDesign, family: str, word: str, value: float) -> Senso
     """The design with one number of a family, found by a word of its description."""
     each = next(q for q in quantities_of(design, [family]) if word in q.words)
     step = np.log(value / each.start) if each.logarithmic else value - each.start
-    return designed(design, [each], np.array([step / each.spread]))
+    return designed(design, [each], np.array([step / each.plausible_range]))
 
 
 @pytest.mark.parametrize(
@@ -132,4 +132,4 @@ def test_edges_that_were_fitted_are_fitted_again() -> None:
     (edges,) = quantities_of(gelsight_mini(), ["edges"])
     assert 0.1 < edges.start < 0.2
     (again,) = quantities_of(designed(gelsight_mini(), [edges], np.ones(1)), ["edges"])
-    assert again.start == pytest.approx(edges.start + edges.spread)
+    assert again.start == pytest.approx(edges.start + edges.plausible_range)

@@ -82,7 +82,7 @@ def test_taxims_data_pack_is_stored_blue_first(tmp_path: Path) -> None:
     assert (found.presses[1].picture == picture(2)).all()
     assert found.presses[1].centre == (25.5, 22.5)
     assert read_photographs(tmp_path / "dataPack.npz", 4.0).presses[0].radius == 8.0
-    with pytest.raises(CalibrationError, match="how large its ball is") as raised:
+    with pytest.raises(CalibrationError, match="does not state the diameter") as raised:
         read_photographs(tmp_path)
     assert "--ball" in (raised.value.hint or "")
 
@@ -117,7 +117,7 @@ def test_a_folder_needs_a_background_of_the_same_size(tmp_path: Path) -> None:
     Image.fromarray(picture(0, (WIDTH, HEIGHT + 2))).save(folder / "background.png")
     with pytest.raises(CalibrationError, match="64 x 48 pixels and the background 64 x 50"):
         read_photographs(folder)
-    with pytest.raises(CalibrationError, match="tells of no presses"):
+    with pytest.raises(CalibrationError, match="has no table of presses"):
         read_photographs(tmp_path)
 
 

@@ -35,7 +35,7 @@ def seen_from(change: tuple[float, float, float]) -> ots.OpticalModel:
     """A model of GelSight Mini with another view."""
     design = ots.load("gelsight-mini-ideal")
     chosen = quantities_of(design, ["view", "place"])
-    steps = np.array([off / each.spread for off, each in zip(change, chosen, strict=True)])
+    steps = np.array([off / each.plausible_range for off, each in zip(change, chosen, strict=True)])
     return ots.OpticalModel(designed(design, chosen, steps))
 
 

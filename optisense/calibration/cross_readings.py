@@ -1,4 +1,4 @@
-"""Readers calibrated on a model and applied to photographs, and the reverse.
+"""Cross-readings: a reader that is calibrated on a model reads photographs, and the reverse.
 
 The reader is a polynomial of degree two of the changes of R, G and B and of the place in the
 picture, fitted by ridge regression (Hoerl and Kennard 1970) to the contacts of the presses, where
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.realism import ReadBothWays, Realism, distances, realism
+from optisense.calibration.realism import CrossReading, Realism, distances, realism
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.geometry import Sphere
 from optisense.reading.lookup import Pixels, tilts_to_normals
@@ -40,10 +40,11 @@ labels and detected positions are off by a tenth.
 """
 
 FLATTEST = 100.0
-"""Largest ratio of a read radius to the true one; a reader that sees no curvature reads it."""
+"""Largest ratio of a read radius to the true one, which stands for a flat contact: a reader that
+sees no curvature reads it."""
 
 FEWEST = 3
-"""Smallest number of presses from which a reader can be calibrated; fewer don't represent other
+"""Smallest number of presses from which a reader can be calibrated; fewer do not represent other
 places.
 """
 
@@ -63,7 +64,8 @@ coefficients of channels without light finite: with 0.1 and 100 errors are withi
 """
 
 NOISE_SEED = 0
-"""Seed of the noise that is added to the model's pictures."""
+"""Seed of the noise that is added to the model's pictures, so that the same pictures give the same
+figures."""
 
 
 @dataclass(frozen=True)
@@ -103,18 +105,18 @@ def realism_and_readings(
     # Far from a contact, a response is the noise of two photographs.
     noise = found.median("far_real") / np.sqrt(2.0)
     rays, axes = model.chief_rays(photographs.size), model.design.camera.axes()
-    readings = read_both_ways(photographs, seen, pictures, rays, axes, float(noise))
+    readings = cross_readings(photographs, seen, pictures, rays, axes, float(noise))
     return replace(found, readings=readings)
 
 
-def read_both_ways(
+def cross_readings(
     photographs: Photographs,
     seen: Sequence[SeenContact],
     pictures: ModelPictures,
     rays: ChiefRays,
     axes: FloatArray,
     noise: float,
-) -> tuple[ReadBothWays, ...]:
+) -> tuple[CrossReading, ...]:
     """Calibrate a reader on the model and one on the photographs, and read the other's contacts.
 
     Noise of the photographs is added to the model's pictures, because a reader that knows no noise
@@ -159,7 +161,7 @@ def read_both_ways(
         if len(balls) >= FEWEST_ALONE:
             others = _Reader(real[:index] + real[index + 1 :], balls[:index] + balls[index + 1 :])
             alone = _judged(others.normals(real[index]), ball)
-        found.append(ReadBothWays(press.name, *forth, *back, *alone))
+        found.append(CrossReading(press.name, *forth, *back, *alone))
     return tuple(found)
 
 
