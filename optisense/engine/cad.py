@@ -13,6 +13,7 @@ from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
+from optisense.near import suggestion
 from optisense.sensors.registry import save_design
 
 AnyUnits = Literal["mm", "cm", "m", "inch", "um", "mil"]
@@ -80,7 +81,11 @@ def from_cad(session: Session, fields: FromCad, job: Job) -> dict[str, Any]:
     }
     unknown = sorted(set(uses) - {each.name for each in bodies})
     if unknown:
-        raise ProtocolError(f"no body is called '{unknown[0]}'", where="uses")
+        raise ProtocolError(
+            f"the files have no body '{unknown[0]}'",
+            where="uses",
+            hint=suggestion(unknown[0], [each.name for each in bodies], limit=20),
+        )
     source = Path(fields.files[0])
     recipe = recipe_of(
         bodies, source if len(fields.files) == 1 else source.parent, fields.units, uses

@@ -16,9 +16,9 @@ from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact_text import parse_contact
 from optisense.geometry.indenter_kinds import indenter_from_plain
 
-ROUNDED = 1e-3
-"""Tolerance, mm, for the distance between a point that a pixel sees and the mesh; it covers
-rounding to float32.
+FLOAT32_TOLERANCE = 1e-3
+"""Tolerance, mm, for the distance between a point that a pixel sees and the mesh: far above the
+rounding of 30 mm to float32 (2e-6 mm), and far below a pixel.
 """
 
 FloatArray = NDArray[np.float32] | NDArray[np.float64]
@@ -114,7 +114,10 @@ def unseen(
     seen = points[touched]
     found = []
     for number, mesh in enumerate(placed):
-        lower, upper = mesh.vertices.min(axis=0) - ROUNDED, mesh.vertices.max(axis=0) + ROUNDED
+        lower, upper = (
+            mesh.vertices.min(axis=0) - FLOAT32_TOLERANCE,
+            mesh.vertices.max(axis=0) + FLOAT32_TOLERANCE,
+        )
         if not ((seen >= lower) & (seen <= upper)).all(axis=1).any():
             found.append(number)
     return found

@@ -34,8 +34,8 @@ from optisense.near import suggestion
 from optisense.sensors.registry import SENSORS
 
 SAME_PLACE = 1e-6
-"""Largest distance, mm, between a cage's point and its place at rest that counts as rest; a margin
-for rounding.
+"""Largest distance, mm, between a vertex of a bent part and its place at rest that counts as rest:
+the rounding of coordinates in float32.
 """
 
 Resolution = tuple[int, int, int]
@@ -245,4 +245,5 @@ def _check_count(design: SensorDesign, fields: ChangeCage, name: str) -> None:
         raise ProtocolError(
             f"{name} has {len(given)} points, the cage {int(np.prod(known.resolution))}",
             where=name,
+            hint="Give one point for each control point of the cage",
         )

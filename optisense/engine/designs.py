@@ -28,12 +28,13 @@ from optisense.untrusted_files import inside as inside_folder
 from optisense.untrusted_files import is_file, is_folder
 
 MOST_MESHES = 200
-"""Largest number of mesh files that are kept; the one not used for longest is dropped first.
+"""Largest number of mesh files that are kept: those of some twenty designs. The one
+not used for longest is dropped first.
 """
 
 MOST_FOLDERS = 20
-"""Largest number of folders of designs that are kept; the one not used for longest is dropped
-first.
+"""Largest number of folders of designs that are kept, more than a user goes back and forth between;
+the one not used for longest is dropped first.
 """
 
 Stamp = tuple[str, int, int]
@@ -97,7 +98,9 @@ class Designs:
             design = self._named(given)
         elif given.data is not None:
             if given.source is not None:
-                raise ProtocolError("a design has both 'from' and 'data'", where="design")
+                raise ProtocolError(
+                    "a design has both 'from' and 'data'", where="design", hint="Give one of them"
+                )
             design = self._from_data(given.data, given.folder, meshes or {})
         elif given.source is not None:
             design = self._named(given.source)
@@ -275,11 +278,17 @@ def _inside(folder: Path | None, relative: str, where: str) -> Path:
     """
     if folder is None:
         raise DesignError(
-            f"'{relative}' is in no folder", where=where, hint="Name the design's folder"
+            f"the file '{relative}' can't be found, as the design has no folder",
+            where=where,
+            hint="Name the design's folder",
         )
     path = inside_folder(folder, relative)
     if path is None:
-        raise DesignError(f"'{brief(relative)}' leads out of the design folder", where=where)
+        raise DesignError(
+            f"'{brief(relative)}' leads out of the design folder",
+            where=where,
+            hint="Put the file into the folder of the design",
+        )
     if not is_file(path):
         raise DesignError(f"there is no file '{brief(relative)}' in the design folder", where=where,
                           hint=f"The folder is {folder}")  # fmt: skip

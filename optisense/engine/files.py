@@ -36,7 +36,7 @@ class Files:
             )
         if name != Path(name).name or name in ("", ".", "..") or not name.isprintable():
             raise OutputError(
-                f"'{brief(name)}' can't begin the name of a file",
+                f"'{brief(name)}' can't be the beginning of a file's name",
                 hint="Use letters, digits, '-' and '_'",
             )
         if len(name.encode("utf-8", "replace")) > LONGEST_NAME:
@@ -52,13 +52,13 @@ class Files:
         return self.folder / f"{self.name}.{rest}"
 
     def picture(self, rest: str, picture: NDArray[np.uint8]) -> str:
-        """Write a PNG file, and return its path."""
+        """Write a picture (h, w, 3) uint8 as a PNG file, and return its path."""
         from optisense.report.pictures import png
 
         return self._write(rest, lambda path: path.write_bytes(png(picture)))
 
     def array(self, rest: str, values: NDArray[Any]) -> str:
-        """Write a NumPy file, and return its path."""
+        """Write an array of any shape as a NumPy file, and return its path."""
         whole = np.ascontiguousarray(values)
 
         def write(path: Path) -> None:

@@ -53,7 +53,9 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
         for name in names:
             if name not in FAMILIES:
                 raise ProtocolError(
-                    f"nothing is called '{name}'", where=where, hint="Use " + ", ".join(FAMILIES)
+                    f"there is no family of numbers '{name}'",
+                    where=where,
+                    hint="Use " + ", ".join(FAMILIES),
                 )
     design = design_of(session, fields, job)
     session.designs.require_valid(design)
@@ -112,4 +114,4 @@ def _asked(text: str) -> tuple[str, float, float]:
         return read_range(text)
     except ValueError:
         hint = "Write PATH=LO:HI, such as camera.fov=45:60"
-        raise ProtocolError(f"'{text}' is no range", where="fit", hint=hint) from None
+        raise ProtocolError(f"'{text}' is no range of a number", where="fit", hint=hint) from None

@@ -20,14 +20,16 @@ if TYPE_CHECKING:
     from optisense.search.study.store import Row
 
 POLL_INTERVAL = 0.25
-"""Interval between two looks at the study, s; it is longer if a look takes long."""
+"""Interval between two readings of the study, s, short enough to seem immediate; it is longer if a
+reading takes long."""
 
 LOOKING_SHARE = 0.05
-"""Largest share of the time that looks at a study may take, so that they do not slow the search."""
+"""Largest share of the time that readings of a study may take, so that they do not slow the search
+noticeably."""
 
 MOST_AT_ONCE = 20
-"""Largest number of trials that a look reports one by one; of more, only the best and the last are
-reported.
+"""Largest number of trials that a reading reports one by one, as many as a list in a front end
+shows; of more, only the best and the last are reported.
 """
 
 

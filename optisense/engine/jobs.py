@@ -13,15 +13,17 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.protocol import RequestId
 
 EVENTS_EVERY = 0.1
-"""Shortest interval between two progress events of a request, s; a person can't follow more."""
+"""Shortest interval between two progress events of a request, s: about as fast as a person can
+follow them."""
 
 LONGEST_WAIT = 3.0
-"""Longest time that a render waits for short work at each of its safe points, s."""
+"""Longest time that a render waits for short work at each of its safe points, s: that of an import
+of a large package; other short work takes less."""
 
-GLANCE = 0.002
+PAUSE = 0.002
 """Time that a render leaves to other threads at a safe point, s, enough to read a request."""
 
-GLANCE_EVERY = 0.05
+PAUSE_EVERY = 0.05
 """Time between two such pauses at least, s; a draft has six safe points in a tenth of a second."""
 
 Send = Callable[[Mapping[str, Any]], None]
@@ -38,7 +40,7 @@ class PriorityGate:
     def __init__(self) -> None:
         """Open the gate: no short work is in progress."""
         self._count = 0
-        self._glanced = 0.0
+        self._paused = 0.0
         self._changed = threading.Condition()
 
     def __enter__(self) -> None:
@@ -54,9 +56,9 @@ class PriorityGate:
 
     def wait_for_short_jobs(self) -> None:
         """Wait until no short work is in progress, or for `LONGEST_WAIT`."""
-        if time.monotonic() - self._glanced >= GLANCE_EVERY:
-            time.sleep(GLANCE)  # the thread that reads requests may have one
-            self._glanced = time.monotonic()
+        if time.monotonic() - self._paused >= PAUSE_EVERY:
+            time.sleep(PAUSE)  # the thread that reads requests may have one
+            self._paused = time.monotonic()
         with self._changed:
             self._changed.wait_for(lambda: self._count == 0, LONGEST_WAIT)
 

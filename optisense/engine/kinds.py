@@ -71,7 +71,9 @@ class Lamp(Fields):
 def lamp(session: Session, fields: Lamp, job: Job) -> dict[str, Any]:
     """Return the drawing of a lamp: its window and its half angle."""
     if (fields.entry is None) == (fields.value is None):
-        raise ProtocolError("give either 'entry' or 'value'", where="lamp")
+        raise ProtocolError(
+            "a lamp needs either 'entry' or 'value'", where="lamp", hint="Give one of them"
+        )
     if fields.value is None:
         emitter = library.light(fields.entry or "")
     else:

@@ -23,7 +23,8 @@ PROTOCOL = 1
 """Version of the protocol; see the module's description for when it is increased."""
 
 MOST_OF_A_LINE = 64 * 1024 * 1024
-"""Largest size of a request, bytes; a longer one is an error and not read into memory."""
+"""Largest size of a request, bytes; a longer one is an error and not read into memory. Requests
+have some kilobytes, as large data are sent by files."""
 
 LONGEST_ID = 64
 """Largest number of characters of a request's id. Every answer repeats the id; a UUID has 36."""
@@ -63,7 +64,7 @@ def read_request(line: bytes) -> Request:
         text = as_text(line, "request", ProtocolError, "the line")
         data = parse_json(text, "request", ProtocolError, "the line")
         if "\\u0000" in text:  # no file name or other text here has it
-            raise ProtocolError("a text has the character NUL")
+            raise ProtocolError("a text contains the character NUL")
     except ProtocolError as error:
         raise ProtocolError(error.message, hint="Write one JSON object on each line") from None
     if not isinstance(data, dict):
@@ -71,15 +72,15 @@ def read_request(line: bytes) -> Request:
     number = data.pop("id", None)
     if not is_id(number):
         raise ProtocolError(
-            "the request has no id that can be used",
+            "the request has no valid id",
             where="id",
             hint=f"Give a whole number or a text of at most {LONGEST_ID} characters",
         )
     do = data.pop("do", None)
     if not isinstance(do, str):
         raise ProtocolError(
-            "the request does not say what to do", where="do", hint='Write "do": "simulate"',
-            request=number,
+            "the request has no field 'do' with its name", where="do",
+            hint='Write "do": "simulate"', request=number,
         )  # fmt: skip
     return Request(number, do, data)
 

@@ -39,10 +39,12 @@ DRAFT_WIDTH = 160
 """
 
 NUDGE = 1e-3
-"""Distance (mm) by which a light is moved to prepare drafts of moved lights; any other one does."""
+"""Distance (mm) by which a light is moved to prepare drafts of moved lights. Any distance above 0
+compiles the same kernels."""
 
 MOST_PLACES = 100
-"""Largest number of places of one ledger; each takes as long as the ledger."""
+"""Largest number of places of one ledger; each takes as long as the ledger, a second and more, so
+that a hundred take minutes."""
 
 LEVELS = (np.arange(256) / 255.0).astype(np.float32)
 """Levels of a picture, 256 numbers on a scale from 0 to 1."""
@@ -127,13 +129,13 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
     size = _draft_size(design)
     model.render((), size, photons="draft", progress=_progress_of(job))
     if fields.contacts:
-        job.progress(0.7, "pressing once")
+        job.progress(0.7, "preparing contacts")
         model.render(contacts_of(["sphere:1.5@0,0:0.2"]), size, photons="draft")
     if fields.drafts:
-        job.progress(0.8, "getting drafts ready")
+        job.progress(0.8, "preparing drafts")
         drafts = session.renderer.draft_model(design)
         drafts.render((), size, photons="draft")
-        job.progress(0.9, "getting drafts of moved lights ready")
+        job.progress(0.9, "preparing drafts of moved lights")
         name, group = next(iter(design.lights.items()))
         x = group.lights[0].position[0] + NUDGE
         drafts.set_design(set_value(design, f"lights.{name}.lights[0].position.x", x))

@@ -80,7 +80,7 @@ def _load() -> None:
         "placing",
         "designing",
         "cad",
-        "keeping",
+        "library_requests",
         "kinds",
         "scoring",
         "searching",

@@ -24,9 +24,9 @@ the process.
 LOG_FILE = "search.log"
 """Name of the file of the process's messages, which shows why it died."""
 
-LAST_WORDS = 2000
-"""Number of bytes at the end of the process's output that are reported when it died; a Python error
-with its cause fits.
+LOG_END = 2000
+"""Number of bytes at the end of the process's log in which the reason is looked up if it ended
+unexpectedly; a Python error with its cause fits.
 """
 
 
@@ -95,9 +95,10 @@ class SearchProcess:
         except ValueError:
             way = f"signal {-code}" if code < 0 else f"exit code {code}"
             raise SearchError(
-                f"the search's process has died ({way}); its finished trials are kept",
+                f"the process of the search has ended unexpectedly ({way}); its finished trials "
+                "are kept",
                 where=str(self.folder),
-                hint=_last_words(self.folder / LOG_FILE),
+                hint=_last_line(self.folder / LOG_FILE),
             ) from None
         if "error" in outcome:
             raise _error_of(outcome["error"])
@@ -139,10 +140,10 @@ def _error_of(data: dict[str, Any]) -> OptiSenseError:
     return made
 
 
-def _last_words(log: Path) -> str | None:
+def _last_line(log: Path) -> str | None:
     """Return the last line of a log, or None."""
     try:
-        text = log.read_bytes()[-LAST_WORDS:].decode("utf-8", "replace").strip()
+        text = log.read_bytes()[-LOG_END:].decode("utf-8", "replace").strip()
     except OSError:
         return None
     return text.splitlines()[-1] if text else None

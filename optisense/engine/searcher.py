@@ -25,9 +25,9 @@ from optisense.engine.failures import as_data
 from optisense.engine.search_process import PROCESS_FILE
 from optisense.errors import OptiSenseError
 
-PATIENCE = 20.0
+GRACE_PERIOD = 20.0
 """Time after the end of the engine until the search drops its trial, s; after the same time again
-the process exits.
+the process exits. Most trials take a few seconds and are finished before.
 """
 
 NICENESS = 5
@@ -107,9 +107,9 @@ def _listen(go_on: bool, working: threading.Event) -> None:
         return
     if not asked:
         _thread.interrupt_main()
-    time.sleep(PATIENCE)
+    time.sleep(GRACE_PERIOD)
     _thread.interrupt_main()
-    time.sleep(PATIENCE)
+    time.sleep(GRACE_PERIOD)
     os._exit(1)
 
 

@@ -235,7 +235,9 @@ def _absolute(folder: str) -> Path:
     path = Path(folder)
     if not path.is_absolute():
         raise ProtocolError(
-            f"the study '{folder}' has no absolute path", where="study", hint="Give it whole"
+            f"the path of the study '{folder}' is not absolute",
+            where="study",
+            hint="Give the absolute path of its folder",
         )
     return path
 

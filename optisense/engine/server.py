@@ -33,8 +33,9 @@ from optisense.engine.session import Session
 from optisense.errors import OptiSenseError, OutputError
 from optisense.untrusted_files import is_folder
 
-FAREWELL = 3.0
-"""Longest time that the engine waits at its end, s, for answers to the requests in progress.
+SHUTDOWN_WAIT = 3.0
+"""Longest time that the engine waits at its end, s, for answers to the requests in progress: more
+than the time between two safe points of a render, and short enough for a user who closes a window.
 """
 
 AT_ONCE = ("hello", "cancel", "shutdown")
@@ -117,7 +118,8 @@ class Engine:
             return
         if self.session.folder is None:
             raise ProtocolError(
-                f"'{request.do}' came before 'hello'", hint="Say hello first, and wait for it"
+                f"'{request.do}' came before 'hello'",
+                hint="Send the request 'hello' first, and wait for its answer",
             )
         if request.do == "cancel":
             self._cancel(request)
@@ -164,7 +166,9 @@ class Engine:
         folder = Path(fields.folder)
         if not folder.is_absolute() or not is_folder(folder):
             error = OutputError(
-                "there is no such folder", where=fields.folder, hint="Make it first; give it whole"
+                "there is no such folder",
+                where=fields.folder,
+                hint="Make the folder first, and give its absolute path",
             )
             self._channel.send(refusal(request.id, as_data(error)))
             return
@@ -196,9 +200,9 @@ class Engine:
         self._channel.send(answer(request.id, {}))
 
     def _give_up_all(self) -> None:
-        """Cancel all open requests, and wait `FAREWELL` seconds for their answers."""
+        """Cancel all open requests, and wait `SHUTDOWN_WAIT` seconds for their answers."""
         self._cancel_all()
-        until = time.monotonic() + FAREWELL
+        until = time.monotonic() + SHUTDOWN_WAIT
         with self._changed:
             while self._open and (left := until - time.monotonic()) > 0:
                 self._changed.wait(left)
@@ -252,7 +256,7 @@ class _Work:
         """Answer the request without carrying it out."""
         error = as_data(Cancelled())
         if kind == "Replaced":
-            error |= {"kind": kind, "message": "a newer draft took its place"}
+            error |= {"kind": kind, "message": "a newer draft has replaced the request"}
         self._refuse(error)
 
     def _refuse(self, error: dict[str, Any]) -> None:

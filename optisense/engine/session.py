@@ -29,7 +29,7 @@ MOST_IMAGES = 6
 with three light groups takes some 30 MB.
 """
 DRAFTS = 1
-"""Number of drafts that are kept for one design; only the last one is shown."""
+"""Number of drafts that are kept for one design: one, as only the last one is shown."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from optisense.library.own_parts import write_own
 from optisense.library.reading import files_of, make_entry
 
 BALL_PIXELS = 160
-"""Width and height of the picture of a single ball, in pixels."""
+"""Width and height of the picture of a single ball, in pixels: that of an icon in a front end,
+drawn in a third of a second."""
 
 
 class KindFields(Fields):
@@ -82,7 +83,9 @@ def preview(session: Session, fields: Preview, job: Job) -> dict[str, Any]:
 
     files = session.files(fields, job.id)
     if (fields.entry is None) == (fields.value is None):
-        raise ProtocolError("give either 'entry' or 'value'", where="preview")
+        raise ProtocolError(
+            "a preview needs either 'entry' or 'value'", where="preview", hint="Give one of them"
+        )
     if fields.entry is not None:
         name, drawn = fields.entry, library.entry(fields.kind, fields.entry)
     else:
@@ -93,7 +96,7 @@ def preview(session: Session, fields: Preview, job: Job) -> dict[str, Any]:
         singular = kind_named(fields.kind)
         if singular not in ("material", "coating"):
             raise ProtocolError(
-                f"there is no ball of a {singular}",
+                f"a {singular} can't be drawn as a ball",
                 where="ball",
                 hint="Only materials and coatings are drawn as balls",
             )
