@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from optisense.calibration.realism import Realism
     from optisense.calibration.result import Calibration
     from optisense.calibration.settings import CalibrationSettings
-    from optisense.calibration.staging import photograph_model, save_photographs
+    from optisense.calibration.synthetic_photographs import photograph_model, save_photographs
 
 _HOMES = {
     "Calibration": ".result",
@@ -28,9 +28,9 @@ _HOMES = {
     "Realism": ".realism",
     "calibrate": ".calibrating",
     "compare": ".comparing",
-    "photograph_model": ".staging",
+    "photograph_model": ".synthetic_photographs",
     "read_photographs": ".layouts",
-    "save_photographs": ".staging",
+    "save_photographs": ".synthetic_photographs",
 }
 
 __all__ = [

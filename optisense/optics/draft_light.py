@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.model import Sight
+from optisense.optics.model import ContactView
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CELL_SIZE, VIEW_MARGIN, CacheStore
 from optisense.optics.scene.emitters import emitter_table
@@ -43,7 +43,7 @@ class KeptView:
     without the windows of the lights that move.
     """
 
-    sight: Sight
+    view: ContactView
     unlit: tuple[list[Piece], RayScene] | None = None
 
     def lit_by(self, moved: frozenset[int], scenes: SensorScenes) -> LitScene:

@@ -23,7 +23,7 @@ from optisense.mechanics import ELASTIC
 from optisense.optics._carried_contacts import PressedContacts
 from optisense.optics.draft_light import DraftCacheStore, KeptView
 from optisense.optics.imaging.tactile_image import TactileImage
-from optisense.optics.model import OpticalModel, Sight
+from optisense.optics.model import ContactView, OpticalModel
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.ray_model import RayModel
 from optisense.optics.scene.assembly import assemble
@@ -99,7 +99,7 @@ class DraftModel(OpticalModel):
         self._kept: KeptView | None = None
         self._faint: dict[str, NDArray[np.float32]] = {}
         """The faint light (`KnownView.faint`) of each group that drafts reuse."""
-        self._last_sight: Sight | None = None
+        self._last_view: ContactView | None = None
         self._pressed: PressedContacts | None = None
         """The contacts that were pressed in last."""
         self._shown: _Shown | None = None
@@ -141,7 +141,7 @@ class DraftModel(OpticalModel):
         if moved != self._moved and self._caches is not None:  # of other light groups
             self._before, self._caches = self._draft_store, None
         self._moved = moved
-        self._last_sight = None if self._kept is None else self._kept.sight
+        self._last_view = None if self._kept is None else self._kept.view
         if moved is None:
             self._kept = None
         if before is None or not _same_picture(before.design, self.design) or still:
@@ -149,8 +149,8 @@ class DraftModel(OpticalModel):
         elif "photons" in kwargs:
             kwargs["photons"] = round(DRAG_PHOTONS * photons_of(kwargs["photons"]))
         image = super().render(contacts, *args, **kwargs)
-        if not self._faint and self._kept is not None and self._kept.sight.known.faint is not None:
-            self._faint = dict(zip(self.groups, self._kept.sight.known.faint, strict=True))
+        if not self._faint and self._kept is not None and self._kept.view.known.faint is not None:
+            self._faint = dict(zip(self.groups, self._kept.view.known.faint, strict=True))
         kept: list[str] = []
         if before is not None and moved is not None:
             kept = [name for k, name in enumerate(self.groups) if k not in moved]
@@ -169,30 +169,30 @@ class DraftModel(OpticalModel):
         names = self.groups
         return names if self._moved is None else [names[k] for k in sorted(self._moved)]
 
-    def _sight(
+    def _contact_view(
         self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
-    ) -> Sight:
+    ) -> ContactView:
         if self._moved is None or self._kept is None:
-            sight = self._carried_sight(contacts, resolution, skin)
-            self._kept = KeptView(sight or super()._sight(contacts, resolution, skin))
-            if sight is None:
+            view = self._carried_view(contacts, resolution, skin)
+            self._kept = KeptView(view or super()._contact_view(contacts, resolution, skin))
+            if view is None:
                 self._pressed = PressedContacts(tuple(contacts), self.sensing)
-        known = self._kept.sight.known
+        known = self._kept.view.known
         known.faint = None
         if self._faint:
             known.faint = np.stack([self._faint[name] for name in self._traced_groups])
-        return self._kept.sight
+        return self._kept.view
 
-    def _carried_sight(
+    def _carried_view(
         self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
-    ) -> Sight | None:
-        """Return the sight with the skin as the contacts deformed it in an earlier draft, moved
+    ) -> ContactView | None:
+        """Return the view with the skin as the contacts deformed it in an earlier draft, moved
         along with a cage by little; None if there is none.
         """
-        if not self._faint or self._last_sight is None or self._pressed is None or skin != ELASTIC:
+        if not self._faint or self._last_view is None or self._pressed is None or skin != ELASTIC:
             return None
         old, now = self._pressed.skin, self.sensing
-        last, pressed = self._last_sight, self._last_sight.pressed
+        last, pressed = self._last_view, self._last_view.pressed
         mesh = last.skin
         if pressed is None or mesh is None or mesh.origin is None or not same_faces(old, now):
             return None
@@ -204,7 +204,7 @@ class DraftModel(OpticalModel):
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)
-        return Sight(camera, last.placed, pressed, scenes, rays, mesh)
+        return ContactView(camera, last.placed, pressed, scenes, rays, mesh)
 
     def _are_same(self, contacts: tuple[Contact, ...]) -> bool:
         """Return whether contacts are those of the last draft, perhaps carried by a skin that was

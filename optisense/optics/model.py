@@ -71,7 +71,7 @@ class RenderProgress:
 
 
 @dataclass(frozen=True)
-class Sight:
+class ContactView:
     """What the camera sees of a sensor with contacts, before its light is known.
 
     Attributes:
@@ -222,9 +222,9 @@ class OpticalModel(RayModel):
                 )
 
         on_stage(Stage.PREPARING, 0.0, 0, None)
-        sight = self._sight(contacts, resolution, skin)
-        camera, rays, scenes = sight.camera, sight.rays, sight.scenes
-        placed, pressed = sight.placed, sight.pressed
+        view = self._contact_view(contacts, resolution, skin)
+        camera, rays, scenes = view.camera, view.rays, view.scenes
+        placed, pressed = view.placed, view.pressed
         built = time.perf_counter()
 
         if estimator == SPPM:
@@ -248,7 +248,7 @@ class OpticalModel(RayModel):
                 store.emitters,
                 seed,
                 SamplingPlan(only_contacts, pixel_importance, self.is_draft),
-                sight.known if self.is_draft else None,
+                view.known if self.is_draft else None,
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()
@@ -300,9 +300,9 @@ class OpticalModel(RayModel):
         }
         return image
 
-    def _sight(
+    def _contact_view(
         self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
-    ) -> Sight:
+    ) -> ContactView:
         """Press the contacts, and trace the chief rays of an image; see `render`."""
         camera = self.camera(resolution)
         placed = [self.place(contact) for contact in contacts]
@@ -316,7 +316,7 @@ class OpticalModel(RayModel):
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)
-        return Sight(camera, placed, pressed, scenes, rays, mesh)
+        return ContactView(camera, placed, pressed, scenes, rays, mesh)
 
     @property
     def _traced_groups(self) -> list[str]:
