@@ -135,5 +135,5 @@ def test_a_mesh_without_a_face_is_told(mini: Any, select: Callable[..., None]) -
             bpy.ops.optisense.set_reference(reference=reference)
     bpy.ops.optisense.set_reference(reference="light")
     select(empty)
-    with pytest.raises(RuntimeError, match="empty mesh"):
+    with pytest.raises(RuntimeError, match="has no vertices"):
         bpy.ops.optisense.add_light(model="smd-3528", group="NEW", name="side")
