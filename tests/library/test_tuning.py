@@ -97,7 +97,7 @@ def without(key: str, **changes: Any) -> dict[str, Any]:
         ("[1, 2]", "no section whose name begins with 'rpi.'"),
         ('{"black_level": 3}', "no section"),
         ('{"rpi.black_level": {"black_level": NaN}}', "NaN is no number"),
-        ('{"rpi.agc": {}}', "tells nothing"),
+        ('{"rpi.agc": {}}', "has no data on"),
         ({"rpi.noise": {"reference_slope": 3}}, "'rpi.noise' is not as in a tuning file"),
         ({"rpi.noise": {"reference_slope": 0, "reference_constant": 0}}, "slope of 0"),
         ({"rpi.black_level": []}, "'rpi.black_level' is not as in"),
@@ -180,7 +180,7 @@ def test_a_focus_distance_gives_the_depth_of_field_of_the_lens() -> None:
     assert design.provenance["camera.noise"].source.startswith("rpi.noise")
     with pytest.raises(LibraryError, match="the f-number of camera 'pi-hq-6mm' is not known"):
         library.with_imaging(mini, "pi-hq-6mm", focus_distance=20.0)
-    with pytest.raises(LibraryError, match="knows no distortion, shading"):
+    with pytest.raises(LibraryError, match="no data on distortion, shading"):
         library.with_imaging(mini, "ovm7692")
 
 

@@ -90,7 +90,7 @@ def test_a_broken_library_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 @pytest.mark.parametrize(
     ("name", "complaint"),
-    [("missing.so", "no libLLVM"), ("text.so", "no libLLVM"), ("libLLVM-15.so", "too old")],
+    [("missing.so", "not a libLLVM"), ("text.so", "not a libLLVM"), ("libLLVM-15.so", "too old")],
 )
 def test_a_bad_path_from_the_user_is_an_error(
     name: str, complaint: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

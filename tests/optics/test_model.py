@@ -228,7 +228,7 @@ def test_ground_truth_of_a_ball_is_a_sphere(skin: str, square_of_radius: float) 
 
 
 def test_an_unknown_skin_is_refused() -> None:
-    with pytest.raises(RenderError, match="no skin 'rubber'"):
+    with pytest.raises(RenderError, match="no kind of skin 'rubber'"):
         model().render([BALL], resolution=PIXELS, photons=PHOTONS, skin="rubber")
 
 

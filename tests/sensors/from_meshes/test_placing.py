@@ -104,7 +104,7 @@ class TestOver:
 
     def test_a_surface_that_looks_everywhere_is_refused(self) -> None:
         shape = LightsOver(file="b.stl", count=3)
-        with pytest.raises(DesignError, match="to all sides"):
+        with pytest.raises(DesignError, match="faces all sides"):
             over(shape, self.board, pick(self.board, shape, "lights"), "lights")
 
 
