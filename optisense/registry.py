@@ -145,7 +145,7 @@ class Registry(Generic[T]):
             raise self._error(
                 f"the {self.noun} '{point.name}' can't be loaded: {type(error).__name__}: {error}",
                 where=f"{point.value}, of {package}",
-                hint="Repair or remove the package that brings it",
+                hint="Repair or remove the package that contains it",
             ) from error
         if point.name in self._registered:  # the import of its module has registered it
             return self._registered[point.name]

@@ -320,5 +320,5 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(found) < len(pairs):
         names = [name for name, _ in pairs]
         twice = next(name for name in found if names.count(name) > 1)
-        raise ValueError(f"'{twice[:40]}' is there twice")
+        raise ValueError(f"'{twice[:40]}' appears twice")
     return found

@@ -1,7 +1,8 @@
-"""The tables and figures of the OptiSense paper, made again, each by one command.
+"""Experiments that reproduce the tables and figures of the OptiSense paper, each by one command.
 
-An experiment asks units (single evaluations, each kept in a file of its own), makes numbers of what
-they find, and holds these against the paper's statements. Settings are in a YAML file beside each.
+An experiment consists of units (single evaluations, each kept in a file of its own). It computes
+numbers from their results and compares them with the paper's statements. The settings of each
+experiment are in a YAML file beside its module.
 """
 
 from paper.bench import Bench

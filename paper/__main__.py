@@ -1,4 +1,4 @@
-"""``python -m paper``: the paper's tables and figures, made again."""
+"""Command ``python -m paper``, which reproduces the tables and figures of the OptiSense paper."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from optisense.time_left import TimedStep, TimeLeft
 
 if TYPE_CHECKING:
     from paper import Experiment
-    from paper.bench import Tell
+    from paper.bench import ShowUnits
 
 app = typer.Typer(
     add_completion=False,
@@ -34,17 +34,24 @@ def experiment(
         str | None,
         typer.Argument(
             metavar="[NAME|all]",
-            help="Which; lists them when left out.",
+            help="Name of the experiment, or all; without it, the experiments are listed.",
             show_default=False,
         ),
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="Less of everything: minutes, and less sure.")
+        bool,
+        typer.Option(
+            "--quick",
+            help="Compute fewer and smaller cases, in minutes; the verdicts are less certain.",
+        ),
     ] = False,
     out: Annotated[
         Path,
         typer.Option(
-            "--out", "-o", metavar="DIR", help="Folder of results; what is in it is not done again."
+            "--out",
+            "-o",
+            metavar="DIR",
+            help="Folder of results; results that it holds are not computed again.",
         ),
     ] = Path("paper-results"),
     seeds: Annotated[
@@ -52,28 +59,32 @@ def experiment(
         typer.Option(
             min=1,
             metavar="N",
-            help="Repeat what has chance in it with so many seeds.",
+            help="Number of seeds of the random numbers of pictures and searches.",
             show_default="3, or 2 with --quick",
         ),
     ] = None,
     workers: Annotated[
         int | None,
         typer.Option(
-            min=1, metavar="N", help="Processes on this machine.", show_default="one a processor"
+            min=1,
+            metavar="N",
+            help="Processes on this machine.",
+            show_default="one for each processor",
         ),
     ] = None,
     page: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Also collect the results on one page (Markdown), with files beside it.",
+            help="Also write the results to one page (Markdown), with its pictures beside it.",
             show_default=False,
         ),
     ] = None,
 ) -> None:
-    """Make tables and figures of the OptiSense paper again, and say what agrees.
+    """Reproduce tables and figures of the OptiSense paper, and report which statements agree.
 
-    Stopped or killed at any moment, the same command continues: every single evaluation is kept.
+    The command may be stopped at any moment: every evaluation is kept, and the same command
+    continues.
     """
     if name is None:
         _print_list()
@@ -101,7 +112,7 @@ def experiment(
             _print_result(each, result, out)
     except KeyboardInterrupt:
         messages.print(
-            f"interrupted: what is finished is kept in {out}; the same command continues"
+            f"interrupted: finished results are kept in {out}; the same command continues"
         )
         raise typer.Exit(EXIT_INTERRUPTED) from None
     if page is not None:
@@ -110,14 +121,14 @@ def experiment(
 
 
 MOST_WORKERS = 8
-"""Largest number of workers unless the user says otherwise, as each takes two gigabytes."""
+"""Default of the largest number of worker processes, since each takes about 2 GB of memory."""
 
 
 @contextmanager
-def _shown_units(name: str, workers: int) -> Iterator[Tell]:
-    """The units of an experiment's step on a progress line.
+def _shown_units(name: str, workers: int) -> Iterator[ShowUnits]:
+    """Yield a callback that shows the units of an experiment's step on a progress line.
 
-    An experiment may ask more when a step has been answered, so the time left is the step's.
+    The time left is that of the step, since an experiment may have more units after it.
     """
     with progress_line() as line:
         line.say(f"{name}: loading")
@@ -137,6 +148,7 @@ def _shown_units(name: str, workers: int) -> Iterator[Tell]:
 
 
 def _print_list() -> None:
+    """Print the names of the experiments and what each one is about."""
     from rich.table import Table
 
     from paper import EXPERIMENTS
@@ -149,13 +161,13 @@ def _print_list() -> None:
 
 
 def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> None:
-    """The verdicts, one a line."""
+    """Print the verdicts, one on each line, and the cost of the experiment."""
     output.print(f"[bold]{experiment.title}[/bold]")
     for claim in result["claims"]:
         output.print(f"  {claim['verdict']:<15} {claim['says']}", markup=False)
         output.print(f"                  {claim['here']}", markup=False)
     if result["gaps"]:
-        output.print(f"  {len(result['gaps'])} without a score; see the text", markup=False)
+        output.print(f"  {len(result['gaps'])} cases without a score; see the text", markup=False)
     minutes = result["seconds"]["processor"] / 60.0
     summary = f"  {result['units']} evaluations, {minutes:.1f} processor minutes"
     output.print(f"{summary}; results: {out / experiment.name}", markup=False)

@@ -1,4 +1,4 @@
-"""The bench on which units are worked out, one after the other or on several processes."""
+"""Evaluation of units, one after the other or in several processes."""
 
 from __future__ import annotations
 
@@ -16,37 +16,45 @@ from paper.errors import ExperimentError
 from paper.shares import shares
 from paper.unit import Record, Unit, kept, work_out
 
-Tell = Callable[[int, int, str], None]
-"""Called with the number of finished units, of all units, and the label of one."""
+ShowUnits = Callable[[int, int, str], None]
+"""Progress callback: takes the number of finished units, of all units, and the label of one."""
 
 TICK = 0.2
-"""Seconds between looks at the keyboard while other processes work."""
+"""Longest wait for a worker process before Ctrl-C is noticed, s; users notice no delay of 0.2 s."""
 
 
 Finished = queue.SimpleQueue[tuple[list[Unit], Future[Outcome]]]
-"""Shares of units that processes are done with."""
+"""Queue of the shares of units that worker processes have finished."""
 
 
 class Bench:
-    """Works out units and keeps what they find in a folder.
+    """Evaluates units and keeps their results in a folder.
 
     Attributes:
-        folder: of all results.
-        workers: processes; 1 works in this one.
+        folder: folder of all results.
+        workers: number of processes; 1 computes in the calling process.
     """
 
-    def __init__(self, folder: Path, workers: int = 1, tell: Tell | None = None) -> None:
-        """Nothing is done yet."""
+    def __init__(self, folder: Path, workers: int = 1, show: ShowUnits | None = None) -> None:
+        """Prepare the evaluation; nothing is computed yet.
+
+        Args:
+            folder: folder of all results.
+            workers: number of processes.
+            show: progress callback.
+        """
         self.folder = folder
         self.workers = workers
-        self._tell = tell or (lambda done, count, label: None)
+        self._show = show or (lambda done, count, label: None)
 
     def run(self, units: Sequence[Unit]) -> list[Record]:
-        """What comes of units, in their order; those whose answers are kept are not asked again.
+        """Return the results of units, in their order; results in the folder are not computed
+        again.
 
         Raises:
-            ExperimentError: a unit's process dies each time.
-            SetupError, OutputError: nothing can be worked out, or kept.
+            ExperimentError: the process of a unit ends each time without a result.
+            SetupError: the engine can't compute here.
+            OutputError: a result can't be written.
         """
         keys = [unit.key for unit in units]
         missing = {
@@ -55,20 +63,21 @@ class Bench:
             if kept(unit, self.folder) is None
         }
         done = len(set(keys)) - len(missing)
-        self._tell(done, done + len(missing), "")
+        self._show(done, done + len(missing), "")
         together = shares(unit for unit in missing.values() if not unit.alone)
         if self.workers > 1 and len(together) > 1:
             done = self._by_pool(together, done, done + len(missing))
             together = []
         alone = [unit for unit in missing.values() if unit.alone]
         for unit in [*(unit for share in together for unit in share), *alone]:
-            self._tell(done, len(set(keys)), unit.label)
+            self._show(done, len(set(keys)), unit.label)
             work_out(unit, self.folder)
             done += 1
-            self._tell(done, len(set(keys)), unit.label)
+            self._show(done, len(set(keys)), unit.label)
         return [self._kept(unit) for unit in units]
 
     def _by_pool(self, together: Sequence[list[Unit]], done: int, count: int) -> int:
+        """Compute shares of units in worker processes; return the number of finished units."""
         finished: Finished = queue.SimpleQueue()
 
         def hand_over(share: list[Unit], future: Future[Outcome]) -> None:
@@ -84,14 +93,14 @@ class Bench:
                 outcome = future.result()
                 if outcome.failure is not None:
                     names = " or ".join(unit.label for unit in share)
-                    raise ExperimentError(f"{names} can't be worked out: {outcome.failure}")
+                    raise ExperimentError(f"{names} can't be computed: {outcome.failure}")
                 done += len(share)
-                self._tell(done, count, share[-1].label)
+                self._show(done, count, share[-1].label)
         return done
 
     @staticmethod
     def _wait(finished: Finished) -> tuple[list[Unit], Future[Outcome]]:
-        """The next finished share; Ctrl-C gets through."""
+        """Return the next finished share; Ctrl-C interrupts the wait."""
         while True:
             try:
                 return finished.get(timeout=TICK)
@@ -99,16 +108,23 @@ class Bench:
                 continue
 
     def _kept(self, unit: Unit) -> Record:
+        """Return the kept result of a unit that was computed.
+
+        Raises:
+            ExperimentError: the result was deleted.
+        """
         record = kept(unit, self.folder)
         if record is None:
             raise ExperimentError(
-                f"the result of {unit.label} has gone", where=str(self.folder), hint="Run it again"
+                f"the result of {unit.label} is missing",
+                where=str(self.folder),
+                hint="Run it again",
             )
         return record
 
 
 class _Worker:
-    """What a process of the pool calls: works out a share of units by its number."""
+    """Function of the worker processes, which computes a share of units by its number."""
 
     renders = True
 
@@ -117,8 +133,9 @@ class _Worker:
         self._folder = folder
 
     def __call__(self, vector: NDArray[np.float64], seed: int) -> Outcome:
-        """See `Evaluator` of searches; the results are in the units' files."""
+        """Compute the share with this number, as `Evaluator` of searches; results are written to
+        files."""
         for unit in self._shares[int(vector[0])]:
-            if kept(unit, self._folder) is None:  # it may be there: of a process that died
+            if kept(unit, self._folder) is None:  # a process that died may have written it
                 work_out(unit, self._folder)
         return Outcome({})

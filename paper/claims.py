@@ -1,4 +1,4 @@
-"""What the paper says, held against what was found: verdicts are worked out, never written down."""
+"""Statements of the paper beside the results here; verdicts are computed from the results."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 AGREES, DISAGREES, OPEN = "agrees", "disagrees", "inconclusive"
+"""Verdicts on a statement."""
 
 
 @dataclass(frozen=True)
@@ -15,9 +16,9 @@ class Claim:
 
     Attributes:
         says: the statement, with the paper's numbers.
-        here: what was found, with numbers.
-        holds: whether the statement holds here; None where the numbers can't tell.
-        why: what explains a difference, or why it can't be told; shown unless the claim holds.
+        here: the result here, with numbers.
+        holds: whether the statement holds here; None if the numbers can't decide.
+        why: explanation of a difference or of an open verdict; not shown if the claim holds.
     """
 
     says: str
@@ -27,25 +28,25 @@ class Claim:
 
     @property
     def verdict(self) -> str:
-        """The verdict in words."""
+        """Return the verdict in words."""
         return OPEN if self.holds is None else AGREES if self.holds else DISAGREES
 
     def to_plain(self) -> dict[str, Any]:
-        """Ready for JSON."""
+        """Return the claim as plain values for JSON."""
         why = "" if self.holds else self.why
         return {**asdict(self), "why": why, "verdict": self.verdict}
 
 
 @dataclass(frozen=True)
 class Table:
-    """Numbers for people: a title, heads of columns, rows of cells."""
+    """Table for readers: a title, heads of columns, and rows of cells."""
 
     title: str
     heads: Sequence[str]
     rows: Sequence[Sequence[str]]
 
     def markdown(self) -> str:
-        """The claims as a Markdown table under its title."""
+        """Return the table as Markdown, below its title."""
         lines = [self.title + ":", ""] if self.title else []
         lines.append(_cells(self.heads))
         lines.append(_cells(["---"] * len(self.heads)))
@@ -54,4 +55,5 @@ class Table:
 
 
 def _cells(texts: Sequence[str]) -> str:
+    """Return a row of a Markdown table."""
     return "| " + " | ".join(texts) + " |"

@@ -1,4 +1,4 @@
-"""The error of the experiments that a user can cause."""
+"""Error of the experiments that a user can cause."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""The questions that experiments ask: scores, pictures, tasks, searches, and what they take.
+"""Functions that compute the units of experiments: scores, pictures, tasks and searches.
 
-Each function here is the work of units (see `paper.unit`): it gets plain values and
-returns plain values. A model is kept from one unit to the next of the same sensor, in a way that
-the answer does not depend on what was asked before.
+Each function is the work of units (see `paper.unit`). It takes plain values, `inputs`, and the
+unit's own folder, and returns plain values. The optical model is kept for the next unit of the same
+sensor, such that results do not depend on the units before.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 Plain = Mapping[str, Any]
 
 NINE = "nine balls"
-"""Name of the contacts that are the balls which objectives press."""
+"""Value of `contacts` that stands for the nine balls which the objectives press."""
 
 SAME_IMAGES = ("contacts", "untouched image", "untouched radiance", "pressed images")
 """Values of an evaluation that do not depend on the exposure."""
@@ -41,30 +41,31 @@ _current: dict[tuple[Any, ...], tuple[str, OpticalModel]] = {}
 
 
 def sensor(name: str, change: Plain | None = None, **dimensions: Any) -> dict[str, Any]:
-    """A design as plain values: a built-in sensor with some dimensions, and what is set in it.
+    """Return a design as plain values: a built-in sensor, its dimensions, and values set in it.
 
     Args:
-        name: of the sensor.
-        change: values by dotted path (see `optisense.set_value`); where the value is a dict, the
-            values of a search's trial that varied this path from 0 to 1.
-        dimensions: arguments of its builder.
+        name: name of the built-in sensor.
+        change: values by dotted path (see `optisense.set_value`). A dict stands for the values of
+            a trial of a search that varied this path from 0 to 1.
+        dimensions: arguments of the sensor's builder.
     """
     return {"sensor": name, "dimensions": dimensions, "change": dict(change or {})}
 
 
 def design_of(plain: Plain) -> SensorDesign:
-    """The design that plain values describe (see `sensor`).
+    """Return the design that plain values describe (see `sensor`).
 
     Raises:
-        OptiSenseError: it can't be built.
+        OptiSenseError: the design can't be built.
     """
     return _changed(_base(plain), plain)
 
 
 def scores(inputs: Plain, folder: Path) -> Found:
-    """Scores of a design: `design`, `objectives`, `settings` of these.
+    """Return scores of a design.
 
-    An objective that fails leaves a gap among `scores` and its reason among `failures`.
+    The inputs are `design`, `objectives` and their `settings`. An objective that fails has the
+    score None in `scores` and its reason in `failures`.
     """
     model = _model(inputs["design"])
     found = evaluate(model, list(inputs["objectives"]), **tuples(inputs["settings"]))
@@ -72,11 +73,11 @@ def scores(inputs: Plain, folder: Path) -> Found:
 
 
 def relit_scores(inputs: Plain, folder: Path) -> Found:
-    """Scores under several colourings of light groups, from one rendering of each group.
+    """Return scores under several colourings of light groups, from one rendering of each group.
 
-    `design`, `groups` (the light groups), `colourings` (a letter of R, G, B for each of them),
-    `objectives`, `settings` of the images, `own` settings of the objectives; and, where there are
-    `normdiff_variants`, NormDiff with each of these settings.
+    The inputs are `design`, `groups` (the light groups), `colourings` (a letter of R, G, B for each
+    group), `objectives`, `settings` of the images, `own` settings of the objectives, and optionally
+    `normdiff_variants`, settings with each of which NormDiff is computed.
     """
     from optisense.objectives.combined import resolve
     from optisense.objectives.registry import pixels_read
@@ -107,9 +108,10 @@ def relit_scores(inputs: Plain, folder: Path) -> Found:
 
 
 def variants_of_score(inputs: Plain, folder: Path) -> Found:
-    """One objective with several settings of its own, of the same images.
+    """Return the scores of one objective with several settings of its own, from the same images.
 
-    `design`, `objective`, `variants` (settings by name), `settings` of the images.
+    The inputs are `design`, `objective`, `variants` (settings by name) and `settings` of the
+    images.
     """
     model = _model(inputs["design"])
     evaluation = Evaluation(model, Settings(**tuples(inputs["settings"])))
@@ -123,11 +125,11 @@ def variants_of_score(inputs: Plain, folder: Path) -> Found:
 
 
 def scores_by_readings(inputs: Plain, folder: Path) -> Found:
-    """RGB2Normal and NormDiff in several ways: `design`, `settings` of the images, `variants`
-    (settings by objective and name), `exposures` (names of the automatic exposure and of that of
-    the untouched skin).
+    """Return RGB2Normal and NormDiff with several settings and two exposures.
 
-    A score that fails is None; the reasons are not kept, as many readings fail alike.
+    The inputs are `design`, `settings` of the images, `variants` (settings by objective and name)
+    and `exposures` (names of the automatic exposure and of that of the untouched skin). A score
+    that fails is None; its reason is not kept, since many settings fail for the same reason.
     """
     model, settings = _model(inputs["design"]), Settings(**tuples(inputs["settings"]))
     automatic = Evaluation(model, settings)
@@ -146,11 +148,12 @@ def scores_by_readings(inputs: Plain, folder: Path) -> Found:
 
 
 def stretch(inputs: Plain, folder: Path) -> Found:
-    """How much longer than wide a small round thing appears: `design`, `ray_resolution`.
+    """Return by how much the camera stretches small shapes: the ratio of length to width of a
+    circle.
 
-    Neighbouring pixels span a parallelogram on the surface; the ratio of the half axes of the
-    ellipse that belongs to it is 1 where shapes are kept. Tells the median over pixels and the
-    ratio that a tenth of them exceeds.
+    The inputs are `design` and `ray_resolution`. Neighbouring pixels span a parallelogram on the
+    surface; the ratio of the semi-axes of its ellipse is 1 where shapes are preserved. The results
+    are the median over pixels and the ratio that a tenth of them exceeds.
     """
     ratios = _stretches(_model(inputs["design"]).chief_rays(tuple(inputs["ray_resolution"])))
     return Found(
@@ -161,12 +164,14 @@ def stretch(inputs: Plain, folder: Path) -> Found:
 
 
 def median_stretch(rays: ChiefRays) -> float | None:
-    """How much longer than wide a small round thing appears, the median over pixels (`stretch`)."""
+    """Return the median over pixels of the ratio of length to width of small circles
+    (`stretch`)."""
     ratios = _stretches(rays)
     return float(np.median(ratios)) if len(ratios) else None
 
 
 def _stretches(rays: ChiefRays) -> NDArray[np.float64]:
+    """Return the ratio of semi-axes (n,) at each pixel whose neighbours hit the surface, too."""
     points = rays.points.astype(np.float64)
     right = (points[:, 1:] - points[:, :-1])[:-1]
     down = (points[1:] - points[:-1])[:, :-1]
@@ -175,7 +180,12 @@ def _stretches(rays: ChiefRays) -> NDArray[np.float64]:
 
 
 def axes_ratio(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,): the larger singular value of the maps with columns (n, 3) over the smaller one."""
+    """Return the ratio of the singular values (n,), larger over smaller, of 3 x 2 matrices.
+
+    Args:
+        first: first columns (n, 3).
+        second: second columns (n, 3).
+    """
     a, b = (first**2).sum(axis=1), (second**2).sum(axis=1)
     c = (first * second).sum(axis=1)
     root = np.sqrt((0.5 * (a - b)) ** 2 + c**2)
@@ -186,11 +196,12 @@ def axes_ratio(first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArr
 
 
 def picture(inputs: Plain, folder: Path) -> Found:
-    """What the camera sees: `design`, `contacts`, `resolution`, `photons`, `seed`.
+    """Return the picture of a design, its mean radiance, and its number of pixels in contact.
 
-    Contacts are texts as on the command line, or `NINE` with `depth`; an indenter named
-    ``object:NAME`` is one of `paper.objects`. Also tells how bright the picture is,
-    before exposure: `radiance`, the mean over the sensing surface and the channels.
+    The inputs are `design`, `contacts`, `resolution`, `photons` and `seed`. Contacts are texts as
+    on the command line, or `NINE` with `depth`; an indenter named ``object:NAME`` is one of
+    `paper.objects`. The result `radiance` is the mean before exposure over the sensing surface and
+    the channels.
     """
     model = _model(inputs["design"])
     contacts: list[Contact]
@@ -216,8 +227,10 @@ def picture(inputs: Plain, folder: Path) -> Found:
 
 
 def perception(inputs: Plain, folder: Path) -> Found:
-    """How well the quantities of tasks are read: `design`, `tasks` (a resolution for each name),
-    `samples`, `seed`, `photons`. Samples are kept in the folder, one by one.
+    """Return how exactly the quantities of tasks are read from images.
+
+    The inputs are `design`, `tasks` (a resolution for each name), `samples`, `seed` and `photons`.
+    Samples are kept in the folder, one by one.
     """
     from optisense.tasks import CylinderRadius, Misalignment, SampleSettings, perceive
 
@@ -242,11 +255,11 @@ def perception(inputs: Plain, folder: Path) -> Found:
 
 
 def searched(inputs: Plain, folder: Path) -> Found:
-    """A search, kept as a study in the folder: `design`, `space`, `objectives`, `method`, `budget`,
-    `seed`, `options`, `settings`.
+    """Run a search, kept as a study in the folder, and return its course.
 
-    Tells the start, the best trial with the values that make it, the best score after each trial,
-    and, with `all` set, the scores of every trial.
+    The inputs are `design`, `space`, `objectives`, `method`, `budget`, `seed`, `options` and
+    `settings`. The results are the start, the best trial with its values, the best score after each
+    trial, and, with `all` set, the scores of every trial.
     """
     from optisense.search import search
 
@@ -283,7 +296,7 @@ def searched(inputs: Plain, folder: Path) -> Found:
 
 
 def coloured(design: SensorDesign, groups: Sequence[str], letters: str) -> SensorDesign:
-    """A design whose light groups are red, green or blue."""
+    """Return a design whose light groups are red, green or blue, by one letter for each group."""
     shares = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
     for name, letter in zip(groups, letters, strict=True):
         design = set_value(design, f"lights.{name}.colour", shares[letter])
@@ -291,11 +304,13 @@ def coloured(design: SensorDesign, groups: Sequence[str], letters: str) -> Senso
 
 
 def _base(plain: Plain) -> SensorDesign:
+    """Return the built-in sensor with its dimensions, before the changes."""
     builder: Callable[..., SensorDesign] = SENSORS.find(plain["sensor"])
     return builder(**tuples(plain["dimensions"]))
 
 
 def _changed(design: SensorDesign, plain: Plain) -> SensorDesign:
+    """Return a design with the values of `change` set."""
     from optisense.search import SearchSpace
 
     for path, value in plain["change"].items():
@@ -308,15 +323,15 @@ def _changed(design: SensorDesign, plain: Plain) -> SensorDesign:
 
 
 def _model(plain: Plain) -> OpticalModel:
-    """A model of a design; the one given before must not be used any more.
+    """Return the model of a design; the model returned before must not be used any more.
 
-    The design asked for last comes with the light that was traced for it.
+    The model of the same design as before keeps the light that was traced for it.
     """
     from optisense.objectives.score import json_ready
 
     key = (plain["sensor"], repr(json_ready(plain["dimensions"])))
     if key not in _keepers:
-        _keepers.clear()  # two models are more than many machines have memory for
+        _keepers.clear()  # many machines do not have the memory for two models
         _current.clear()
         _keepers[key] = _base(plain), ModelCache()
     (base, models), change = _keepers[key], repr(json_ready(plain["change"]))
@@ -327,6 +342,8 @@ def _model(plain: Plain) -> OpticalModel:
 
 
 def _contact(text: str) -> Contact:
+    """Return the contact that a text describes, with an object of `paper.objects` if it names
+    one."""
     from paper.objects import OBJECTS
 
     kind, _, place = text.partition("@")
@@ -342,6 +359,7 @@ def _contact(text: str) -> Contact:
 
 
 def _scores(found: Mapping[str, Score]) -> dict[str, Any]:
+    """Return scores by name, reasons of those that failed, and single numbers among their parts."""
     return {
         "scores": {n: None if s.failure is not None else s.value for n, s in found.items()},
         "failures": {n: s.failure for n, s in found.items() if s.failure is not None},
@@ -350,7 +368,7 @@ def _scores(found: Mapping[str, Score]) -> dict[str, Any]:
 
 
 def _small(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, float]]:
-    """The single numbers among the parts of scores."""
+    """Return the single numbers among the parts of scores, by score and part."""
     return {
         name: {
             key: value
@@ -362,7 +380,7 @@ def _small(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, float]
 
 
 def _space(plain: Plain) -> dict[str, Any]:
-    """Bounds are pairs of numbers; options stay lists."""
+    """Return a search space with bounds as pairs of numbers and options as lists."""
     return {
         path: tuple(spec) if not isinstance(spec[0], str) else list(spec)
         for path, spec in plain.items()
@@ -370,7 +388,7 @@ def _space(plain: Plain) -> dict[str, Any]:
 
 
 def tuples(values: Plain) -> dict[str, Any]:
-    """Lists as tuples, which builders and settings want."""
+    """Return values with lists as tuples, which builders and settings take."""
     return {
         name: tuple(tuple(v) if isinstance(v, list) else v for v in value)
         if isinstance(value, list)

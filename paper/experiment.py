@@ -1,4 +1,4 @@
-"""What an experiment is, and running one: units to numbers, picture and text."""
+"""Experiments, and how they run: from units to numbers, a picture and a text."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 80
-"""Resolution of the experiments' figures, which keeps each below 100 kB."""
+"""Resolution of the experiments' figures, dots per inch, which keeps each file below 100 kB."""
 
 Values = dict[str, Any]
 Pictures = dict[str, NDArray[np.uint8]]
@@ -35,11 +35,11 @@ Pictures = dict[str, NDArray[np.uint8]]
 
 @dataclass(frozen=True)
 class Finding:
-    """What an experiment's steps end with.
+    """Final result of an experiment's steps.
 
     Attributes:
-        numbers: ready for JSON; all that text and curves are made of.
-        pictures: (h, w, 3) uint8 by name, to be drawn.
+        numbers: plain values for JSON, from which texts and curves are made.
+        pictures: pictures (h, w, 3) uint8 by name, which the figure shows.
     """
 
     numbers: Values
@@ -47,24 +47,24 @@ class Finding:
 
 
 Steps = Generator[list[Unit], list[Record], Finding]
-"""Asks batches of units and is sent their records; later batches may rest on earlier records."""
+"""Generator that yields batches of units and is sent their records, before its next batch."""
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """A table or figure of the OptiSense paper, made again.
+    """Reproduction of a table or figure of the OptiSense paper.
 
     Attributes:
-        name: as on the command line.
-        title: of its chapter on the page.
-        about: one line.
-        steps: asks units, given the settings.
-        claims: what the paper says, held against the numbers.
-        tables: the numbers for people.
-        draw: the picture, of the numbers and the pictures.
-        notes: what the reader must know, given the numbers; Markdown paragraphs.
-        again: whether its statements are those of other experiments, so that the page does not
-            count them a second time.
+        name: name on the command line.
+        title: title of its chapter on the page.
+        about: summary in one line.
+        steps: returns the generator of its units, from the settings.
+        claims: returns the paper's statements with verdicts, from the numbers.
+        tables: returns the tables for readers, from the numbers.
+        draw: returns the figure, from the numbers and the pictures.
+        notes: returns remarks for readers, paragraphs of Markdown, from the numbers.
+        again: whether its statements are also those of other experiments; the page then counts
+            them once.
     """
 
     name: str
@@ -78,17 +78,17 @@ class Experiment:
     again: bool = False
 
     def settings(self, quick: bool = False, seeds: int | None = None) -> Values:
-        """Those of its YAML file; a quick run changes some, and the user the number of seeds.
+        """Return the settings of its YAML file, with those of a quick run and the number of seeds.
 
         Raises:
-            ExperimentError: less than one seed.
+            ExperimentError: the number of seeds is below 1.
         """
         file = files("paper") / f"{self.name.replace('-', '_')}.yaml"
         stored = yaml.safe_load(file.read_text(encoding="utf-8"))
         chosen: Values = {**stored["full"], **(stored["quick"] if quick else {})}
         if seeds is not None:
             if seeds < 1:
-                raise ExperimentError(f"{seeds} seeds are none", hint="Give 1 or more")
+                raise ExperimentError(f"the number of seeds is {seeds}", hint="Give 1 or more")
             chosen["seeds"] = seeds
         return chosen
 
@@ -96,13 +96,13 @@ class Experiment:
 def prepare(
     experiments: Sequence[Experiment], bench: Bench, quick: bool = False, seeds: int | None = None
 ) -> None:
-    """Work out what several experiments ask first, all in one go.
+    """Compute the first batches of several experiments together.
 
-    Running each of them then finds its answers kept. Processes start once, and units of one sensor
-    share its scene and light, whichever experiment asks for them.
+    The experiments then find these results in the folder. Processes start once, and units of the
+    same sensor share its scene and light across experiments.
 
     Raises:
-        OptiSenseError: a unit can't be worked out, or its answer not kept.
+        OptiSenseError: a unit can't be computed, or its result not written.
     """
     bench.run(
         [unit for each in experiments for unit in next(each.steps(each.settings(quick, seeds)))]
@@ -112,10 +112,10 @@ def prepare(
 def run(
     experiment: Experiment, bench: Bench, quick: bool = False, seeds: int | None = None
 ) -> Values:
-    """Run an experiment and write its folder; returns the content of its result.json.
+    """Run an experiment, write its folder, and return the content of its result.json.
 
     Raises:
-        OptiSenseError: it can't be run, or its results not written.
+        OptiSenseError: a unit can't be computed, or a result not written.
     """
     settings = experiment.settings(quick, seeds)
     began = time.perf_counter()
@@ -159,7 +159,7 @@ def run(
 
 
 def gaps(records: Sequence[Record]) -> list[dict[str, str]]:
-    """The units without a result, and units of several scores that miss one, with reasons."""
+    """Return the units without a result, or without one of several scores, with the reasons."""
     found = {}
     for record in records:
         if record.failure is not None:
@@ -172,10 +172,10 @@ def gaps(records: Sequence[Record]) -> list[dict[str, str]]:
 def write(
     experiment: Experiment, result: Mapping[str, Any], pictures: Pictures, folder: Path
 ) -> None:
-    """result.json, picture.png and text.md.
+    """Write the result (JSON), the figure (PNG) and the text (Markdown) of an experiment.
 
     Raises:
-        OutputError: they can't be written.
+        OutputError: a file can't be written.
     """
     with written_whole(folder / PICTURE, "a picture") as temporary:
         experiment.draw(dict(result["numbers"]), pictures).savefig(temporary, dpi=DOTS_PER_INCH)

@@ -1,4 +1,4 @@
-"""What the pictures of experiments have in common."""
+"""Lines, bars and images of the experiments' figures."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLOURS = (BLUE, RED, AMBER, GREY, "#3c8d5a", "#6c4ab0", "#222222", "#b06a9a")
-"""Colours of lines, in this order."""
+"""Colours of lines, in the order in which they are used."""
 
 
 def line(
     axes: Axes, points: Mapping[str, Spread], label: str = "", colour: str = BLUE, mark: str = "o-"
 ) -> None:
-    """Means with their standard deviations over seeds; `points` by the x value as text."""
+    """Draw means with their standard deviations over seeds; the keys of `points` are x as text."""
     there = {x: each for x, each in points.items() if each["mean"] is not None}
     if not there:
         return
@@ -39,7 +39,7 @@ def line(
 
 
 def bars(axes: Axes, values: Mapping[str, Spread], colour: str = BLUE) -> None:
-    """One bar a name, with its standard deviation."""
+    """Draw one bar for each name, with its standard deviation."""
     there = {name: each for name, each in values.items() if each["mean"] is not None}
     axes.bar(
         list(there),
@@ -52,7 +52,7 @@ def bars(axes: Axes, values: Mapping[str, Spread], colour: str = BLUE) -> None:
 
 
 def finish(axes: Axes, title: str, x: str = "", y: str = "", legend: bool = False) -> None:
-    """Title, axes and grid."""
+    """Set the title and the labels of the axes, and draw the grid and the legend."""
     axes.set_title(title, fontsize=10)
     axes.set_xlabel(x, fontsize=9)
     axes.set_ylabel(y, fontsize=9)
@@ -63,7 +63,7 @@ def finish(axes: Axes, title: str, x: str = "", y: str = "", legend: bool = Fals
 
 
 def image(axes: Axes, picture: NDArray[np.uint8] | None, title: str) -> None:
-    """A picture, or an empty frame where there is none."""
+    """Draw a picture (h, w, 3), or an empty frame if there is none."""
     axes.set_xticks([])
     axes.set_yticks([])
     axes.set_title(title, fontsize=9)

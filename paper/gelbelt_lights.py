@@ -1,7 +1,7 @@
-"""GelBelt: where the lights go, then which coating, then what things look like.
+"""Experiment on GelBelt: positions of the lights, coating, and pictures of objects.
 
-The OptiSense paper, case study II: light designs 1 to 3 by forward design, the coating by a search,
-and a screw, a breadboard and a rack pressed in.
+It reproduces case study II of the OptiSense paper: light designs 1 to 3 by forward design, the
+coating by a search, and pictures of a screw, a breadboard and a rack.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from paper.claims import Claim, Table
 from paper.evaluations import NINE, picture, scores, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, image, line
-from paper.mini_shapes import OBJECTIVES, told_best
+from paper.mini_shapes import OBJECTIVES, best_text
 from paper.spread import best, is_larger, number, shown, spread
 from paper.unit import Unit
 
@@ -22,14 +22,15 @@ if TYPE_CHECKING:
 SENSOR = "gelbelt"
 DESIGNS = ("1", "2", "3")
 MOST_SPECULAR = 0.3
-"""Specularity below which the paper finds the best coating."""
+"""Specularity (0 to 1) below which the paper finds the best coating."""
 
 DARK = 0.1
-"""A light design that brings less than this share of the best one's light to the belt fails."""
+"""Share of the best light design's light on the belt below which a light design counts as
+failed."""
 
 
 def steps(settings: Values) -> Steps:
-    """Light designs, coatings of the third, pictures."""
+    """Score light designs and coatings of the third one, and render pictures."""
     seeds = range(settings["seeds"])
     images = {key: settings[key] for key in ("resolution", "photons")}
     asked = {
@@ -90,7 +91,7 @@ def steps(settings: Values) -> Steps:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """The paper's statements on the lights and the coating."""
+    """Return the paper's statements on the lights and the coating, with verdicts."""
     designs = numbers["designs"]
     light = {name: designs[name]["light"]["mean"] or 0.0 for name in DESIGNS}
     share = light["1"] / max(light.values()) if max(light.values()) > 0 else None
@@ -114,7 +115,7 @@ def claims(numbers: Values) -> list[Claim]:
 
 
 def coating_is_dull(column: Values, title: str) -> Claim:
-    """The paper's statement on the best coating, of scores by specularity."""
+    """Return the paper's statement on the best coating, with its verdict from scores."""
     top, alike = best(column)
     agrees: bool | None = None
     if top is not None:
@@ -123,14 +124,14 @@ def coating_is_dull(column: Values, title: str) -> Claim:
             agrees = None
     return Claim(
         f"A specularity below {MOST_SPECULAR:g} is best ({title}).",
-        told_best(column, top, alike),
+        best_text(column, top, alike),
         agrees,
         WHY_COATING,
     )
 
 
 def third_is_best(column: Values, title: str) -> Claim:
-    """The paper's statement on the third light design, of scores by design."""
+    """Return the paper's statement on the third light design, with its verdict from scores."""
     larger = is_larger(column["3"], column["2"])
     texts = [f"design {name}: {shown(each)}" for name, each in column.items()]
     return Claim(
@@ -156,7 +157,7 @@ WHY_COATING = (
 
 
 def tables(numbers: Values) -> list[Table]:
-    """Light designs, and coatings."""
+    """Return the tables of light designs and of coatings."""
     designs, coatings = numbers["designs"], numbers["coatings"]
     lights = [
         [name, *(shown(designs[name][key]) for key in (*OBJECTIVES, "light"))] for name in DESIGNS
@@ -176,7 +177,7 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """Pictures of the designs and of the objects; scores over specularity."""
+    """Draw pictures of the designs and of the objects, and scores over specularity."""
     from optisense.report.drawing import new_figure
 
     figure = new_figure(11.0, 8.4)

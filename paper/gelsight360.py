@@ -1,7 +1,8 @@
-"""GelSight360: colours of its lights, shape of its tip, shape of its resin.
+"""Experiment on GelSight360: colours of its lights, shape of its tip, shape of its resin.
 
-The OptiSense paper, case study III: the table of five colourings by NormDiff and RGB2Normal, tips 0
-(flat) to 10 (conical) by 2to3PW, resins 0 (even shell) to 10 (almost flat) by both scores.
+It reproduces case study III of the OptiSense paper: the table of five colourings by NormDiff and
+RGB2Normal, tips 0 (flat) to 10 (conical) by 2to3PW, and resins 0 (even shell) to 10 (almost flat)
+by both scores.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 SENSOR = "gelsight360"
 ANY_JUMP = 1e9
-"""Largest jump between neighbouring rays for 2to3PW, so large that no triangle is left out."""
+"""Largest jump of 2to3PW between neighbouring rays, so large that no triangle is left out."""
 
 FINER = 6
 """Number of rows by which each grid of chief rays is finer than the one before."""
@@ -47,8 +48,11 @@ BLIND: dict[str, dict[str, Any]] = {
     "only the polar angle, 15 %": {"phi_weight": 0.0, "noise": 0.15},
     "colours of the picture": {"colours": "picture"},
 }
-"""Ways to look at NormDiff: the paper gives neither the weights of its two angles, nor whether its
-noise of 30 % is to either side or from end to end."""
+"""Settings of NormDiff by name.
+
+The paper states neither the weights of the two angles, nor whether its noise of 30 % is to either
+side or from end to end.
+"""
 
 OTHERWISE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "as it is": ({}, {}),
@@ -61,12 +65,13 @@ OTHERWISE: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "at half the resolution": ({}, {}),
     "with a tenth of the photons": ({}, {}),
 }
-"""Sensors and images whose NormDiff is looked at: what is set, and the dimensions."""
+"""Changes (values and dimensions) of the sensor or of images under which NormDiff is computed."""
 
 
 def ray_grid(settings: Values, seed: int) -> list[int]:
-    """(width, height) of the chief rays: tips have no random numbers in them, so each seed looks
-    through other pixels, a little smaller ones.
+    """Return width and height of the grid of chief rays, which differs from seed to seed.
+
+    Scores of tips contain no random numbers; the scatter between grids takes their place.
     """
     width, height = settings["ray_resolution"]
     return [width + seed * FINER * width // height, height + seed * FINER]
@@ -77,7 +82,7 @@ def _ways(least_pixels: int) -> dict[str, dict[str, Any]]:
 
 
 def _why_unit(name: str, images: Values, least_pixels: int) -> Unit:
-    """NormDiff of one of `OTHERWISE`, in all ways of `BLIND`."""
+    """Return the unit of NormDiff of one change of `OTHERWISE`, with all settings of `BLIND`."""
     change, dimensions = OTHERWISE[name]
     width, height = images["resolution"]
     if "resolution" in name:
@@ -97,7 +102,7 @@ def _why_unit(name: str, images: Values, least_pixels: int) -> Unit:
 
 
 def steps(settings: Values) -> Steps:
-    """Colourings from layers, all of them if asked; tips; resins; what NormDiff hangs on."""
+    """Score colourings (all of them if set), tips and resins, and NormDiff with other settings."""
     seeds = range(settings["seeds"])
     images = {key: settings[key] for key in ("resolution", "photons")}
     judged = {**images, "least_pixels": settings["least_pixels"]}
@@ -217,7 +222,7 @@ def _colourings(records: list[Record]) -> Values:
 
 
 def every_colouring(record: Record) -> Values:
-    """The best of all colourings by each objective, and where the others lie."""
+    """Return the best of all colourings by each objective, and the position of the others."""
     shares = {"1,0,0": "R", "0,1,0": "G", "0,0,1": "B"}
     trials = [
         ("".join(shares.get(str(v), str(v)[0].upper()) for v in values), own)
@@ -242,7 +247,7 @@ def every_colouring(record: Record) -> Values:
 
 
 def notes(numbers: Values) -> list[str]:
-    """Notes on how many pixels a contact needs in order to count."""
+    """Return a paragraph on the number of pixels that a contact needs."""
     least = numbers["least_pixels"]
     return [
         "The camera sees the far wall at a grazing angle, and a ball there covers few pixels. A "
@@ -253,7 +258,7 @@ def notes(numbers: Values) -> list[str]:
 
 
 def tables(numbers: Values) -> list[Table]:
-    """Colourings, the best of all, tips, resins, and what NormDiff hangs on."""
+    """Return tables of colourings, the best of all, tips, resins, and what NormDiff depends on."""
     found = [
         Table(
             "Colourings of the paper's table (in brackets the paper's scores)",
@@ -340,7 +345,7 @@ def _correlation(colourings: Values, way: str) -> str:
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """Ours against the paper's table; tips; resins by both."""
+    """Draw the scores beside the paper's table, tips, and resins by both objectives."""
     from optisense.report.drawing import new_figure
 
     figure = new_figure(11.0, 6.4)
@@ -367,7 +372,7 @@ def draw(numbers: Values, pictures: Pictures) -> Figure:
 
 
 def _draw_all(axes: Any, numbers: Values) -> None:
-    """The scores of NormDiff with other noise, of the sensors in the table."""
+    """Draw NormDiff over its noise, for each sensor of the table."""
     for colour, (name, each) in zip(COLOURS, numbers["why"].items(), strict=False):
         ways = ("as scored", "noise of 15 % to either side", LITTLE_NOISE)
         values = [each["scores"].get(way) for way in ways]

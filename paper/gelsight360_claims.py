@@ -14,26 +14,25 @@ PAPER = {
     "GBRBRGBR": {"normdiff": -19.810, "rgb2normal": 0.901},
     "RGBRGBRG": {"normdiff": -14.696, "rgb2normal": 0.891},
 }
-"""The paper's table, the original first."""
+"""Scores of the five colourings in the table of the OptiSense paper, the original first."""
 
 PAPERS_TIP, PAPERS_TIP_SCORE = 6, 0.071
-"""The tip, of 0 (flat) to 10 (conical), that the paper finds best, and its 2to3PW."""
+"""Best tip in the paper, from 0 (flat) to 10 (conical), and its 2to3PW."""
 PAPERS_RESIN, PAPERS_RESIN_SCORE = 4, -8.81
-"""The resin, of 0 (even shell) to 10 (almost flat inside), that the paper finds best, and its
-score by NormDiff."""
+"""Best resin in the paper, from 0 (even shell) to 10 (almost flat inside), and its NormDiff."""
 
 LITTLE_NOISE = "noise of 3 %"
-"""A way to look at NormDiff, nearer to what a camera has."""
+"""Name of the setting of NormDiff with the noise of a camera rather than the paper's 30 %."""
 
 MATCH = 0.7
-"""A rank correlation from here on counts as the same order."""
+"""Rank correlation from which on two orders count as the same."""
 
 WIDER = 2.0
-"""The range of the five may be so many times the paper's and still counts as alike."""
+"""Largest ratio of the range of the five scores to the paper's at which the two count as alike."""
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """The paper's statements on colours, tips and resins."""
+    """Return the paper's statements on colours, tips and resins, with verdicts."""
     return [
         *colour_claims(numbers["colourings"]),
         *_tips(numbers["tips"], numbers["tips_with_leaps"]),
@@ -42,7 +41,7 @@ def claims(numbers: Values) -> list[Claim]:
 
 
 def colour_claims(colourings: Values) -> list[Claim]:
-    """The paper's statements on the five colourings."""
+    """Return the paper's statements on the five colourings, with verdicts."""
     found = [_order(colourings, name, title) for name, title in OBJECTIVES.items()]
     column = {letters: each["normdiff"] for letters, each in colourings.items()}
     top, alike = best(column)

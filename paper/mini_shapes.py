@@ -1,7 +1,7 @@
-"""GelSight Mini, flat, cylindrical and spherical: which coating scores best?
+"""Experiment on flat, cylindrical and spherical GelSight Minis: which coating scores best.
 
-The OptiSense paper, case study I and its figure: nine balls of 1.5 mm, specularity of the coating
-against RGB2Normal and NormDiff.
+It reproduces case study I of the OptiSense paper and its figure: RGB2Normal and NormDiff of nine
+balls of 1.5 mm over the specularity of the coating.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ similar; the paper shows it in a figure without numbers."""
 def score_units(
     settings: Values, sensors: dict[str, str], change: dict[str, Any] | None = None
 ) -> list[Unit]:
-    """Scores of sensors at all specularities with all seeds."""
+    """Return the units of scores of sensors at all specularities with all seeds."""
     return [
         Unit(
             scores,
@@ -60,7 +60,7 @@ def score_units(
 
 
 def curves(settings: Values, records: list[Any], sensors: dict[str, str]) -> Values:
-    """Scores by sensor, objective and specularity, over seeds; and the best specularities."""
+    """Return scores over seeds by sensor, objective and specularity, and the best specularities."""
     answers = iter(records)
     found: Values = {}
     for label in sensors:
@@ -74,7 +74,7 @@ def curves(settings: Values, records: list[Any], sensors: dict[str, str]) -> Val
 
 
 def steps(settings: Values) -> Steps:
-    """Scores, and a picture of each shape as it is."""
+    """Compute the scores, and a picture of each shape with its own coating."""
     pictures = [
         Unit(
             picture,
@@ -104,7 +104,7 @@ def steps(settings: Values) -> Steps:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """The paper's statements on the best coating of each shape."""
+    """Return the paper's statements on the best coating of each shape, with verdicts."""
     found = []
     for name, title in OBJECTIVES.items():
         found.append(_cylinder(numbers["scores"]["cylinder"][name], title))
@@ -119,7 +119,7 @@ def _cylinder(column: Values, title: str) -> Claim:
     agrees = None if top is None or len(alike) == len(column) else f"{CYLINDER_BEST:g}" in alike
     return Claim(
         f"On the cylinder, a specularity of about {CYLINDER_BEST:g} is best ({title}).",
-        told_best(column, top, alike),
+        best_text(column, top, alike),
         agrees,
         WHY_COATING,
     )
@@ -134,7 +134,7 @@ def _sphere(column: Values, title: str) -> Claim:
             agrees = None
     return Claim(
         f"On the sphere, a specularity of up to {SPHERE_MOST:g} is best ({title}).",
-        told_best(column, top, alike),
+        best_text(column, top, alike),
         agrees,
         WHY_COATING,
     )
@@ -161,8 +161,8 @@ def _best_mean(column: Values) -> float | None:
     return None if top is None else float(column[top]["mean"])
 
 
-def told_best(column: Values, top: str | None, alike: list[str]) -> str:
-    """Such as ``best at 0.4 (0.81 ± 0.01); not significantly different: 0.3``."""
+def best_text(column: Values, top: str | None, alike: list[str]) -> str:
+    """Return a text such as ``best at 0.4 (0.81 ± 0.01); not significantly different: 0.3``."""
     if top is None:
         return "no scores"
     others = ", ".join(value for value in alike if value != top)
@@ -194,7 +194,7 @@ FITTED_NOTE = (
 
 
 def tables(numbers: Values) -> list[Table]:
-    """One table an objective."""
+    """Return one table for each objective."""
     found = []
     for name, title in OBJECTIVES.items():
         columns = [numbers["scores"][label][name] for label in SHAPES]
@@ -204,7 +204,7 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """Both objectives over specularity, and nine balls on each shape."""
+    """Draw both objectives over specularity, and nine balls on each shape."""
     from optisense.report.drawing import new_figure
 
     figure = new_figure(11.0, 6.4)

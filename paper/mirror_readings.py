@@ -1,8 +1,8 @@
-"""GelSight Svelte's mirror under readings of what its search may change, and of its skin.
+"""Searches of GelSight Svelte's mirror under several interpretations of the paper.
 
 The OptiSense paper bends the mirror "between flat and most curved", and considers "a simplified
-sensing surface" and "the centre of the sensing surface" first. Each choice is searched by gradient,
-which needs few trials.
+sensing surface" and "the centre of the sensing surface" first. Each choice of bounds and skin is
+searched by the gradient method, which needs few trials.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ the picture at the start, where the usual limit is 20 %."""
 
 
 def factors() -> dict[str, tuple[str, ...]]:
-    """Options of each factor, the default first, in the order of `units`."""
+    """Return the options of each factor, the default first, in the order of `units`."""
     return {"the mirror bends": tuple(SPACES), "part of the skin": SKINS}
 
 
@@ -71,10 +71,9 @@ def units(settings: Values) -> dict[tuple[str, str], Unit]:
 
 
 def bent_mirror(inputs: Mapping[str, Any], folder: Path) -> Found:
-    """A search of the mirror by AOAP: `design`, `skin` (one of `SKINS`), `space`, `budget`,
-    `settings`.
+    """Search the mirror by AOAP; return AOAP and the stretch of circles, at the start and the best.
 
-    Tells AOAP and the stretch of round things for the start and for the best trial.
+    The inputs are `design`, `skin` (one of `SKINS`), `space`, `budget` and `settings`.
     """
     from optisense.search import Around, search
 
@@ -124,7 +123,7 @@ def crop_to_middle(design: SensorDesign) -> None:
 
 
 def claims_of(record: Record) -> list[Claim]:
-    """The paper's statements on the mirror, held against one search."""
+    """Return the paper's statements on the mirror, with verdicts from one search."""
     found = record.values
     nothing = {"aoap": None, "stretch": None}
     first, best = found.get("first", nothing), found.get("best", nothing)

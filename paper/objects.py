@@ -1,4 +1,4 @@
-"""The things that the paper presses into GelBelt and GelSight Svelte, in outline: mm."""
+"""Simplified models of the objects that the paper presses into GelBelt and GelSight Svelte; mm."""
 
 from __future__ import annotations
 
@@ -10,23 +10,26 @@ from optisense.geometry import MeshIndenter, TriangleMesh
 from optisense.geometry.mesh import grid_faces
 
 SCREW_RADIUS, SCREW_PITCH, THREAD_DEPTH, SCREW_LENGTH = 3.0, 1.0, 0.6, 16.0
-"""An M6 screw, lying on its side; along x."""
+"""Outer radius, pitch, depth of the thread and length of an M6 screw (ISO 261), mm.
+
+The screw lies on its side, along x.
+"""
 
 BOARD_PITCH, HOLE, BOARD_SIDE = 2.54, 1.3, 20.0
-"""A breadboard: square holes in a grid of a tenth of an inch."""
+"""Pitch (0.1 inch) and side of the square holes of a breadboard, and side of the board, mm."""
 
 TOOTH_PITCH, TOOTH_HEIGHT, RACK_LENGTH, RACK_WIDTH = 3.14, 2.25, 22.0, 8.0
-"""A rack of module 1: trapezoidal teeth, 20 degrees flank."""
+"""Pitch, height of the teeth, length and width of a rack of module 1 mm (ISO 53), mm."""
 
 STUD_PITCH, STUD_RADIUS, STUD_HEIGHT = 8.0, 2.4, 1.7
-"""A toy brick, studs towards the sensor."""
+"""Pitch, radius and height of the studs of a toy brick, which point to the sensor, mm."""
 
 SAMPLES_A_MM = 12
-"""Number of heights per mm along each axis; details of a tenth of a millimetre are kept."""
+"""Number of heights per mm along each axis; details of 0.1 mm are resolved."""
 
 
 def screw() -> MeshIndenter:
-    """A screw on its side: a cylinder whose radius follows a helix."""
+    """Return a screw on its side: a cylinder whose radius follows a helix."""
     along = np.linspace(-SCREW_LENGTH / 2, SCREW_LENGTH / 2, SAMPLES_A_MM * int(SCREW_LENGTH) + 1)
     around = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 121)
     x, angle = np.meshgrid(along, around, indexing="ij")
@@ -37,7 +40,7 @@ def screw() -> MeshIndenter:
 
 
 def breadboard() -> MeshIndenter:
-    """A plate with a grid of square holes."""
+    """Return a plate with a grid of square holes."""
     steps = int(BOARD_SIDE * SAMPLES_A_MM)
     x, y = _grid(BOARD_SIDE, BOARD_SIDE, steps, steps)
     inside = np.maximum(*(np.abs((v / BOARD_PITCH) % 1.0 - 0.5) for v in (x, y))) * BOARD_PITCH
@@ -46,7 +49,7 @@ def breadboard() -> MeshIndenter:
 
 
 def rack() -> MeshIndenter:
-    """Teeth of a rack across x."""
+    """Return a rack whose teeth lie across x, with flanks of 20 degrees."""
     x, y = _grid(RACK_LENGTH, RACK_WIDTH, int(RACK_LENGTH * SAMPLES_A_MM), 16)
     away = np.abs((x / TOOTH_PITCH) % 1.0 - 0.5) * TOOTH_PITCH
     flank = TOOTH_HEIGHT * np.tan(np.radians(20.0))
@@ -55,7 +58,7 @@ def rack() -> MeshIndenter:
 
 
 def brick() -> MeshIndenter:
-    """A brick with two rows of three studs."""
+    """Return a brick with two rows of three studs."""
     length, width = 3 * STUD_PITCH - 0.2, 2 * STUD_PITCH - 0.2
     x, y = _grid(length, width, int(length * SAMPLES_A_MM), int(width * SAMPLES_A_MM))
     centre_x = (np.round(x / STUD_PITCH)) * STUD_PITCH
@@ -74,6 +77,7 @@ OBJECTS: dict[str, Callable[[], MeshIndenter]] = {
 
 
 def _grid(length: float, width: float, columns: int, rows: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return x and y of a centred grid, each (columns + 1, rows + 1) mm."""
     x = np.linspace(-length / 2, length / 2, columns + 1)
     y = np.linspace(-width / 2, width / 2, rows + 1)
     first, second = np.meshgrid(x, y, indexing="ij")
@@ -81,7 +85,7 @@ def _grid(length: float, width: float, columns: int, rows: int) -> tuple[np.ndar
 
 
 def _indenter(points: np.ndarray) -> MeshIndenter:
-    """An indenter of a grid of points (a, b, 3), seen from below; facets keep their normals."""
+    """Return the indenter of a grid of points (a, b, 3) mm that face downwards."""
     faces = grid_faces(*points.shape[:2])
     mesh = TriangleMesh(points.reshape(-1, 3), faces)
     if mesh.face_normals[:, 2].sum() > 0.0:

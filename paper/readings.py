@@ -25,8 +25,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LAWS = ("blend", "blend-fixed-roughness", "conductor")
-"""What specularity changes (see docs/design-file.md): shares of paint and metal and the metal's
-roughness; the shares alone; the roughness of bare metal."""
+"""Models of what specularity changes (see docs/design-file.md).
+
+In turn: the shares of paint and metal together with the metal's roughness, the shares alone, and
+the roughness of bare metal.
+"""
 
 EXPOSURES = ("lowered for bright contacts", "of the untouched skin")
 
@@ -49,14 +52,14 @@ VARIANTS: dict[str, dict[str, dict[str, Any]]] = {
 """Readings of both scores: settings by name, the default first."""
 
 BELT = ("2", "3")
-"""GelBelt's light designs that are compared; hardly any light of design 1 reaches the belt."""
+"""Light designs of GelBelt that are compared; hardly any light of design 1 reaches the belt."""
 
 Reading = tuple[str, ...]
-"""An option of each factor."""
+"""One option of each factor, in the order of the factors."""
 
 
 def factors(settings: Values) -> dict[str, tuple[str, ...]]:
-    """Options of each factor, the default first."""
+    """Return the options of each factor, the default first."""
     return {
         "specularity changes": tuple(settings["laws"]),
         "exposure": EXPOSURES,
@@ -66,7 +69,7 @@ def factors(settings: Values) -> dict[str, tuple[str, ...]]:
 
 
 def _designs(settings: Values) -> Iterator[tuple[str, str, Values]]:
-    """Name, law and plain design of each sensor that is scored with `scores_by_readings`."""
+    """Yield name, law and plain design of each sensor that `scores_by_readings` scores."""
     for law in settings["laws"]:
         for value in settings["specularities"]:
             bare = law != "conductor" and value == 0.0  # without metal both blends are one
@@ -85,7 +88,7 @@ def _designs(settings: Values) -> Iterator[tuple[str, str, Values]]:
 
 
 def steps(settings: Values) -> Steps:
-    """Scores of all designs at all depths, in all ways of exposing and scoring."""
+    """Score all designs at all depths, with all exposures and settings of the scores."""
     images = {key: settings[key] for key in ("resolution", "photons", "together")}
     designs = list(_designs(settings))
     units = [
@@ -143,7 +146,7 @@ def steps(settings: Values) -> Steps:
 
 
 def _held(options: dict[str, tuple[str, ...]], found: Iterable[list[Claim]]) -> Values:
-    """The factors, and whether each statement holds under each reading, in the readings' order."""
+    """Return the factors, and whether each statement holds, in the order of the readings."""
     held: dict[str, list[bool | None]] = {}
     for claims_found in found:
         for claim in claims_found:
@@ -152,7 +155,7 @@ def _held(options: dict[str, tuple[str, ...]], found: Iterable[list[Claim]]) -> 
 
 
 def _groups(numbers: Values) -> list[Values]:
-    """The statements on pressed balls, and those on the mirror, each with their factors."""
+    """Return the statements on pressed balls and those on the mirror, each with their factors."""
     return [{key: numbers[key] for key in ("factors", "held")}, numbers["mirror"]]
 
 
@@ -162,7 +165,7 @@ def _claims_under(
     answers: dict[tuple[str, str, float], Record],
     tips: dict[float, Record],
 ) -> list[Claim]:
-    """The paper's statements, held against the scores of one reading."""
+    """Return the paper's statements, with verdicts from the scores of one reading."""
     law, exposure, depth_text, *own = reading
     depth = next(each for each in settings["depths"] if f"{each:g} mm" == depth_text)
     variant = dict(zip(VARIANTS, own, strict=True))
@@ -207,7 +210,7 @@ def _named(what: str, claim: Claim) -> Claim:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """Whether each statement holds under all readings, under none, or under some of them."""
+    """Return whether each statement holds under all readings, under none, or under some of them."""
     found = []
     rows = [item for group in _groups(numbers) for item in group["held"].items()]
     for says, row in rows:
@@ -236,12 +239,12 @@ WHY_NONE = (
 
 
 def _readings(numbers: Values) -> list[Reading]:
-    """All readings, in the order of the verdicts of each statement; the default is the first."""
+    """Return all readings in the order of each statement's verdicts; the default is the first."""
     return list(itertools.product(*numbers["factors"].values()))
 
 
 def tables(numbers: Values) -> list[Table]:
-    """How many statements hold with each option, and with which options each statement holds."""
+    """Return tables: how many statements hold with each option, and which with which options."""
     rows, best, shares = [], [], []
     for group in _groups(numbers):
         held = group["held"]
@@ -278,7 +281,7 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def _by_option(group: Values) -> tuple[list[list[str]], list[list[str]]]:
-    """A row for each option of each factor, and for each statement a cell for each factor."""
+    """Return a row for each option of each factor, and for each statement a cell per factor."""
     held, readings = group["held"], _readings(group)
     rows: list[list[str]] = []
     cells: list[list[str]] = [[] for _ in held]
@@ -299,14 +302,14 @@ def _by_option(group: Values) -> tuple[list[list[str]], list[list[str]]]:
 
 
 def _counts(held: dict[str, list[bool | None]]) -> list[int]:
-    """Number of statements that hold, for each reading."""
+    """Return the number of statements that hold, for each reading."""
     return [
         sum(holds is True for holds in verdicts) for verdicts in zip(*held.values(), strict=True)
     ]
 
 
 def notes(numbers: Values) -> list[str]:
-    """Notes on what is varied, and for which sensors."""
+    """Return paragraphs on what is varied, and for which sensors."""
     return [
         "Each combination of the options is one interpretation. In this section, *inconclusive* "
         "means that a statement holds under some interpretations and not under others. The effect "
@@ -320,7 +323,7 @@ def notes(numbers: Values) -> list[str]:
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """How many readings make how many statements true."""
+    """Draw the number of readings over the number of statements that hold under them."""
     from optisense.report.drawing import new_figure
 
     figure = new_figure(7.0, 3.2)

@@ -29,16 +29,17 @@ EXPERIMENTS: dict[str, Experiment] = {
         readings,
     )
 }
-"""The experiments, in the order of the page."""
+"""Experiments by name, in the order of the page."""
 
 ALL = "all"
+"""Name on the command line that stands for every experiment."""
 
 
 def find(name: str) -> list[Experiment]:
-    """The experiment of a name, or all.
+    """Return the experiment of a name, or all experiments.
 
     Raises:
-        ExperimentError: there is none of this name; names the near match.
+        ExperimentError: no experiment has this name; the hint suggests the most similar one.
     """
     if name == ALL:
         return list(EXPERIMENTS.values())

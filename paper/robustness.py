@@ -1,9 +1,9 @@
-"""Which conclusions of the paper survive a change of the dimensions that we had to assume.
+"""Experiment on robustness: which conclusions of the paper depend on assumed dimensions.
 
-Each dimension of a sensor that no source gives is taken to both ends of its plausible range, one at
-a time, and then all of them are drawn at once. In each of these geometries the conclusion is a
-margin: above 0 it holds. What the seeds scatter by on the sensor as assumed is the noise of a
-margin, and within it nothing can be told.
+Each dimension of a sensor that no source gives is set to both ends of its plausible range, one at
+a time; then all of them are drawn at random. In each of these geometries, a conclusion has a margin
+and holds if the margin is above 0. The noise of a margin is its standard deviation over seeds on
+the sensor as assumed; a margin within the noise is inconclusive.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ AS_ASSUMED = "as assumed"
 
 
 def geometries(ranges: Mapping[str, Sequence[float]], draws: int) -> dict[str, dict[str, Any]]:
-    """Dimensions by a name for each geometry, the one as assumed first.
+    """Return the dimensions of each geometry by its name, the one as assumed first.
 
     Args:
-        ranges: (lowest, highest) plausible value of each dimension.
-        draws: geometries in which all dimensions are drawn at once, evenly.
+        ranges: lowest and highest plausible value of each dimension, in the dimension's unit.
+        draws: number of geometries in which all dimensions are drawn from uniform distributions.
     """
     found: dict[str, dict[str, Any]] = {AS_ASSUMED: {}}
     for name, ends in ranges.items():
@@ -46,7 +46,7 @@ def geometries(ranges: Mapping[str, Sequence[float]], draws: int) -> dict[str, d
 
 
 def steps(settings: Values) -> Steps:
-    """All questions of all geometries; the geometry as assumed with all seeds."""
+    """Evaluate all questions for all geometries, and the geometry as assumed with all seeds."""
     asked: list[tuple[Question, str, list[Unit]]] = []
     for question in QUESTIONS:
         ranges = settings["ranges"][question.sensor]
@@ -64,11 +64,11 @@ def steps(settings: Values) -> Steps:
         found = question.margins([next(records) for _ in units], settings)
         for name in question.conclusions:
             margins[name].setdefault(geometry, []).append(found[name])
-    return Finding({"margins": {name: _told(rows) for name, rows in margins.items()}})
+    return Finding({"margins": {name: _with_verdicts(rows) for name, rows in margins.items()}})
 
 
-def _told(rows: Mapping[str, list[float | None]]) -> Values:
-    """The margin as assumed with its noise, and margin and verdict of each geometry."""
+def _with_verdicts(rows: Mapping[str, list[float | None]]) -> Values:
+    """Return the margin as assumed with its noise, and margin and verdict of each geometry."""
     nominal = spread(rows[AS_ASSUMED])
     noise = nominal["standard_deviation"] or 0.0
     verdicts: dict[str, Any] = {}
@@ -81,11 +81,12 @@ def _told(rows: Mapping[str, list[float | None]]) -> Values:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """One a conclusion: it agrees where it holds in all geometries."""
+    """Return one statement for each conclusion, which agrees if it holds in all geometries."""
     return [_claim(CONCLUSIONS[name], found) for name, found in numbers["margins"].items()]
 
 
 def _claim(text: str, found: Values) -> Claim:
+    """Return a conclusion with its verdict over all geometries."""
     verdicts = {name: each["holds"] for name, each in found["geometries"].items()}
     holding = [name for name, holds in verdicts.items() if holds]
     failing = [name for name, holds in verdicts.items() if holds is False]
@@ -110,7 +111,7 @@ def _claim(text: str, found: Values) -> Claim:
 
 
 def notes(numbers: Values) -> list[str]:
-    """What a geometry is."""
+    """Return a paragraph that explains geometries and margins."""
     return [
         "A geometry is the sensor with one assumed dimension at an end of its plausible range, or "
         "with random values of all of them. A statement agrees if it holds in all geometries, and "
@@ -121,7 +122,7 @@ def notes(numbers: Values) -> list[str]:
 
 
 def tables(numbers: Values) -> list[Table]:
-    """The margins of each sensor's conclusions."""
+    """Return tables of the margins of each sensor's conclusions."""
     found = []
     for question in QUESTIONS:
         names = list(question.conclusions)
@@ -137,12 +138,13 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def _cell(each: Values) -> str:
+    """Return the margin and verdict of one geometry as text."""
     mark = {True: "holds", False: "does not hold", None: "inconclusive"}[each["holds"]]
     return "no score" if each["margin"] is None else f"{each['margin']:+.3g} ({mark})"
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """Each margin over what it could be: in units of the largest of its conclusion."""
+    """Draw each margin, in units of the largest margin of its conclusion."""
     from optisense.report.drawing import AMBER, BLUE, GREY, RED, new_figure
 
     figure = new_figure(10.0, 4.6)

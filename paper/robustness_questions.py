@@ -1,4 +1,4 @@
-"""What is asked of each geometry of a sensor, and the margins of the paper's conclusions there."""
+"""Evaluations of each geometry of a sensor, and the margins of the paper's conclusions there."""
 
 from __future__ import annotations
 
@@ -18,31 +18,34 @@ from paper.mini_shapes import OBJECTIVES
 from paper.unit import Record, Unit
 
 LOW, HIGH = "0.2", "0.6"
-"""Specularities of the Mini's coating that are compared."""
+"""Specularities (0 to 1) of the Mini's coating that are compared, as keys of results."""
 
 PRESS_DEPTH = "press_depth"
-"""mm, of the objectives' balls: not a dimension of the sensor, but the paper gives none."""
+"""Name, among the ranges of dimensions, of the depth (mm) to which the objectives press balls.
+
+It is no dimension of the sensor, but the paper does not state it either.
+"""
 
 FOUND, ORIGINAL = "RGBRGBRG", "GRRGGRRG"
-"""Colourings of GelSight360: the paper's best by NormDiff, and the sensor's own."""
+"""Colourings of GelSight360: the paper's best by NormDiff, and that of the original sensor."""
 
-TIMES = 2.0
-"""AOAP must grow so many times by the search (in the paper: 2.7 times)."""
+LEAST_GAIN = 2.0
+"""Factor by which the search must raise AOAP for the conclusion to hold; it is 2.7 in the paper."""
 
 Dimensions = Mapping[str, Any]
-"""Arguments of a sensor's builder."""
+"""Arguments of a sensor's builder by name."""
 
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of one geometry of a sensor, and the margins that follow.
+    """Evaluations of one geometry of a sensor, and the margins that follow from them.
 
     Attributes:
-        sensor: a built-in one.
-        conclusions: what the paper says, by a short name.
-        units: of dimensions, settings and a seed.
-        margins: by the conclusions' names, of the records of these units.
-        has_chance: whether seeds matter.
+        sensor: name of a built-in sensor.
+        conclusions: conclusions of the paper by short names.
+        units: returns the units from dimensions, settings and a seed.
+        margins: returns the margins by the conclusions' names, from the records of these units.
+        has_chance: whether the results depend on the seed.
     """
 
     sensor: str
@@ -177,7 +180,7 @@ def _mirror_margins(records: Sequence[Record], settings: Values) -> dict[str, fl
     values = records[0].values
     if "best" not in values:
         return {"mirror": None}
-    return {"mirror": values["best"]["aoap"] - TIMES * values["start"]["aoap"]}
+    return {"mirror": values["best"]["aoap"] - LEAST_GAIN * values["start"]["aoap"]}
 
 
 def _score(design: Values, settings: Values, seed: int, what: str) -> Unit:
@@ -240,7 +243,10 @@ QUESTIONS = (
     ),
     Question(
         "gelsight-svelte",
-        {"mirror": f"Bending GelSight Svelte's mirror raises AOAP to {TIMES:g} times its value."},
+        {
+            "mirror": f"Bending GelSight Svelte's mirror raises AOAP to {LEAST_GAIN:g} times its "
+            "value."
+        },
         _mirror_units,
         _mirror_margins,
         has_chance=False,

@@ -1,7 +1,7 @@
-"""Which units one process works out in a row, so that it need not make the same thing twice.
+"""Shares of units: those that one process computes in a row, to reuse scenes and light.
 
-A sensor of other dimensions needs a new scene, another coating or seed needs new photons; other
-contacts, pictures and scores under the same light need neither.
+A sensor with other dimensions needs a new scene, and another coating or seed needs new photons;
+other contacts, pictures and scores under the same light need neither.
 """
 
 from __future__ import annotations
@@ -13,13 +13,17 @@ from optisense.objectives.score import json_ready
 from paper.unit import Unit
 
 LEAST_UNITS = 6
-"""Least units of a share, where so many have the same sensor: fewer build it anew often, more are
-spread badly over processes, and progress comes in large steps."""
+"""Smallest number of units of a share, if so many have the same sensor.
+
+Smaller shares build the sensor again more often. Larger ones leave processes idle at the end and
+make the progress line jump.
+"""
 
 
 def shares(units: Iterable[Unit]) -> list[list[Unit]]:
-    """Units in groups: those with the same light together, then those of the same sensor, in the
-    order in which sensors and lights are first asked for.
+    """Return units in groups: those with the same light together, then those of the same sensor.
+
+    The groups are in the order in which sensors and lights first occur.
     """
     by_sensor: dict[str, dict[str, list[Unit]]] = {}
     for unit in units:
@@ -38,7 +42,7 @@ def shares(units: Iterable[Unit]) -> list[list[Unit]]:
 
 
 def _sensor(unit: Unit) -> str:
-    """The same text for units that build the same scene; searches build many."""
+    """Return a text that is the same for units with the same scene; a search has one of its own."""
     design = unit.inputs.get("design")
     if design is None or "method" in unit.inputs:
         return unit.key
@@ -46,7 +50,7 @@ def _sensor(unit: Unit) -> str:
 
 
 def _light(unit: Unit) -> str:
-    """The same text for units that trace the same photons."""
+    """Return a text that is the same for units that trace the same photons."""
     asked = {**unit.inputs, **unit.inputs.get("settings", {})}
     light = [asked.get("design"), asked.get("photons"), asked.get("seed")]
     return json.dumps(json_ready(light), sort_keys=True)

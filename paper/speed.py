@@ -1,7 +1,7 @@
-"""How long a tactile image takes, beside the times that the OptiSense paper gives.
+"""Experiment on the time of a tactile image, compared with the times of the OptiSense paper.
 
-The paper: 6 s for GelSight Mini on an Apple M2, 8.9 s for GelBelt, 8.7 s for GelSight360; it gives
-neither the resolution, nor the photons, nor the noise, nor a time for GelSight Svelte.
+The paper states 6 s for GelSight Mini on an Apple M2, 8.9 s for GelBelt, and 8.7 s for GelSight360.
+It states neither the resolution, nor the photons, nor the noise, nor a time for GelSight Svelte.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ PAPER = {"gelsight-mini-ideal": 6.0, "gelbelt": 8.9, "gelsight360": 8.7, "gelsig
 
 KINDS = {"new_light": "new light", "light_kept": "light kept"}
 BUSY = 1.3
-"""Ratio of wall time times processors to processor time above which something else ran too."""
+"""Ratio of wall time times processors to processor time above which other programs ran, too."""
 
 
 def steps(settings: Values) -> Steps:
-    """Each sensor at all resolutions, one after the other."""
+    """Measure each sensor at all resolutions, one sensor after the other."""
     records = yield [
         Unit(
             image_times,
@@ -66,6 +66,7 @@ def steps(settings: Values) -> Steps:
 
 
 def _machine() -> Values:
+    """Return the model and the number of the machine's processors."""
     model = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.is_file():
@@ -75,7 +76,7 @@ def _machine() -> Values:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """The paper's times."""
+    """Return the paper's times as statements, with verdicts."""
     found = []
     for name, seconds in PAPER.items():
         for size, row in numbers["times"].get(name, {}).items():
@@ -99,13 +100,13 @@ def claims(numbers: Values) -> list[Claim]:
 
 
 def _was_busy(row: Values, about: Values) -> bool:
-    """Whether processors did something else, or nothing, for much of the time."""
+    """Return whether the processors were idle or ran other programs for much of the time."""
     wall = float(row["new_light"]["mean"]) * (about["processors"] or 1)
     return wall > BUSY * float(row["new_light_processor"]["mean"]) + 1.0
 
 
 def notes(numbers: Values) -> list[str]:
-    """The machine, and whether it was busy."""
+    """Return a paragraph on the machine, and on whether it was busy."""
     about = numbers["machine"]
     busy = [
         f"{name} {size}"
@@ -128,7 +129,7 @@ def notes(numbers: Values) -> list[str]:
 
 
 def tables(numbers: Values) -> list[Table]:
-    """All times."""
+    """Return the table of all times."""
     rows = []
     for name, sizes in numbers["times"].items():
         for size, row in sizes.items():
@@ -151,7 +152,7 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """Bars beside the paper's."""
+    """Draw the times as bars beside those of the paper."""
     from optisense.report.drawing import AMBER, BLUE, GREY, new_figure
 
     figure = new_figure(9.0, 3.8)

@@ -1,4 +1,4 @@
-"""Means over seeds, how sure they are, and comparisons that know it."""
+"""Means over seeds, their standard deviations, and comparisons by t tests."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import numpy as np
 
 from optisense.objectives.score import deviation_of
 
-SURE = 0.95
-"""Confidence at which two values count as different (one-sided t test)."""
+CONFIDENCE = 0.95
+"""Confidence from which on two values count as different (one-sided t test), the usual choice."""
 
 Spread = dict[str, Any]
-"""mean, standard_deviation (None for one value), values (None where a seed gave none)."""
+"""Dict of mean, standard_deviation (None for one value) and values (None if a seed gave none)."""
 
 
 def spread(values: Sequence[float | None]) -> Spread:
-    """Mean and standard deviation (of a sample) over seeds; seeds without a value are left out."""
+    """Return mean and sample standard deviation over seeds; seeds without a value are left out."""
     there = [float(value) for value in values if value is not None and math.isfinite(value)]
     return {
         "mean": float(np.mean(there)) if there else None,
@@ -29,7 +29,7 @@ def spread(values: Sequence[float | None]) -> Spread:
 
 
 def shown(found: Spread, digits: int = 3) -> str:
-    """Such as ``0.951 ± 0.003``; ``none`` where there is no value."""
+    """Return a text such as ``0.951 ± 0.003``; ``none`` if there is no value."""
     if found["mean"] is None:
         return "none"
     text = number(found["mean"], digits)
@@ -38,7 +38,7 @@ def shown(found: Spread, digits: int = 3) -> str:
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """A number with so many digits that count, never in powers of ten."""
+    """Return a number with so many significant digits, never in powers of ten."""
     if value is None or not math.isfinite(value):
         return "none"
     if value == 0.0:
@@ -48,10 +48,10 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def is_larger(one: Spread, other: Spread) -> bool | None:
-    """Whether one mean is larger than another, by the differences seed by seed.
+    """Return whether one mean is larger than another, by a t test of the differences of each seed.
 
-    None where the seeds can't tell. With a single seed the plain comparison counts, and equal
-    values can't be told apart.
+    The result is None if the difference is not significant. With a single seed, the two values are
+    compared, and None is returned if they are equal.
     """
     pairs = zip(one["values"], other["values"], strict=True)
     differences = np.array([a - b for a, b in pairs if a is not None and b is not None])
@@ -67,7 +67,7 @@ def is_larger(one: Spread, other: Spread) -> bool | None:
 
 
 def best(values: Mapping[str, Spread]) -> tuple[str | None, list[str]]:
-    """The name with the largest mean, and all names that the seeds can't tell from it."""
+    """Return the name with the largest mean, and all names that do not differ significantly."""
     there = {name: each for name, each in values.items() if each["mean"] is not None}
     if not there:
         return None, []
@@ -77,10 +77,10 @@ def best(values: Mapping[str, Spread]) -> tuple[str | None, list[str]]:
 
 
 def spearman(first: Sequence[float], second: Sequence[float]) -> tuple[float, float]:
-    """The rank correlation, and the share of all orders of `second` that reach it or more.
+    """Return Spearman's rank correlation and its one-sided p-value, by all permutations.
 
-    NaN where there are fewer than three pairs or all are alike. The share is exact, so it grows
-    with the factorial of their number; nine at most are meant.
+    Both are NaN if there are fewer than three pairs, or if all values are equal. The p-value is
+    exact; its cost grows with the factorial of the number of pairs, which should be at most nine.
     """
     from scipy.stats import rankdata
 
@@ -95,6 +95,7 @@ def spearman(first: Sequence[float], second: Sequence[float]) -> tuple[float, fl
 
 
 def _quantile(freedom: int) -> float:
+    """Return the quantile of the t distribution at `CONFIDENCE`, for these degrees of freedom."""
     from scipy.stats import t
 
-    return float(t.ppf(SURE, freedom))
+    return float(t.ppf(CONFIDENCE, freedom))

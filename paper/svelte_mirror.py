@@ -1,7 +1,7 @@
-"""GelSight Svelte: the back mirror bent so that the camera looks straight at the skin.
+"""Experiment on GelSight Svelte: bending the back mirror so that chief rays meet the skin upright.
 
-The OptiSense paper, case study IV: AOAP of the first mirror and of the one that CMA-ES finds over
-its cage of 81 numbers, and tactile images before and after.
+It reproduces case study IV of the OptiSense paper: AOAP of the first mirror and of the one that
+CMA-ES finds by its cage of 81 coordinates, and tactile images before and after.
 """
 
 from __future__ import annotations
@@ -23,13 +23,15 @@ if TYPE_CHECKING:
 SENSOR = "gelsight-svelte"
 CAGE = "cages.M1.blend"
 FIRST, BEST = 0.236, 0.635
-"""AOAP in the paper, before and after."""
+"""AOAP (0 to 1) of the first and of the best mirror in the OptiSense paper."""
 
 NEAR = 0.05
-"""Difference of AOAP values below which they count as alike."""
+"""Difference of two AOAP values (0 to 1) below which they count as alike."""
 
 LESS = 0.8
-"""Distortion counts as reduced where what it adds to a round shape falls to this share."""
+"""Ratio, after to before, of the excess stretch of circles (length over width, minus 1) up to which
+the distortion counts as reduced; the paper shows the reduction in pictures without numbers.
+"""
 
 SHOWN = {
     "aoap": "AOAP",
@@ -44,7 +46,7 @@ METHODS = {"cma-es": "CMA-ES", "gradient": "gradient"}
 def search_unit(
     method: str, trials: int, seed: int, resolution: list[int], design: Values | None = None
 ) -> Unit:
-    """A search of the mirror by AOAP."""
+    """Return the unit of a search of the mirror by AOAP."""
     return Unit(
         searched,
         {
@@ -61,7 +63,7 @@ def search_unit(
 
 
 def steps(settings: Values) -> Steps:
-    """The searches; then both mirrors at full resolution, and pictures of them."""
+    """Run the searches; then score both mirrors at full resolution, and render pictures."""
     rays = settings["ray_resolution"]
     seeds = range(settings["seeds"])
     records = yield [
@@ -174,7 +176,7 @@ def _numbers(
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """The paper's statements on the mirror."""
+    """Return the paper's statements on the mirror, with verdicts."""
     mirrors = numbers["mirrors"]
     first, best = mirrors["first"]["aoap"], mirrors["cma-es"]["aoap"]
     gradient = mirrors["gradient"]["aoap"]
@@ -223,7 +225,7 @@ def _trials(numbers: Values, method: str) -> int:
 
 
 def tables(numbers: Values) -> list[Table]:
-    """The mirrors side by side."""
+    """Return the table of the mirrors side by side."""
     titles = {"first": "first", **METHODS}
     rows = [
         [titles[name], *(shown(each[key]) for key in SHOWN)]
@@ -233,7 +235,7 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def notes(numbers: Values) -> list[str]:
-    """What spread means here."""
+    """Return a paragraph that explains the standard deviations and the stretch of circles."""
     return [
         "Chief rays use no random numbers. The standard deviation is that of CMA-ES over several "
         "seeds; the gradient method uses no random numbers. The searches trace fewer rays than the "
@@ -242,7 +244,7 @@ def notes(numbers: Values) -> list[str]:
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """The courses of the searches, and what ball and brick look like."""
+    """Draw the courses of the searches, and pictures of a ball and a brick."""
     from optisense.report.drawing import AMBER, BLUE, GREY, new_figure
 
     figure = new_figure(11.0, 5.6)

@@ -1,8 +1,9 @@
-"""Do sensors that score well serve a robot well? Angles and radii read from curved Minis.
+"""Experiment on perception tasks: whether the objectives show the trends of estimated quantities.
 
-The OptiSense paper, "Why choosing those objective functions?": the misalignment angle to a plane
-and the radius of a cylinder, read by a random forest, and their signal-to-noise ratios, over the
-specularity of the coating, on the cylindrical and the spherical GelSight Mini.
+It reproduces the section "Why choosing those objective functions?" of the OptiSense paper: the
+misalignment angle to a plane and the radius of a cylinder, estimated by a random forest, and their
+signal-to-noise ratios, over the specularity of the coating, on the cylindrical and the spherical
+GelSight Mini.
 """
 
 from __future__ import annotations
@@ -23,17 +24,17 @@ if TYPE_CHECKING:
 CURVED = {label: SHAPES[label] for label in ("cylinder", "sphere")}
 TASKS = {"misalignment": ("angle", "degrees"), "cylinder-radius": ("radius", "mm")}
 SHINY = 0.6
-"""Coatings from this specularity on are compared with those below."""
+"""Specularity from which on coatings count as shiny; they are compared with those below."""
 
 PAPERS_ERROR = 0.5
-"""The paper's smallest mean absolute error of the angle, in degrees."""
+"""Smallest mean absolute error of the angle in the OptiSense paper, degrees."""
 
 FOLLOWS = 0.5
-"""A mean rank correlation from here on counts as the same trend."""
+"""Mean rank correlation from which on an objective counts as showing the trend of the tasks."""
 
 
 def steps(settings: Values) -> Steps:
-    """Both tasks and both objectives for each shape, coating and seed."""
+    """Compute both tasks and both objectives for each shape, coating and seed."""
     seeds = range(settings["seeds"])
     asked = [
         Unit(
@@ -68,9 +69,9 @@ def steps(settings: Values) -> Steps:
 
 
 def _agreement(found: Values, label: str) -> Values:
-    """Rank correlation of each objective with each measure over coatings that have both.
+    """Return the rank correlation of each objective with each measure over the coatings.
 
-    1 is the same order: small errors and large ratios where scores are high.
+    It is 1 for the same order: small errors and large ratios where scores are high.
     """
     measures = {
         f"{task} {key}": (columns[key], -1.0 if key == "error" else 1.0)
@@ -97,7 +98,7 @@ def _agreement(found: Values, label: str) -> Values:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """The paper's statements on tasks."""
+    """Return the paper's statements on tasks, with verdicts."""
     found = []
     for label in CURVED:
         errors = numbers["tasks"][label]["misalignment"]["error"]
@@ -125,7 +126,7 @@ def claims(numbers: Values) -> list[Claim]:
 
 
 def _trends(columns: Values, label: str, what: str, unit: str) -> list[Claim]:
-    """Whether shiny coatings are worse, by error and by signal-to-noise ratio."""
+    """Return whether shiny coatings are worse, by error and by signal-to-noise ratio."""
     found = []
     for key, worse, title in (("error", 1, f"error ({unit})"), ("snr", -1, "SNR")):
         column = columns[key]
@@ -148,7 +149,7 @@ def _trends(columns: Values, label: str, what: str, unit: str) -> list[Claim]:
 
 
 def _means_over(column: Values, wanted: object) -> Values:
-    """The mean over some coatings, seed by seed."""
+    """Return the mean over the coatings whose specularity is wanted, seed by seed."""
     assert callable(wanted)
     rows = [each["values"] for x, each in column.items() if wanted(float(x))]
     means = []
@@ -159,6 +160,7 @@ def _means_over(column: Values, wanted: object) -> Values:
 
 
 def _follows(agreement: Values, name: str, title: str) -> Claim:
+    """Return whether an objective shows the trends of the tasks, by its mean rank correlation."""
     found = [
         cell["correlation"]
         for label in CURVED
@@ -181,7 +183,7 @@ def _follows(agreement: Values, name: str, title: str) -> Claim:
 
 
 def tables(numbers: Values) -> list[Table]:
-    """Errors and ratios of each shape, with the objectives; and the correlations."""
+    """Return tables of errors, ratios and objectives for each shape, and of the correlations."""
     found = []
     for label in CURVED:
         tasks, scores = numbers["tasks"][label], numbers["scores"][label]
@@ -215,7 +217,7 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
-    """Errors, ratios and objectives over specularity."""
+    """Draw errors, ratios and objectives over specularity."""
     from optisense.report.drawing import new_figure
 
     figure = new_figure(11.0, 6.4)

@@ -1,4 +1,4 @@
-"""The text of an experiment, made of its recorded result, and the page that collects all."""
+"""Text of an experiment, made from its recorded result, and the page of all experiments."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from paper.experiment import Experiment
 
 RESULT, PICTURE, TEXT = "result.json", "picture.png", "text.md"
-"""The files of an experiment in its folder."""
+"""Names of the files of an experiment in its folder."""
 
 MOST_GAPS = 6
-"""Number of gaps that the text tells one by one; the rest is counted."""
+"""Largest number of failed evaluations that the text lists; the number of the others is stated."""
 
 
 def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> str:
@@ -45,7 +45,7 @@ def chapter(experiment: Experiment, result: Mapping[str, Any], picture: str) -> 
 
 
 def _verdicts(claims: list[Mapping[str, Any]]) -> str:
-    """A table of statements, and the reasons why some do not hold, each reason once."""
+    """Return a table of statements, and the reasons why some do not hold, each reason once."""
     lines = ["| | statement of the paper | result | verdict |", "| --- | --- | --- | --- |"]
     reasons: dict[str, list[str]] = {}
     for number, claim in enumerate(claims, 1):
@@ -59,10 +59,12 @@ def _verdicts(claims: list[Mapping[str, Any]]) -> str:
 
 
 def _listed(words: list[str]) -> str:
+    """Return words as an enumeration, such as ``1, 2 and 3``."""
     return " and ".join(part for part in (", ".join(words[:-1]), words[-1]) if part)
 
 
 def _gaps(gaps: list[Mapping[str, str]]) -> str:
+    """Return the list of evaluations without a score, with the reasons."""
     lines = [f"Evaluations without a score ({len(gaps)}):", ""]
     lines += [f"- {gap['what']}: {gap['reason'].rstrip('.')}." for gap in gaps[:MOST_GAPS]]
     if len(gaps) > MOST_GAPS:
@@ -71,6 +73,7 @@ def _gaps(gaps: list[Mapping[str, str]]) -> str:
 
 
 def _how(name: str, result: Mapping[str, Any]) -> str:
+    """Return the sentence that states the command, the release and the cost of a result."""
     seconds = result["seconds"]
     seeds = result["settings"].get("seeds")
     over = f", {seeds} seed{'s' if seeds > 1 else ''}" if seeds else ""
@@ -84,10 +87,10 @@ def _how(name: str, result: Mapping[str, Any]) -> str:
 
 
 def read_result(folder: Path) -> dict[str, Any]:
-    """The recorded result of an experiment.
+    """Return the recorded result of an experiment.
 
     Raises:
-        ExperimentError: there is none, or it can't be read.
+        ExperimentError: the result does not exist, or can't be read.
     """
     path = folder / RESULT
     try:
@@ -100,16 +103,16 @@ def read_result(folder: Path) -> dict[str, Any]:
 
 
 def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None:
-    """One page of all experiments, with results and pictures in a folder beside it.
+    """Write one page of all experiments, with results and pictures in a folder beside it.
 
     Args:
-        page: the Markdown file; the folder has its name without the suffix.
+        page: path of the Markdown file; the folder has its name without the suffix.
         results: folder of all results.
-        experiments: those on the page, in this order.
+        experiments: the experiments on the page, in this order.
 
     Raises:
         ExperimentError: an experiment has no result.
-        OutputError: something can't be written.
+        OutputError: a file can't be written.
     """
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
@@ -139,10 +142,10 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
 
 
 def _took(spent: Iterable[Sequence[float]]) -> str:
-    """What all evaluations took; each counts once, however many experiments ask for it.
+    """Return the sentence on the cost of all evaluations, each of which counts once.
 
     Args:
-        spent: wall seconds, processor seconds and whether nothing ran beside it.
+        spent: wall seconds, processor seconds, and whether the evaluation ran alone.
     """
     rows = list(spent)
     shared = sum(wall for wall, _, alone in rows if not alone)
@@ -155,11 +158,12 @@ def _took(spent: Iterable[Sequence[float]]) -> str:
 
 
 def _counted(number: int, verdict: str) -> str:
-    """Such as ``1 agrees``, ``3 agree``."""
+    """Return a number of verdicts as text, such as ``1 agrees`` or ``3 agree``."""
     return f"{number} {verdict if number == 1 or verdict == OPEN else verdict.removesuffix('s')}"
 
 
 def _anchor(title: str) -> str:
+    """Return the anchor that GitHub makes of a heading."""
     kept = "".join(c for c in title.lower() if c.isalnum() or c in " -")
     return kept.replace(" ", "-")
 

@@ -1,4 +1,4 @@
-"""How long images take: the work of units that measure time."""
+"""Work of the units that measure the time of images."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ if TYPE_CHECKING:
     from optisense.optics import TactileImage
 
 UNTIMED_SEED = 10_000
-"""Seed of images that are not counted; it differs from the seeds of those that are."""
+"""Seed of the images that are not timed; it differs from the seeds 0, 1, ... of those that are."""
 
 
 def image_times(inputs: Mapping[str, Any], folder: Path) -> Found:
-    """How long images take: `design`, `resolutions`, `photons`, `seeds`, `ball` (radius, depth).
+    """Return the times of images, s.
 
-    For each seed an image with new light at the first resolution, and one more with the same light
-    at each. How light is traced does not depend on the pixels, so new light counts at the other
-    resolutions as the time that it added at the first. Before them images that are not counted, for
-    which kernels are compiled and the photon guide is learned. The noise is what two seeds differ
-    by in the contact, in relation to the mean there, over the square root of 2.
+    The inputs are `design`, `resolutions`, `photons`, `seeds` and `ball` (radius and depth, mm).
+    For each seed, an image with new light is rendered at the first resolution, and an image with
+    the same light at every resolution. Since photons do not depend on the pixels, the time that new
+    light adds at the first resolution is added at the others. Images before these are not timed:
+    for them, kernels are compiled and the photon guide is learned. The noise is the difference of
+    two seeds in the contact, relative to the mean there, divided by the square root of 2.
     """
     from optisense.geometry import Sphere
     from optisense.optics import OpticalModel
@@ -41,6 +42,7 @@ def image_times(inputs: Mapping[str, Any], folder: Path) -> Found:
     sizes = [tuple(size) for size in inputs["resolutions"]]
 
     def image(size: tuple[int, int], seed: int) -> tuple[TactileImage, NDArray[np.float64]]:
+        """Return an image with its wall time and processor time (2,), s."""
         clock, spent = time.perf_counter(), time.process_time()
         made = model.render([contact], size, inputs["photons"], seed=seed, skin=CONFORMING)
         if made.interrupted:
@@ -76,6 +78,7 @@ def image_times(inputs: Mapping[str, Any], folder: Path) -> Found:
 
 
 def _difference(one: Any, other: Any, mask: Any) -> float:
+    """Return the relative noise of two images (h, w, 3) in a mask (h, w), from their difference."""
     a, b = one[mask].astype(np.float64), other[mask].astype(np.float64)
     lit = (a + b).sum(axis=0) > 0.0
     return float(np.sqrt(((a - b)[:, lit] ** 2).mean() / 2.0) / (0.5 * (a + b)[:, lit].mean()))

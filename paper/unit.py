@@ -1,8 +1,8 @@
-"""Units: the single evaluations that experiments are made of, each worked out once and kept.
+"""Units: single evaluations of experiments, each computed once and kept in a file.
 
-What a unit finds is written to a file whose name is a fingerprint of what was asked, so that the
-same question is never worked out twice: not after a break, nor by another experiment, nor when
-settings were changed and changed back.
+The name of the file is a fingerprint of the unit's inputs, so that the same unit is never computed
+twice: not after an interruption, nor by another experiment, nor when settings are changed and
+changed back.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from optisense.writing import inside, write_json, written_together
 from paper.errors import ExperimentError
 
 UNITS = "units"
-"""Folder, within that of all results, of what units found."""
+"""Name of the folder of the units' results, within the folder of all results."""
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a unit's work returns.
+    """Result of a unit's work.
 
     Attributes:
-        values: ready for JSON.
-        pictures: (h, w, 3) uint8 by name.
+        values: plain values for JSON.
+        pictures: pictures (h, w, 3) uint8 by name.
     """
 
     values: Mapping[str, Any]
@@ -43,19 +43,22 @@ class Found:
 
 
 Work = Callable[[Mapping[str, Any], Path], Found]
-"""Answers a question, given as plain values. The folder is its own and may hold work half done,
-from which it goes on; it must find the same then as in one go."""
+"""Function that computes a unit from plain values and a folder of its own.
+
+The folder may hold the first part of interrupted work, which the function continues; the result is
+the same as without the interruption.
+"""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """One question.
+    """One evaluation.
 
     Attributes:
-        work: a function of a module, which other processes can find by its name.
-        inputs: the whole question, ready for JSON.
-        label: how progress and gaps call it.
-        alone: whether nothing else may run beside it, because it measures time.
+        work: function of a module, which other processes can import by its name.
+        inputs: all inputs, as plain values for JSON.
+        label: name in the progress line and in the list of failures.
+        alone: whether no other unit may run at the same time, because this one measures time.
     """
 
     work: Work
@@ -65,7 +68,7 @@ class Unit:
 
     @property
     def key(self) -> str:
-        """The name of its file: work and fingerprint of the question and the releases used."""
+        """Return the name of its file: the function, and a fingerprint of inputs and releases."""
         asked = [self.work.__name__, json_ready(self.inputs), __version__, package_versions()]
         text = json.dumps(asked, sort_keys=True)
         return f"{self.work.__name__}-{hashlib.sha256(text.encode()).hexdigest()[:16]}"
@@ -73,14 +76,14 @@ class Unit:
 
 @dataclass(frozen=True)
 class Record:
-    """What came of a unit.
+    """Kept result of a unit.
 
     Attributes:
-        label: the unit's.
-        values: what it found; empty where it failed.
-        failure: why there is nothing, or None.
-        seconds, processor_seconds: wall time, and that of all threads.
-        pictures_file: where its pictures are, or None.
+        label: label of the unit.
+        values: its results; empty if it failed.
+        failure: reason of a failure, or None.
+        seconds, processor_seconds: wall time and processor time of all threads, s.
+        pictures_file: file of its pictures, or None.
     """
 
     label: str
@@ -91,7 +94,7 @@ class Record:
     pictures_file: Path | None = None
 
     def pictures(self) -> dict[str, NDArray[np.uint8]]:
-        """(h, w, 3) by name."""
+        """Return the pictures (h, w, 3) uint8 by name."""
         if self.pictures_file is None:
             return {}
         with np.load(self.pictures_file) as stored:
@@ -99,14 +102,14 @@ class Record:
 
 
 def kept(unit: Unit, folder: Path) -> Record | None:
-    """What a unit found before, or None.
+    """Return the kept result of a unit, or None.
 
     Args:
-        unit: the question.
-        folder: of all results.
+        unit: the unit.
+        folder: folder of all results.
 
     Raises:
-        ExperimentError: its file can't be read.
+        ExperimentError: the unit's file can't be read.
     """
     path = folder / UNITS / f"{unit.key}.json"
     if not path.is_file():
@@ -129,14 +132,14 @@ def kept(unit: Unit, folder: Path) -> Record | None:
 
 
 def work_out(unit: Unit, folder: Path) -> None:
-    """Answer a question and keep the answer; an answer is there as a whole or not at all.
+    """Compute a unit and write its result; a result is written completely or not at all.
 
-    An error of the kind that a user can cause, such as an overexposed contact, is an answer too:
-    a gap with its reason.
+    An error that a user can cause, such as an overexposed contact, is a result, too: a failure with
+    its reason.
 
     Raises:
         SetupError: the renderer can't run on this machine.
-        OutputError: nothing can be written.
+        OutputError: the result can't be written.
     """
     home = folder / UNITS
     own = inside(folder, f"{UNITS}/{unit.key}")

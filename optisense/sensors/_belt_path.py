@@ -36,8 +36,8 @@ class BeltHalf:
     Attributes:
         points: x and z of the points, (n, 2) mm.
         normals: unit normals (n, 2) out of the loop; the belt lies on that side.
-        starts: index of the first point of each run and bend, and last the index of the last point.
-        bends: centre (x, z), mm, of each bend, by its number among the runs and bends.
+        starts: index of the first point of each run and bend, then the index of the last point.
+        bends: centre (x, z) of each bend, mm, by its number among the runs and bends.
     """
 
     points: FloatArray
@@ -69,18 +69,18 @@ class BeltHalf:
         return np.concatenate([beside, arc(centre, radius, end, end + rest, pieces)[1:-1]])
 
 
-def trace(way: Sequence[Straight | Bend], level: float, tessellation: float) -> BeltHalf:
+def trace(pieces: Sequence[Straight | Bend], level: float, tessellation: float) -> BeltHalf:
     """Return the inner face of a belt along its runs and bends.
 
     Args:
-        way: runs and bends in turn.
+        pieces: runs and bends, in their order along the belt.
         level: z of the inner face at x = 0, where the belt runs along +x, mm.
         tessellation: approximate length of a piece, mm.
     """
     place, angle = np.array([0.0, level]), 0.0
     points, normals, starts, bends = [place[None]], [_normal(angle)[None]], [0], {}
     count = 0
-    for number, piece in enumerate(way):
+    for number, piece in enumerate(pieces):
         if isinstance(piece, Straight):
             steps = max(1, math.ceil(piece.length / tessellation))
             share = np.arange(1, steps + 1)[:, None] / steps
@@ -104,8 +104,11 @@ def trace(way: Sequence[Straight | Bend], level: float, tessellation: float) -> 
 
 
 def mirrored_and_joined(left: FloatArray, right: FloatArray) -> FloatArray:
-    """Join two halves (n, 2) that begin at x = 0 to one curve from left to right; `left` is given
-    as if it lay on the right.
+    """Return one curve (k, 2) from left to right, made of two halves (n, 2) that begin at x = 0.
+
+    Args:
+        left: left half, mirrored to the right, mm.
+        right: right half, mm.
     """
     return np.concatenate([left[:0:-1] * (-1.0, 1.0), right])
 
@@ -120,7 +123,6 @@ def way_back(left: BeltHalf, right: BeltHalf) -> tuple[float, float]:
     Returns:
         Length of the inner face that is modelled, and of the straight run of the return, mm; this
         run and half a turn around a wheel are not modelled.
-        this one and half a turn around a wheel are what is left out.
     """
     (x0, z0), (x1, z1) = left.bends[max(left.bends)], right.bends[max(right.bends)]
     drawn = sum(

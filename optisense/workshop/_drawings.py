@@ -61,6 +61,7 @@ def cut_file(plate: Plate) -> str:
 
 
 def _cut(piece: OutlinePiece) -> Iterator[list[Pair]]:
+    """Yield the DXF entities of a piece of an outline."""
     if piece.kind == "line":
         yield line("CUT", *piece.points.tolist())
     elif piece.kind == "arc":
@@ -78,12 +79,13 @@ def _cut(piece: OutlinePiece) -> Iterator[list[Pair]]:
 
 
 def _is_anticlockwise(points: FloatArray) -> bool:
+    """Return whether an arc through three points (3, 2) turns anticlockwise."""
     (ax, ay), (bx, by) = points[1] - points[0], points[2] - points[1]
     return bool(ax * by - ay * bx > 0.0)
 
 
 def _through(points: FloatArray) -> FloatArray:
-    """Return a smooth curve through points, finely divided."""
+    """Return points (k, 2) of a cubic spline through points (n, 2), mm."""
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     shares = np.linspace(0.0, 1.0, STEPS_OF_CURVE + 1)[:-1]
     fine = np.concatenate([(lengths[:-1, None] + shares * np.diff(lengths)[:, None]).reshape(-1),
@@ -99,17 +101,21 @@ class _Sheet:
     lines: list[str] = field(default_factory=list)
 
     def at(self, point: FloatArray | tuple[float, float]) -> str:
+        """Return a point (x, y), mm, as SVG writes it."""
         return f"{point[0]:.4f} {self.height - point[1]:.4f}"
 
     def path(self, moves: str, kind: str) -> None:
+        """Add a path; `kind` is one of the classes of `STYLE`."""
         self.lines.append(f'<path class="{kind}" d="{moves}"/>')
 
     def line(self, start: tuple[float, float], end: tuple[float, float], kind: str) -> None:
+        """Add a straight line between two points, mm; `kind` is one of the classes of `STYLE`."""
         self.path(f"M {self.at(start)} L {self.at(end)}", kind)
 
     def text(
         self, at: tuple[float, float], words: str, anchor: str = "middle", upright: bool = False
     ) -> None:
+        """Add text at a point, mm; `anchor` is SVG's, and upright text runs upwards."""
         x, y = at[0], self.height - at[1]
         turn = f' transform="rotate(-90 {x:.3f} {y:.3f})"' if upright else ""
         self.lines.append(

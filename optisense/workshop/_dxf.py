@@ -8,11 +8,11 @@ from itertools import pairwise
 from optisense.workshop._placement import digits
 
 Pair = tuple[int, str | float]
-"""Group code and its value."""
+"""Group code of DXF and its value; lengths are in mm and angles in degrees."""
 
 
 def dxf(entities: Iterable[Sequence[Pair]]) -> str:
-    """Return a drawing of entities."""
+    """Return the text of a DXF file with these entities."""
     lines = ["0", "SECTION", "2", "ENTITIES"]
     for entity in entities:
         for code, value in entity:
@@ -21,22 +21,24 @@ def dxf(entities: Iterable[Sequence[Pair]]) -> str:
 
 
 def line(layer: str, start: Sequence[float], end: Sequence[float]) -> list[Pair]:
-    """Return a straight line between two points (x, y)."""
+    """Return a straight line between two points (x, y), mm."""
     return [(0, "LINE"), (8, layer), (10, start[0]), (20, start[1]), (30, 0.0),
             (11, end[0]), (21, end[1]), (31, 0.0)]  # fmt: skip
 
 
 def arc(layer: str, centre: Sequence[float], radius: float, start: float, end: float) -> list[Pair]:
-    """Return an arc, anticlockwise from one direction (degrees) to another."""
+    """Return an arc about a centre (x, y) with a radius, mm, anticlockwise from `start` to `end`,
+    degrees.
+    """
     return [(0, "ARC"), (8, layer), (10, centre[0]), (20, centre[1]), (30, 0.0), (40, radius),
             (50, start), (51, end)]  # fmt: skip
 
 
 def circle(layer: str, centre: Sequence[float], radius: float) -> list[Pair]:
-    """Return a circle."""
+    """Return a circle about a centre (x, y) with a radius, mm."""
     return [(0, "CIRCLE"), (8, layer), (10, centre[0]), (20, centre[1]), (30, 0.0), (40, radius)]
 
 
 def closed(layer: str, corners: Sequence[Sequence[float]]) -> list[list[Pair]]:
-    """Return lines from each corner to the next, and back to the first."""
+    """Return lines from each corner (x, y), mm, to the next, and back to the first."""
     return [line(layer, a, b) for a, b in pairwise([*corners, corners[0]])]

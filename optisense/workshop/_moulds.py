@@ -170,7 +170,7 @@ def _outward(skins: list[TriangleMesh]) -> FloatArray:
     if np.linalg.norm(total) < LEAST_FACING * area:
         raise DesignError(
             "the skin faces all sides, so that no half of a mould could be pulled off it",
-            hint="Leave --moulds out: a belt or a tube is cast around a core",
+            hint="Leave --moulds out; cast a belt or a tube around a core instead",
         )
     return np.asarray(total / np.linalg.norm(total), dtype=np.float64)
 

@@ -20,6 +20,7 @@ SEWN = 1e-5
 
 
 def point(place: FloatArray) -> Any:
+    """Return a point of Open CASCADE at a position (3,), mm."""
     from OCP.gp import gp_Pnt
 
     return gp_Pnt(*(float(value) for value in place))
@@ -37,7 +38,8 @@ def array_of(kind: str) -> Any:
 
 
 def numbers(values: NDArray[Any]) -> Any:
-    """Return a table of numbers; its class, too, has another name before release 8."""
+    """Return an array (n,) as a table of Open CASCADE, whose class has another name before release
+    8."""
     whole = np.issubdtype(values.dtype, np.integer)
     try:
         module = importlib.import_module("OCP.collections")
@@ -55,6 +57,8 @@ def wire(corners: FloatArray, lift: Lift, closing: bool = False) -> Any:
     """Return the lines, arcs and curves through the corners of an outline, joined.
 
     Args:
+        corners: corners of the outline, (n, 2) mm.
+        lift: map from the outline's plane to the sensor.
         closing: whether to add a line from the last corner to the first.
     """
     from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire
@@ -82,6 +86,7 @@ def wire(corners: FloatArray, lift: Lift, closing: bool = False) -> Any:
 
 
 def compound(shapes: Sequence[Any]) -> Any:
+    """Return one shape that holds several; a single shape is returned as it is."""
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound
 

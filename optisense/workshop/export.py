@@ -122,6 +122,6 @@ def _write_all(folder: Path, writers: dict[str, Writer], notes: list[str]) -> li
     finals = [folder / file for file in writers]
     with written_together("the workshop's files") as stage:
         for final, write in zip(finals, writers.values(), strict=True):
-            told = write(stage(final))
-            notes += told if isinstance(told, list) else []
+            found = write(stage(final))
+            notes += found if isinstance(found, list) else []
     return finals

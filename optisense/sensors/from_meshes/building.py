@@ -84,6 +84,7 @@ class _Builder(RecipeState):
     """Steps of the construction, in their order."""
 
     def build(self) -> SensorDesign:
+        """Return the design; the steps add their notes to `notes`."""
         materials = self._materials()
         self._read_parts()
         contacts = settle_contacts(self.recipe, self.solids())
@@ -100,7 +101,7 @@ class _Builder(RecipeState):
         design.meshes.update({name: self.meshes[name] for name in self.recipe.parts})
         for name in self.of(Role.INDENTER):
             self.notes.append(
-                f"{name} is kept for reference and touches nothing by itself. Press it with "
+                f"{name} is kept for reference and not pressed into the gel. Press it with "
                 f"--contact mesh:DIR/meshes/{name}.obj@0,0:DEPTH"
             )
         return design
@@ -150,6 +151,7 @@ class _Builder(RecipeState):
                 )
 
     def _chosen(self, name: str, mesh: TriangleMesh) -> TriangleMesh:
+        """Return the faces of a mesh that the recipe selects for a part."""
         result, notes = chosen(mesh, self.recipe.parts[name], self.label(name))
         self.notes += [f"{name}: {note}" for note in notes]
         return result
@@ -172,7 +174,8 @@ class _Builder(RecipeState):
                 raise DesignError(
                     f"part '{name}' is a closed solid; a sensing surface is only its coated side",
                     where=self.label(name),
-                    hint="Say which faces: towards: +z (or another side), perhaps tangent: true",
+                    hint="Select the faces with towards: +z (or another side), if needed with "
+                    "tangent: true",
                 )
             if part.faces_of is None or part.faces_of not in self.solids():
                 self._refuse_bad(name, skin)
@@ -188,7 +191,7 @@ class _Builder(RecipeState):
             self.notes += notes
         if not gels:
             self.notes.append(
-                "there is no elastomer: light reaches the sensing surface through air"
+                "no part is an elastomer: light reaches the sensing surface through air"
             )
 
     # ---- the design
@@ -200,7 +203,7 @@ class _Builder(RecipeState):
             material = part.material or USUAL_MATERIAL.get(part.role)
             if material is None:
                 continue
-            self.known("material", material, "parts", name, "material")
+            self.check_known("material", material, "parts", name, "material")
             used[material] = library.material(material)
             if part.role not in used[material].roles:
                 fitting = kinds_for(part.role)
@@ -210,13 +213,13 @@ class _Builder(RecipeState):
                     where=self.recipe.where("parts", name, "material"),
                     hint="Choose a material of kind " + " or ".join(fitting)
                     if fitting
-                    else "Leave its material out: it wears the coating",
+                    else "Leave its material out; the coating covers this part",
                 )
             if part.material is None:
                 self.provenance[f"parts.{name}.material"] = Provenance(
                     status=Status.ASSUMED, source="usual for such a part; the recipe names none"
                 )
-        self.known("coating", self.recipe.coating, "coating")
+        self.check_known("coating", self.recipe.coating, "coating")
         return used
 
     def _design(
@@ -226,6 +229,7 @@ class _Builder(RecipeState):
         camera: Camera,
         groups: dict[str, LightGroup],
     ) -> SensorDesign:
+        """Return the design of the finished parts, lights and camera, without their meshes."""
         coating = library.coating(self.recipe.coating)
         if self.recipe.specularity is not None:
             if "specularity" not in type(coating).model_fields:

@@ -69,7 +69,7 @@ def make_camera(
             raise DesignError(
                 "the sensing surface faces all sides, so a place for the camera can't be derived",
                 where="camera",
-                hint="Give its place: at: [x, y, z]",
+                hint="Give the position of the camera: at: [x, y, z]",
             )
         way = way / np.linalg.norm(way)
         up = upward(choice, -way)
@@ -78,15 +78,15 @@ def make_camera(
     distance = float(np.linalg.norm(look))
     if distance < 1e-6:
         raise DesignError(
-            "the camera is at the very point that it looks at",
+            "the camera is at the point that it looks at",
             where="camera",
-            hint="Give another place after at, or another target after look_at",
+            hint="Change at, the position, or look_at, the target",
         )
     look = look / distance
     up = upward(choice, look)
     if np.linalg.norm(np.cross(look, up)) < 1e-3:
         raise DesignError(
-            "the camera looks along its own up",
+            "the viewing direction of the camera is parallel to up",
             where="camera.up",
             hint="Choose an up that points to the top of the picture",
         )

@@ -82,6 +82,6 @@ def nearest_side(direction: FloatArray) -> str:
     return ("-" if direction[axis] < 0.0 else "+") + "xyz"[axis]
 
 
-def said(way: Direction) -> str:
+def direction_text(way: Direction) -> str:
     """Return a direction as text for a sentence."""
     return way if isinstance(way, str) else "({:g}, {:g}, {:g})".format(*way)

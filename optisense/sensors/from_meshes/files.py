@@ -95,7 +95,7 @@ class CadFiles:
         body = bodies[0]
         if not body.own_units and shape.solid is not None:
             raise DesignError(
-                "solid names a body of a STEP file, and this is none",
+                "solid names a body of a STEP file, but this file is no STEP file",
                 where=where,
                 hint="Leave solid out",
             )
@@ -103,7 +103,7 @@ class CadFiles:
             body = _named(bodies, shape.solid, where)
             if shape.units is not None:
                 raise DesignError(
-                    "a STEP file knows its units", where=where, hint="Leave units out"
+                    "a STEP file states its units", where=where, hint="Leave units out"
                 )
             return body.mesh
         scale = MM_PER[shape.units or units]
@@ -119,6 +119,11 @@ class CadFiles:
 
 
 def _mesh(path: Path) -> TriangleMesh:
+    """Return the mesh of a file that is no STEP file, in the file's unit.
+
+    Raises:
+        MeshError: the file has another format, is malformed, or has no faces.
+    """
     if path.suffix.lower() not in FORMATS:
         raise MeshError(
             f"a file of type '{path.suffix or 'unknown'}' can't be read",
@@ -139,6 +144,11 @@ def _mesh(path: Path) -> TriangleMesh:
 
 
 def _named(bodies: list[Body], name: str | None, where: str) -> Body:
+    """Return the body of a name, or the only body if no name is given.
+
+    Raises:
+        DesignError: no body has this name, or there are several and none is named.
+    """
     if name is None and len(bodies) == 1:
         return bodies[0]
     known = [body.name or "" for body in bodies]
@@ -148,9 +158,9 @@ def _named(bodies: list[Body], name: str | None, where: str) -> Body:
     raise DesignError(
         f"the STEP file has no body '{name}'"
         if name
-        else f"the STEP file holds {len(bodies)} bodies; it must be said which one is meant",
+        else f"the STEP file holds {len(bodies)} bodies; solid must name one of them",
         where=where,
-        hint=f"solid: one of {listed}",
+        hint=f"Set solid to one of {listed}",
     )
 
 
@@ -200,10 +210,10 @@ def refuse_odd_units(
     raise MeshError(
         f"the sensor would be {large} large if its files are in {given}",
         where=", ".join(meshes),
-        hint=("The files look as if they were in " + " or ".join(fitting) + ": say --units "
+        hint=("The files look as if they were in " + " or ".join(fitting) + ": give --units "
               + likely_units(number)[0] + ", or units: in the recipe")
         if fitting
-        else "Look up the export units in the CAD tool, and say them with --units",
+        else "Look up the export units in the CAD tool, and give them with --units",
     )  # fmt: skip
 
 
@@ -229,8 +239,8 @@ def _odd_parts(meshes: dict[str, TriangleMesh], scale: float, gels: Collection[s
         unit = f"units: {others[-1] if ratio <= ODD_PART else others[0]}" if others else "units:"
         if ratio > ODD_PART or (where in gels and size < SMALLEST):
             raise MeshError(
-                f"it is {size:.4g} mm large, the other parts are {typical:.4g} mm: its file is in "
-                "another unit",
+                f"the part is {size:.4g} mm large, the other parts are {typical:.4g} mm: its "
+                "file is in another unit",
                 where=where,
                 hint=f"Export it in the unit of the others, or give this part its own {unit}",
             )

@@ -209,11 +209,11 @@ def recipe_of(
     )  # fmt: skip
     if carrier is None:
         raise MeshError(
-            "no file can be told to be the gel or the sensing surface: "
+            "no file is recognised as the gel or the sensing surface: "
             + ", ".join(f"{each.name}: {each.use}" for each in found),
             where=str(source),
-            hint="Name the files after what they are (gel.stl, window.stl, housing.stl, ...), or "
-            "say what each is in a recipe",
+            hint="Name the files after their roles (gel.stl, window.stl, housing.stl, ...), or "
+            "give the role of each file in a recipe",
         )
     outward = guess_outward(meshes, carrier)
     dome = is_round(meshes[carrier], outward)

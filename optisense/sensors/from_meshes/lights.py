@@ -59,7 +59,7 @@ def axis_along(choice: LightRow, bounds: FloatArray) -> int:
     if along == across:
         raise DesignError(
             f"a row at side {choice.side} can't run along {choice.along}",
-            hint="Along one of " + ", ".join("xyz"[axis] for axis in others),
+            hint="Choose along: one of " + ", ".join("xyz"[axis] for axis in others),
         )
     return along
 
@@ -152,6 +152,7 @@ def light(place: FloatArray, way: FloatArray, up: FloatArray) -> Light:
 
 
 def _direction(given: Direction, normal: FloatArray) -> FloatArray:
+    """Return the unit direction (3,) of a light over a surface with this normal (3,)."""
     if isinstance(given, str) and given in ("normal", "-normal"):
         return normal if given == "normal" else -normal
     return vector(given)
@@ -209,6 +210,7 @@ def _on_curve(
 
 
 def _off(where: str, u: float, v: float) -> DesignError:
+    """Return the error of a light at u, v (mm) that is not over the surface."""
     return DesignError(
         f"a light ({u:.2f}, {v:.2f}) mm from the middle of the surface is off it, or in a hole",
         where=where,
@@ -217,13 +219,18 @@ def _off(where: str, u: float, v: float) -> DesignError:
 
 
 def _mean_direction(mesh: TriangleMesh, patch: Faces, where: str) -> FloatArray:
+    """Return the unit mean normal (3,) of faces.
+
+    Raises:
+        DesignError: the normals point in all directions.
+    """
     normal = mean_normal(mesh, patch)
     length = float(np.linalg.norm(normal))
     if length < SPREAD:
         raise DesignError(
             "this surface faces all sides, so the places of its lights can't be derived",
             where=where,
-            hint="Say which faces with towards: (+z, -x, ...), or use a ring",
+            hint="Select faces with towards: (+z, -x, ...), or use a ring",
         )
     return normal / length
 

@@ -66,16 +66,16 @@ def resting_order(parts: Mapping[str, PartChoice]) -> list[str]:
         while (below := parts[chain[-1]].on) is not None:
             if below in chain:
                 raise DesignError(
-                    f"parts {' and '.join(sorted(set(chain)))} lie on one another in a circle"
+                    f"parts {' and '.join(sorted(set(chain)))} lie on one another"
                     if below != name or len(chain) > 1
                     else f"part '{name}' lies on itself",
                     where=f"parts.{name}.on",
-                    hint="Let one of them have its own place, by its file or by move",
+                    hint="Remove on from one of them, and place it by its file or by move",
                 )
             chain.append(below)
         if parts[chain[1]].file is None:
             raise DesignError(
-                f"part '{name}' lies on '{chain[1]}', which is only faces of another part",
+                f"part '{name}' lies on '{chain[1]}', which consists of faces of another part",
                 where=f"parts.{name}.on",
                 hint="Name the part that has the file",
             )

@@ -167,9 +167,9 @@ def _length(text: str, unit: str | None, path: Path, number: int) -> float:
     given = (match[2] or unit or "").lower()
     if not given:
         raise DesignError(
-            "the file does not say the unit of its lengths",
+            "the file does not state the unit of its lengths",
             where=str(path),
-            hint="Say it beside the file: units: mm, or units: mil",
+            hint="Give it beside the file: units: mm, or units: mil",
         )
     known = {"mils": "mil", "thou": "mil", "in": "inch", "inches": "inch"}
     return float(match[1]) * MM_PER[known.get(given, given)]

@@ -14,7 +14,7 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import middle
-from optisense.sensors.from_meshes import lights as placing
+from optisense.sensors.from_meshes import lights as light_placement
 from optisense.sensors.from_meshes import strips
 from optisense.sensors.from_meshes.camera import make_camera, share_seen
 from optisense.sensors.from_meshes.pick_and_place import read_pick_and_place
@@ -25,34 +25,39 @@ from optisense.sensors.from_meshes.surfaces import chosen, pick
 from optisense.sensors.from_meshes.touching import refuse_contact_with_lamps
 
 LITTLE_SEEN = 0.5
-"""Share of the sensing surface below which a warning says how little the camera sees."""
+"""Share of the sensing surface that the camera sees below which a warning states it."""
 
 
-def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGroup:
-    """Return a light group with each of its lights in place.
+def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGroup:
+    """Return a light group with the positions of its lights.
+
+    Args:
+        state: recipe and meshes; notes and sources are added to it.
+        name: name of the group.
+        choice: model, colour and placement of the lights.
 
     Raises:
         DesignError: a light falls off its surface, or a row or ring is impossible.
         LibraryError: the library lacks its model.
     """
-    where = bench.recipe.where("lights", name)
-    bench.known("light", choice.model, "lights", name, "model")
+    where = state.recipe.where("lights", name)
+    state.check_known("light", choice.model, "lights", name, "model")
     try:
         if choice.row is not None:
-            lights = placing.row(choice.row, bench.meshes[choice.row.part].bounds)
+            lights = light_placement.row(choice.row, state.meshes[choice.row.part].bounds)
         elif choice.ring is not None:
-            lights = placing.ring(choice.ring, bench.meshes[choice.ring.part].bounds)
+            lights = light_placement.ring(choice.ring, state.meshes[choice.ring.part].bounds)
         elif choice.over is not None:
-            mesh = bench.reference(choice.over, f"lights {name}")
+            mesh = state.reference(choice.over, f"lights {name}")
             found = pick(mesh, choice.over, f"lights {name}")
-            lights = placing.over(choice.over, mesh, found, f"lights {name}")
+            lights = light_placement.over(choice.over, mesh, found, f"lights {name}")
         elif choice.along is not None:
-            lights = strips.along(choice.along, bench.meshes[choice.along.edge_of])
+            lights = strips.along(choice.along, state.meshes[choice.along.edge_of])
         elif choice.table is not None:
-            file = bench.recipe.folder / choice.table.file
+            file = state.recipe.folder / choice.table.file
             table = read_pick_and_place(file, choice.table.units)
             lights = strips.from_table(choice.table, table)
-            bench.provenance[f"lights.{name}.lights"] = Provenance(
+            state.provenance[f"lights.{name}.lights"] = Provenance(
                 status=Status.SOURCED, source=f"pick-and-place file {choice.table.file}"
             )
         else:
@@ -62,7 +67,7 @@ def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGro
             raise DesignError(error.message, where=where, hint=error.hint) from None
         raise
     colour = choice.colour
-    bench.provenance[f"lights.{name}.flux"] = Provenance(
+    state.provenance[f"lights.{name}.flux"] = Provenance(
         status=Status.ASSUMED, source="from the recipe; see the LED's datasheet and current"
     )
     try:
@@ -74,27 +79,27 @@ def place_lights(bench: RecipeState, name: str, choice: LightChoice) -> LightGro
         )
     except ValidationError as error:
         raise design_error(error, {}, where=where, model=LightGroup) from None
-    _note_crowded(bench, name, group)
+    _note_crowded(state, name, group)
     if choice.row is not None:
-        _note_beyond(bench, name, group, choice.row)
+        _note_beyond(state, name, group, choice.row)
     return group
 
 
-def _note_beyond(bench: RecipeState, name: str, group: LightGroup, row: LightRow) -> None:
+def _note_beyond(state: RecipeState, name: str, group: LightGroup, row: LightRow) -> None:
     """Note if a row is longer than the side at which it stands."""
     part = row.part
-    low, high = bench.meshes[part].bounds
+    low, high = state.meshes[part].bounds
     places = np.array([light.position for light in group.lights])
-    along = placing.axis_along(row, bench.meshes[part].bounds)
+    along = light_placement.axis_along(row, state.meshes[part].bounds)
     beyond = int(((places[:, along] < low[along]) | (places[:, along] > high[along])).sum())
     if beyond:
-        bench.notes.append(
-            f"lights {name}: {beyond} of {len(places)} stand beyond the ends of {part}, which is "
+        state.notes.append(
+            f"lights {name}: {beyond} of {len(places)} are beyond the ends of {part}, which is "
             f"{high[along] - low[along]:.4g} mm long along {'xyz'[along]}"
         )
 
 
-def _note_crowded(bench: RecipeState, name: str, group: LightGroup) -> None:
+def _note_crowded(state: RecipeState, name: str, group: LightGroup) -> None:
     """Note if lights are closer than their bodies are wide."""
     package = getattr(library.entry("light", group.model), "package", None)
     if package is None or len(group.lights) < 2:
@@ -102,67 +107,66 @@ def _note_crowded(bench: RecipeState, name: str, group: LightGroup) -> None:
     places = np.array([light.position for light in group.lights])
     nearest = float(cKDTree(places).query(places, k=2)[0][:, 1].min())
     if nearest < min(package[:2]) - 1e-6:
-        bench.notes.append(
+        state.notes.append(
             f"lights {name}: they are {nearest:.2f} mm apart, but a {group.model} is "
             f"{package[0]:g} x {package[1]:g} mm"
         )
 
 
-def place_camera(bench: RecipeState) -> Camera:
+def place_camera(state: RecipeState) -> Camera:
     """Return the camera, with a warning if it sees little of the sensing surface.
 
     Raises:
         DesignError: the camera can't be placed or aimed like this.
         LibraryError: the library lacks its model.
     """
-    choice = bench.recipe.camera
-    where = bench.recipe.where("camera")
-    bench.known("camera", choice.model, "camera", "model")
-    skins = [bench.meshes[name] for name in bench.of(Role.SENSING_SURFACE)]
+    choice = state.recipe.camera
+    where = state.recipe.where("camera")
+    state.check_known("camera", choice.model, "camera", "model")
+    skins = [state.meshes[name] for name in state.of(Role.SENSING_SURFACE)]
     skin = TriangleMesh.joined([TriangleMesh(m.vertices, m.faces) for m in skins])
     target = middle(skin)
     if isinstance(choice.look_at, str):
-        target = middle(bench.meshes[choice.look_at])
+        target = middle(state.meshes[choice.look_at])
     elif choice.look_at is not None:
         target = np.array(choice.look_at)
     place = None
     if isinstance(choice.at, ShapeReference):
         shape = choice.at
-        mesh, _ = chosen(bench.reference(shape, "camera"), shape, "camera")
+        mesh, _ = chosen(state.reference(shape, "camera"), shape, "camera")
         place = middle(mesh)
-        bench.provenance["camera.position"] = Provenance(
+        state.provenance["camera.position"] = Provenance(
             status=Status.DERIVED, source=f"middle of {shape.file or shape.faces_of}"
         )
     elif choice.at is not None:
         place = np.array(choice.at)
     else:
-        bench.provenance["camera.position"] = Provenance(
+        state.provenance["camera.position"] = Provenance(
             status=Status.ASSUMED, source="where the sensing surface fills the picture"
         )
     try:
-        camera = make_camera(choice, skin, place, target, bench.meshes)
+        camera = make_camera(choice, skin, place, target, state.meshes)
     except DesignError as error:
         raise DesignError(error.message, where=where, hint=error.hint) from None
     except ValidationError as error:
         raise design_error(error, {}, where=where, model=Camera) from None
-    if not bench.of(Role.MIRROR):
+    if not state.of(Role.MIRROR):
         seen, spread = share_seen(camera, skin)
         if seen < LITTLE_SEEN:
-            bench.notes.append(
+            state.notes.append(
                 f"the camera sees about {100 * seen:.0f} % of the sensing surface: check its "
                 "place (at), what it looks at (look_at) and its field of view"
             )
         elif spread < 0.3:
-            bench.notes.append(
+            state.notes.append(
                 f"the sensing surface fills only {100 * spread:.0f} % of the picture: the "
                 "camera is far away, or its field of view is wide"
             )
     return camera
 
 
-def check_places(bench: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:
-    """Check that no camera and no light lies in a face; those inside a transparent solid give a
-    warning.
+def check_places(state: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:
+    """Check that neither the camera nor a light lies in a face, and note those inside solids.
 
     Raises:
         DesignError: a camera or light lies in a face.
@@ -171,14 +175,14 @@ def check_places(bench: RecipeState, camera: Camera, groups: dict[str, LightGrou
     for name, group in groups.items():
         for number, light in enumerate(group.lights):
             places.append((f"light {number} of '{name}'", np.array(light.position)))
-    refuse_contact_with_lamps(places, bench.meshes)
-    for name in bench.solids():
+    refuse_contact_with_lamps(places, state.meshes)
+    for name in state.solids():
         buried = [
             group
             for group, lights in groups.items()
-            if inside(np.array([li.position for li in lights.lights]), bench.meshes[name]).any()
+            if inside(np.array([li.position for li in lights.lights]), state.meshes[name]).any()
         ]
         if buried:
-            bench.notes.append(f"lights {', '.join(buried)} are inside {name}")
-        if inside(np.array([camera.position]), bench.meshes[name]).any():
-            bench.notes.append(f"the camera is inside {name}")
+            state.notes.append(f"lights {', '.join(buried)} are inside {name}")
+        if inside(np.array([camera.position]), state.meshes[name]).any():
+            state.notes.append(f"the camera is inside {name}")

@@ -43,23 +43,27 @@ class CameraChoice(Model):
     model: Name = Field(description="camera of the library")
     at: Vector | ShapeReference | None = Field(
         default=None,
-        description="mm, its pupil, or a shape in whose middle it is; behind the sensing surface "
-        "if left out",
+        description="position of the pupil, mm, or a shape in whose middle it is; behind the "
+        "sensing surface if left out",
     )
     look_at: Name | Vector | None = Field(
-        default=None, description="part or point; the sensing surface if left out"
+        default=None,
+        description="part or point (mm) in the middle of the picture; the sensing surface if left "
+        "out",
     )
-    direction: Way | None = Field(default=None, description="where it looks, instead of look_at")
-    up: Way | None = Field(default=None, description="upward in the picture")
+    direction: Way | None = Field(default=None, description="viewing direction, instead of look_at")
+    up: Way | None = Field(default=None, description="direction to the top of the picture")
     fov: Annotated[Number, Field(ge=SMALLEST_FOV, le=360.0)] | None = Field(
-        default=None, description="degrees across the width, if not the library's"
+        default=None,
+        description="field of view across the width, degrees; that of the library if left out",
     )
     resolution: tuple[Pixels, Pixels] | None = Field(
-        default=None, description="pixels; 320 wide if left out"
+        default=None, description="width and height, pixels; 320 wide if left out"
     )
 
     @model_validator(mode="after")
     def _one_aim(self) -> CameraChoice:
+        """Check that the viewing direction is given once."""
         if self.look_at is not None and self.direction is not None:
             raise ValueError("give look_at or direction, not both")
         return self
@@ -74,17 +78,20 @@ class Recipe(Model):
     name: Annotated[str, Field(min_length=1, max_length=200)]
     description: str = ""
     units: Units | None = Field(
-        default=None, description="of the files: mm; cm; m; inch; mil; um (STEP files know theirs)"
+        default=None,
+        description="unit of the files: mm; cm; m; inch; mil; um (STEP files state theirs)",
     )
     join: Annotated[Number, Field(ge=0.0, le=1.0)] = Field(
-        default=0.05, description="mm; solids nearer than this are made to touch"
+        default=0.05, description="distance up to which solids are made to touch, mm"
     )
     air_films: list[tuple[Name, Name]] = Field(
-        default_factory=list, description="pairs of parts with a thin film of air that is meant"
+        default_factory=list,
+        description="pairs of parts between which a thin film of air stays open",
     )
     coating: Name = Field(default="diffuse-grey", description="coating of the library")
     specularity: Fraction | None = Field(
-        default=None, description="of the coating, 0 to 1, if not the library's"
+        default=None,
+        description="specularity of the coating, 0 to 1; that of the library if left out",
     )
     parts: Annotated[dict[Name, PartChoice], Field(min_length=1)]
     lights: dict[Name, LightChoice] = Field(default_factory=dict)
@@ -96,6 +103,7 @@ class Recipe(Model):
 
     @model_validator(mode="after")
     def _references_hold(self) -> Recipe:
+        """Check that a sensing surface exists, and that all names of parts are known."""
         if not any(part.role is Role.SENSING_SURFACE for part in self.parts.values()):
             raise InconsistentValueError(
                 "no part is a sensing_surface",
@@ -144,7 +152,7 @@ class Recipe(Model):
 
     @property
     def folder(self) -> Path:
-        """Folder that the paths of files are relative to."""
+        """Return the folder that the paths of files are relative to."""
         return self._folder
 
     def relative_to(self, folder: Path) -> Recipe:

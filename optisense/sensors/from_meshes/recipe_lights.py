@@ -20,6 +20,11 @@ Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
 
 
 def _colour(value: Any) -> str | tuple[float, float, float]:
+    """Return the name of a colour, or its shares of R, G and B.
+
+    Raises:
+        ValueError: the name is unknown, or the shares are not three numbers from 0 to 1.
+    """
     if isinstance(value, str):
         if value in NAMED_COLOURS:
             return value
@@ -73,42 +78,52 @@ PitchOrTwo = Annotated[
 class LightRow(Model):
     """Lights in a row along one side of a part's box."""
 
-    part: Name = Field(description="beside this part")
-    side: Side = Field(description="at this side of it")
+    part: Name = Field(description="part at whose box the row is")
+    side: Side = Field(description="side of the box")
     along: Literal["x", "y", "z"] | None = Field(
-        default=None, description="the row runs this way; the longer one if left out"
+        default=None, description="axis along which the row runs; the longer one if left out"
     )
     count: Lights
     pitch: Positive | None = Field(
-        default=None, description="mm between lights; spread over the side if left out"
+        default=None, description="distance between lights, mm; spread over the side if left out"
     )
     gap: Number = Field(
-        default=0.2, description="mm from the side to the lights; below 0 is inside the part"
+        default=0.2,
+        description="distance of the lights from the side, mm; below 0 is inside the part",
     )
     height: Number | None = Field(
-        default=None, description="mm, where on the third axis; the part's middle if left out"
+        default=None,
+        description="coordinate along the third axis, mm; the middle of the part if left out",
     )
-    shift: Number = Field(default=0.0, description="mm, moves the row along itself")
+    shift: Number = Field(default=0.0, description="shift of the row along itself, mm")
     direction: Way | None = Field(
-        default=None, description="where they shine; into the side if left out"
+        default=None, description="direction of the light; into the side if left out"
     )
 
 
 class Ring(Model):
     """Lights in a circle, or an arc of one, around a part."""
 
-    part: Name = Field(description="around the middle of this part")
-    axis: Side = Field(default="+z", description="of the circle")
+    part: Name = Field(description="part around whose middle the ring is")
+    axis: Side = Field(default="+z", description="axis of the circle")
     count: Lights
     radius: Positive | None = Field(
-        default=None, description="mm; half the part's width plus gap if left out"
+        default=None,
+        description="radius of the circle, mm; half the width of the part plus gap if left out",
     )
-    gap: Number = Field(default=0.2, description="mm outside the part, where no radius is given")
+    gap: Number = Field(
+        default=0.2, description="distance outside the part, mm, if no radius is given"
+    )
     height: Number | None = Field(
-        default=None, description="mm, where on the axis; the part's middle if left out"
+        default=None,
+        description="coordinate along the axis, mm; the middle of the part if left out",
     )
-    start: Turn = Field(default=0.0, description="degrees, anticlockwise seen from the axis' end")
-    end: Turn = Field(default=360.0, description="degrees; a full turn from start is a full ring")
+    start: Turn = Field(
+        default=0.0, description="first angle, degrees, anticlockwise seen from the end of the axis"
+    )
+    end: Turn = Field(
+        default=360.0, description="last angle, degrees; a full turn from start is a full ring"
+    )
     direction: Annotated[Direction, or_words("inward", "outward")] = Field(
         default="inward", description="inward; outward; or a direction for all"
     )
@@ -121,9 +136,9 @@ class LightsOver(ShapeReference):
         default=None, description="number, or [along, across]; one on each patch if left out"
     )
     pitch: PitchOrTwo | None = Field(
-        default=None, description="mm, or [along, across]; spread evenly if left out"
+        default=None, description="distances, mm, or [along, across]; spread evenly if left out"
     )
-    gap: Number = Field(default=0.05, description="mm off the surface")
+    gap: Number = Field(default=0.05, description="distance from the surface, mm")
     direction: Annotated[Direction, or_words("normal", "-normal")] = Field(
         default="normal", description="normal; -normal; or a direction for all"
     )
@@ -131,27 +146,32 @@ class LightsOver(ShapeReference):
     @model_validator(mode="after")
     def _not_too_many(self) -> LightsOver:
         if isinstance(self.count, tuple) and self.count[0] * self.count[1] > MOST_LIGHTS:
-            raise ValueError(f"{self.count[0]} x {self.count[1]} are more than {MOST_LIGHTS}")
+            raise ValueError(
+                f"{self.count[0]} x {self.count[1]} are more than {MOST_LIGHTS} lights"
+            )
         return self
 
 
 class LightsAlong(Model):
     """Lights along the outline of a part, such as on a flexible strip around its edge."""
 
-    edge_of: Name = Field(description="around this part")
-    axis: Side = Field(default="+z", description="the outline is that seen from where this points")
+    edge_of: Name = Field(description="part along whose outline the lights are")
+    axis: Side = Field(default="+z", description="direction from which the outline is seen")
     height: Number | None = Field(
-        default=None, description="mm, where on the axis; the part's middle if left out"
+        default=None,
+        description="coordinate along the axis, mm; the middle of the part if left out",
     )
-    start: Way = Field(description="the outline is counted from its end in this direction")
+    start: Way = Field(description="direction in which the outline begins")
     shift: Number = Field(
-        default=0.0, description="mm along the outline to the middle of the lights, anticlockwise"
+        default=0.0,
+        description="distance to the middle of the lights along the outline, mm, anticlockwise",
     )
     count: Lights = 1
     pitch: Positive | None = Field(
-        default=None, description="mm along the outline; spread over all of it if left out"
+        default=None,
+        description="distance along the outline, mm; spread over all of it if left out",
     )
-    gap: Number = Field(default=0.2, description="mm outside the part")
+    gap: Number = Field(default=0.2, description="distance outside the part, mm")
     direction: Annotated[Direction, or_words("inward", "outward")] = Field(
         default="inward", description="inward; outward; or a direction for all"
     )
@@ -160,25 +180,27 @@ class LightsAlong(Model):
 class FromTable(Model):
     """Lights where a pick-and-place file of a board puts them."""
 
-    file: str = Field(description="of KiCad, Altium or EasyEDA, or any table with such columns")
+    file: str = Field(
+        description="pick-and-place file of KiCad, Altium or EasyEDA, or a similar table"
+    )
     only: str | list[str] | None = Field(
         default=None, description="designators, such as D1, [D1, D3] or D*; all if left out"
     )
-    units: Units | None = Field(default=None, description="of the file, where it does not say")
+    units: Units | None = Field(default=None, description="unit of the file, if it states none")
     points: dict[str, Vector] | None = Field(
-        default=None, description="two or three designators, and where they are, mm"
+        default=None, description="positions of two or three designators, mm"
     )
     origin: Vector | None = Field(
-        default=None, description="mm, where the file's 0, 0 is, instead of points"
+        default=None, description="position of the origin of the file, mm, instead of points"
     )
     right: Way | None = Field(
-        default=None, description="where the file's x axis points, with origin; +x if left out"
+        default=None, description="direction of the x axis of the file, with origin; +x if left out"
     )
     normal: Way | None = Field(
         default=None,
-        description="where the board's top looks; needed with two points, +z with origin",
+        description="normal of the top of the board; needed with two points, +z with origin",
     )
-    gap: Number = Field(default=0.05, description="mm off the board")
+    gap: Number = Field(default=0.05, description="distance from the board, mm")
 
     @model_validator(mode="after")
     def _one_mapping(self) -> FromTable:
@@ -188,12 +210,14 @@ class FromTable(Model):
             if len(self.points) not in (2, 3):
                 raise ValueError("points needs two or three designators")
             if self.right is not None:
-                raise ValueError("right goes with origin; points tell it by themselves")
+                raise ValueError(
+                    "right is for origin only; points define the direction by themselves"
+                )
             if (len(self.points) == 2) == (self.normal is None):
                 raise ValueError(
-                    "two points need normal: where does the top of the board look? (+z, -x, ...)"
+                    "two points need normal, the direction of the top of the board (+z, -x, ...)"
                     if len(self.points) == 2
-                    else "three points tell where the board looks; leave normal out"
+                    else "three points define the direction of the board; leave normal out"
                 )
         return self
 
@@ -209,7 +233,7 @@ class LightChoice(Model):
 
     model: Name = Field(description="light of the library")
     colour: ColourWord = Field(description=", ".join(NAMED_COLOURS) + " or [r, g, b]")
-    flux: NonNegative = Field(default=10.0, description="mW of each light")
+    flux: NonNegative = Field(default=10.0, description="flux of each light, mW")
     row: LightRow | None = Field(default=None, description="lights along one side of a part's box")
     ring: Ring | None = Field(default=None, description="lights in a circle around a part")
     over: LightsOver | None = Field(default=None, description="lights over a surface")
@@ -219,7 +243,7 @@ class LightChoice(Model):
     table: FromTable | None = Field(
         default=None, alias="from", description="lights of a pick-and-place file"
     )
-    at: list[Light] | None = Field(default=None, description="each light by its place")
+    at: list[Light] | None = Field(default=None, description="position of each light")
 
     @model_validator(mode="after")
     def _one_way(self) -> LightChoice:

@@ -31,42 +31,48 @@ Turns = tuple[Turn, Turn, Turn]
 class ShapeReference(Model):
     """Shape of a recipe: a file, or faces of another part."""
 
-    file: str | None = Field(default=None, description="OBJ, STL, PLY or STEP")
-    solid: str | None = Field(default=None, description="which body of a STEP file")
-    units: Units | None = Field(default=None, description="of this file, if not as the others")
-    faces_of: Name | None = Field(default=None, description="the part whose faces these are")
-    towards: Way | None = Field(default=None, description="only the faces that point there")
-    within: Angle | None = Field(default=None, description="degrees, how far they may look aside")
+    file: str | None = Field(default=None, description="OBJ, STL, PLY or STEP file")
+    solid: str | None = Field(default=None, description="name of the body in a STEP file")
+    units: Units | None = Field(
+        default=None, description="unit of this file, if not that of the others"
+    )
+    faces_of: Name | None = Field(default=None, description="part whose faces these are")
+    towards: Way | None = Field(default=None, description="direction of the selected faces")
+    within: Angle | None = Field(
+        default=None, description="largest angle to that direction, degrees"
+    )
     tangent: bool | None = Field(
-        default=None, description="and those that go on from them without a sharp edge"
+        default=None,
+        description="whether faces that continue them without a sharp edge are selected, too",
     )
     patches: Literal["largest", "all"] | None = Field(
-        default=None, description="of several separate patches: largest; all"
+        default=None, description="selection from several separate patches: largest; all"
     )
 
     mirror: Literal["x", "y", "z"] | None = Field(
-        default=None, description="turn the file's shape over, left to right along this axis"
+        default=None, description="axis along which the shape of the file is mirrored"
     )
     turn: Turns | None = Field(
-        default=None, description="degrees about x, then y, then z of the file's frame"
+        default=None,
+        description="rotations about x, then y, then z of the frame of the file, degrees",
     )
-    move: Vector | None = Field(default=None, description="mm, x y z, after mirror and turn")
+    move: Vector | None = Field(default=None, description="translation after mirror and turn, mm")
 
     @model_validator(mode="after")
     def _one_source(self) -> ShapeReference:
         if (self.file is None) == (self.faces_of is None):
             raise ValueError("give either a file, or faces_of another part")
         if self.faces_of is not None and (self.solid is not None or self.units is not None):
-            raise ValueError("solid and units go with a file, not with faces_of")
+            raise ValueError("solid and units are for files only, not for faces_of")
         if self.faces_of is not None:
             for name in ("mirror", "turn", "move"):
                 if getattr(self, name) is not None:
-                    raise ValueError(f"{name} goes with a file; faces move with their part")
+                    raise ValueError(f"{name} is for files only; faces move with their part")
         if self.faces_of is not None and self.towards is None:
-            raise ValueError("faces_of needs towards: where do the faces look? (+z, -x, ...)")
+            raise ValueError("faces_of needs towards, the direction of the faces (+z, -x, ...)")
         for name in ("within", "tangent", "patches"):
             if getattr(self, name) is not None and self.towards is None:
-                raise ValueError(f"{name} goes with towards, which is missing")
+                raise ValueError(f"{name} needs towards, which is missing")
         return self
 
 
@@ -74,27 +80,30 @@ class PartChoice(ShapeReference):
     """Part of the sensor in a recipe."""
 
     role: Role = Field(description="; ".join(role.value for role in Role))
-    material: Name | None = Field(default=None, description="of the library")
+    material: Name | None = Field(default=None, description="material of the library")
     priority: Annotated[int, Field(strict=True, ge=-1000, le=1000)] | None = Field(
-        default=None, description="where solids overlap, the higher one counts"
+        default=None, description="where solids overlap, the one with the higher priority counts"
     )
     on: Name | None = Field(
-        default=None, description="lies on this part with its own flat face, in the middle"
+        default=None, description="part on whose side this part lies with its own flat face"
     )
-    side: Side | None = Field(default=None, description="the side of that part; +z if left out")
+    side: Side | None = Field(default=None, description="side of that part; +z if left out")
     flush: list[Side] | None = Field(
-        default=None, description="sides that end where those of that part end, not in the middle"
+        default=None,
+        description="sides that are flush with those of that part; centred if left out",
     )
-    gap: Number | None = Field(default=None, description="mm between the two; 0 if left out")
+    gap: Number | None = Field(
+        default=None, description="distance between the two, mm; 0 if left out"
+    )
 
     @model_validator(mode="after")
     def _lies_on_something(self) -> PartChoice:
         if self.on is None:
             for name in ("side", "flush", "gap"):
                 if getattr(self, name) is not None:
-                    raise ValueError(f"{name} goes with on, which is missing")
+                    raise ValueError(f"{name} needs on, which is missing")
         elif self.faces_of is not None:
-            raise ValueError("on goes with a file; faces lie where their part lies")
+            raise ValueError("on is for files only; faces lie where their part lies")
         axes = [side[-1] for side in self.flush or []]
         lies_along = (self.side or "+z")[-1]
         for axis in axes:

@@ -25,6 +25,7 @@ class RecipeState:
     """
 
     def __init__(self, recipe: Recipe) -> None:
+        """Begin with a recipe of which no file is read yet."""
         self.recipe = recipe
         self.files = CadFiles(recipe.folder)
         self.meshes: dict[str, TriangleMesh] = {}
@@ -32,15 +33,34 @@ class RecipeState:
         self.notes: list[str] = []
 
     def load(self, shape: ShapeReference, where: str) -> TriangleMesh:
-        """Return the mesh of a file in its final position, mm; errors name the shape."""
+        """Return the mesh of a file in its final position, mm.
+
+        Args:
+            shape: shape that comes from a file.
+            where: name of the shape for messages.
+
+        Raises:
+            SetupError: the file is a STEP file, but the extra for it is missing.
+            MeshError: the file is missing or has no usable mesh.
+            DesignError: the body or the unit of the shape does not fit the file.
+        """
         try:
             return posed(self.files.load(shape, self.recipe.units or "mm", where), shape)
         except MeshError as error:
             place = f"{where}: {error.where}" if error.where else where
             raise MeshError(error.message, where=place, hint=error.hint) from None
 
-    def known(self, kind: str, name: str, *path: str) -> None:
-        """Check that the library has an entry; the error names the recipe's line."""
+    def check_known(self, kind: str, name: str, *path: str) -> None:
+        """Check that the library has an entry.
+
+        Args:
+            kind: kind of the entry, such as 'light'.
+            name: name of the entry.
+            path: path of the name in the recipe, whose line the error states.
+
+        Raises:
+            LibraryError: the library has no such entry.
+        """
         try:
             library.entry(kind, name)
         except LibraryError as error:
@@ -66,7 +86,8 @@ class RecipeState:
         }
 
     def reference(self, shape: ShapeReference, where: str) -> TriangleMesh:
-        """Return the mesh that lights or the camera refer to, welded."""
+        """Return the welded mesh, mm, to which lights or the camera refer; `where` is for
+        messages."""
         if shape.faces_of is not None:
             return self.meshes[shape.faces_of]
         mesh, _ = repaired(self.load(shape, where), where, closed=False)

@@ -46,14 +46,16 @@ def along(choice: LightsAlong, mesh: TriangleMesh) -> list[Light]:
     way = np.array([vector(choice.start) @ first, vector(choice.start) @ second])
     if np.linalg.norm(way) < 1e-6:
         raise DesignError(
-            f"start points along {choice.axis}, so it names no place on the outline",
-            hint="Give a direction across it",
+            f"start points along {choice.axis}, so that it meets no point of the outline",
+            hint="Give a direction perpendicular to the axis",
         )
     inside = np.array([middle @ first, middle @ second])
     ray = shapely.LineString([inside, inside + 2.0 * line.length * way / np.linalg.norm(way)])
     hits = shapely.get_coordinates(line.intersection(ray))
     if len(hits) == 0:
-        raise DesignError("the outline is not met in the direction start", hint="Choose another")
+        raise DesignError(
+            "the outline has no point in the direction start", hint="Choose another direction"
+        )
     first_hit = hits[np.argmax((hits - inside) @ way)]
     zero = line.project(shapely.Point(first_hit)) + choice.shift
     lights = []
@@ -164,7 +166,8 @@ def _frame(choice: FromTable, table: dict[str, BoardPart]) -> tuple[FloatArray, 
         right = right - (right @ normal) * normal
         if np.linalg.norm(right) < 1e-6:
             raise DesignError(
-                "right and normal are parallel", hint="Say where the file's x axis points: right"
+                "right and normal are parallel",
+                hint="Set right to the direction of the file's x axis",
             )
         right /= np.linalg.norm(right)
         return np.array([right, np.cross(normal, right), normal]), np.array(choice.origin)
@@ -199,13 +202,14 @@ def _fitted(
         if min(np.linalg.norm(plane), np.linalg.norm(normal)) < 1e-6:
             raise DesignError(
                 "the three points lie on one line",
-                hint="Choose another third one, or give two points and normal",
+                hint="Choose another third point, or give two points and normal",
             )
         normal = normal / np.linalg.norm(normal) * np.sign(plane[2])
     x = side_2 - (side_2 @ normal) * normal
     if np.linalg.norm(x) < 0.5 * np.linalg.norm(side_2):
         raise DesignError(
-            "normal runs along the two points", hint="Say where the board's top looks"
+            "normal is parallel to the line through the two points",
+            hint="Set normal to the direction of the top of the board",
         )
     x /= np.linalg.norm(x)
     y = np.cross(normal, x)

@@ -13,7 +13,7 @@ from optisense.geometry.patches import (
     patches,
     smoothly_joined,
 )
-from optisense.sensors.from_meshes.directions import said, vector
+from optisense.sensors.from_meshes.directions import direction_text, vector
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 
 WITHIN = 30.0
@@ -40,10 +40,10 @@ def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
     if len(faces) == 0:
         nearest = angle_to_nearest(mesh, way)
         raise DesignError(
-            f"no face points to {said(shape.towards)} within {within:g} degrees; the nearest one "
-            f"looks {nearest:.0f} degrees aside",
+            f"no face points to {direction_text(shape.towards)} within {within:g} "
+            f"degrees; the nearest one is {nearest:.0f} degrees off",
             where=where,
-            hint="Choose another direction after towards, or a larger within",
+            hint="Change towards, the direction, or give a larger angle within",
         )
     if not shape.tangent:
         return patches(mesh, faces)
@@ -71,6 +71,6 @@ def chosen(mesh: TriangleMesh, shape: ShapeReference, where: str) -> tuple[Trian
     taken = float(mesh.face_areas[found[0]].sum())
     note = (
         f"{count} of {left:.3g} mm2 beside the {taken:.3g} mm2 chosen "
-        f"also point to {said(shape.towards)}; 'patches: all' includes them"
+        f"also point to {direction_text(shape.towards)}; 'patches: all' includes them"
     )
     return mesh.with_faces(mesh.faces[found[0]]).compacted(), [note]

@@ -115,9 +115,9 @@ def _settle(recipe: Recipe, result: Contacts, fixed: str, mover: str) -> None:
     if wide > MUCH * smaller / 2 and touching_area(other, one, reach) < 0.5 * wide:
         result.notes.append(
             f"{mover} and {fixed} face each other over {wide:.3g} mm2 with a gap of less than "
-            f"{WIDE_GAP:g} mm: light finds a film of air there. If they touch, close the gap in "
-            f"the CAD tool or give a larger join; if the air is meant, add [{mover}, {fixed}] to "
-            "air_films"
+            f"{WIDE_GAP:g} mm, which is a film of air for light. If they touch, close the gap in "
+            f"the CAD tool or give a larger join; if the film is intended, add "
+            f"[{mover}, {fixed}] to air_films"
         )
 
 
@@ -192,7 +192,7 @@ def look_inward(
         toward = np.einsum("ij,ij->i", eye - centres, normals)
         ahead, behind = int((toward > 0).sum()), int((toward <= 0).sum())
     if behind > ahead:
-        return skin.flipped(), [f"{name} looked outward and was turned over"]
+        return skin.flipped(), [f"the normals of {name} pointed outward and were reversed"]
     return skin, []
 
 

@@ -157,7 +157,7 @@ class TestRecipes:
     def test_no_face_looks_there(self, cad: Any) -> None:
         error = error_of(cad.write(cad.recipe.replace("+z", "[1, 1, 1]")))
         assert "no face points to (1, 1, 1)" in error.message
-        assert "55 degrees aside" in error.message  # arccos(1 / sqrt 3)
+        assert "55 degrees off" in error.message  # arccos(1 / sqrt 3)
         assert "part skin" in str(error.where)
 
     def test_a_closed_solid_as_sensing_surface(self, cad: Any) -> None:

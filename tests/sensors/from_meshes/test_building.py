@@ -190,7 +190,7 @@ def test_what_looks_odd_is_told(cad: Any) -> None:
 def test_a_row_longer_than_its_side_is_told(cad: Any) -> None:
     """Four lights 10 mm apart are 30 mm; the plate is 24 mm long."""
     notes = design_from_meshes(cad.write(cad.recipe.replace("pitch: 4.5", "pitch: 10"))).notes
-    assert any("lights red: 2 of 4 stand beyond the ends of plate" in note for note in notes)
+    assert any("lights red: 2 of 4 are beyond the ends of plate" in note for note in notes)
     assert not any("beyond" in note for note in design_from_meshes(cad.write()).notes)
 
 
@@ -256,7 +256,7 @@ class TestStep:
         with pytest.raises(DesignError, match="no body 'jelly'") as caught:
             design_from_meshes(cad.write(text.replace("solid: gel", "solid: jelly")))
         assert "gel, " in str(caught.value.hint) and "part gel" in str(caught.value.where)
-        with pytest.raises(DesignError, match="which one is meant"):
+        with pytest.raises(DesignError, match="solid must name one of them"):
             design_from_meshes(cad.write(text.replace(", solid: gel", "")))
-        with pytest.raises(DesignError, match="knows its units"):
+        with pytest.raises(DesignError, match="states its units"):
             design_from_meshes(cad.write(text.replace("solid: gel", "solid: gel, units: cm")))

@@ -97,12 +97,12 @@ def test_a_saved_recipe_makes_the_same_again(cad: Cad, tmp_path: Path) -> None:
     ("change", "words"),
     [
         (("on: plate", "on: gel"), "lies on itself"),
-        (("on: plate", "on: skin"), "only faces of another part"),
+        (("on: plate", "on: skin"), "consists of faces of another part"),
         (("on: plate", "on: plat"), "no part 'plat'"),
-        (("on: plate", "gap: 1"), "gap goes with on"),
+        (("on: plate", "gap: 1"), "gap needs on"),
         (("on: plate", "on: plate, flush: [+z]"), "flush can't name z"),
         (("towards: +z,", "towards: +z, move: [0, 0, 1],"), "faces move with their part"),
-        (("turn: [180, 0, 0]", "on: gel"), "lie on one another in a circle"),
+        (("turn: [180, 0, 0]", "on: gel"), "lie on one another"),
     ],
 )
 def test_moves_that_cannot_be(cad: Cad, change: tuple[str, str], words: str) -> None:
@@ -116,7 +116,7 @@ def test_a_single_light_beside_a_long_side_is_not_beyond_it(cad: Cad) -> None:
     assert not [note for note in design_from_meshes(cad.write(text)).notes if "beyond" in note]
     text = RECIPE.replace("count: 4, pitch: 4.5", "count: 1, shift: 13")
     (note,) = [n for n in design_from_meshes(cad.write(text)).notes if "beyond" in n]
-    assert "1 of 1 stand beyond the ends of plate, which is 24 mm long along x" in note
+    assert "1 of 1 are beyond the ends of plate, which is 24 mm long along x" in note
 
 
 def test_file_names_tell_what_a_nameless_body_is(tmp_path: Path) -> None:
@@ -232,7 +232,7 @@ def test_pick_and_place_files_of_all_programs(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (KICAD_CSV, "does not say the unit"),
+        (KICAD_CSV, "does not state the unit"),
         ("a,b\n1,2\n", "no pick-and-place file"),
         (ALTIUM.replace("-500.000", "here"), "'here' is no length"),
         (ALTIUM.split('"D1"')[0], "has no parts"),

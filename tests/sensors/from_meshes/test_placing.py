@@ -140,8 +140,8 @@ class TestCamera:
     @pytest.mark.parametrize(
         ("choice", "message"),
         [
-            ({"place": np.zeros(3)}, "very point"),
-            ({"place": np.array([0, 0, -9.0]), "up": "+z"}, "its own up"),
+            ({"place": np.zeros(3)}, "at the point that it looks at"),
+            ({"place": np.array([0, 0, -9.0]), "up": "+z"}, "parallel to up"),
         ],
     )
     def test_poses_that_make_no_picture(self, choice: dict[str, Any], message: str) -> None:
