@@ -236,5 +236,5 @@ def test_names_and_near_names() -> None:
     with pytest.raises(ExperimentError, match="no experiment 'mini-shape'") as error:
         find("mini-shape")
     assert "mini-shapes" in str(error.value.hint)
-    with pytest.raises(ExperimentError, match="0 seeds"):
+    with pytest.raises(ExperimentError, match="number of seeds is 0"):
         EXPERIMENTS["speed"].settings(seeds=0)
