@@ -175,7 +175,7 @@ def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
     bench.desktop.click(*bench.see(f"on_screen(bpy.data.objects[{camera!r}].matrix_world"
                                    ".translation)"))  # fmt: skip
     bench.until(f"bpy.context.view_layer.objects.active.name == {camera!r}")
-    labels = bench.see("[each.label for each in part('core.vary').for_camera()]")
+    labels = bench.see("[each.label for each in part('core.search_parameters').for_camera()]")
     bench.choose(bench.bring(VARY, 0.3), labels.index("Field of view"))
     bench.until("len(scene().optisense_search.vary) == 1")
     grid = "camera.fov=" + ",".join(f"{each:g}" for each in FIELDS_OF_VIEW)

@@ -23,7 +23,7 @@ CONTROLS = 60
 
 SEARCH = "scene().optisense_search"
 PROBLEM = "state().problem"
-GREEN = "part('lights.choosing').lights_of(scene(), 'green')"
+GREEN = "part('lights.group_selection').lights_of(scene(), 'green')"
 SCORES = "manager.optisense_evaluation.scores"
 
 
@@ -93,7 +93,7 @@ def test_a_search_that_cannot_succeed_is_refused(bench: Bench) -> None:
     bench.desktop.click(*bench.see(f"on_screen({GREEN}[2].matrix_world.translation)"))
     bench.until("bpy.context.view_layer.objects.active.optisense.kind == 'LIGHT'")
     bench.only(OPTIMISE)
-    labels = bench.see("[e.label for e in part('optimise.suggesting').suggestions(bpy.context)]")
+    labels = bench.see("[e.label for e in part('optimise.suggestions').suggestions(bpy.context)]")
     flux = next(number for number, label in enumerate(labels) if "flux" in label.lower())
     bench.choose(bench.find(VARY), flux)
     bench.until(f"len({SEARCH}.vary) == 1")

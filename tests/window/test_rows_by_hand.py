@@ -25,7 +25,7 @@ NAME, EYE, STAR = 0.2, 0.77, 0.86
 LINE = 22
 """Pixels from one group of the list to the next."""
 
-LIGHTS_OF = "part('lights.choosing').lights_of(scene(), {!r})"
+LIGHTS_OF = "part('lights.group_selection').lights_of(scene(), {!r})"
 POSES = f"[part('scene.lamps').light_pose(each) for each in {LIGHTS_OF}]"
 
 ARROW = (

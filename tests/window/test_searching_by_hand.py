@@ -81,7 +81,9 @@ def test_a_mini_is_saved(bench: Bench) -> None:
 def test_what_may_vary_is_chosen(bench: Bench) -> None:
     bench.press("optisense.select_cage")
     bench.until("bpy.context.view_layer.objects.active.optisense.kind == 'CAGE'")
-    labels = bench.see("[e.label for e in part('core.vary').for_cage('skin', (), blended=False)]")
+    labels = bench.see(
+        "[e.label for e in part('core.search_parameters').for_cage('skin', (), blended=False)]"
+    )
     bench.only(OPTIMISE)
     bench.choose(bench.find(VARY), labels.index("skin: all points in z"))
     bench.until("len(scene().optisense_search.vary) == 1")
