@@ -164,8 +164,8 @@ class Photographs:
         found = _repeated(pictures)
         if all(_is_grey(picture) for _, picture in pictures):
             found.append(
-                "the photographs have no colour; the sensor's colours, and what they tell of the "
-                "skin's tilt, can't be fitted to them"
+                "the photographs have no colour, so that the colours of the lights and the camera "
+                "can't be fitted to them"
             )
         for name, picture in pictures:
             full = float((picture.max(axis=2) >= FULL_LEVEL).mean())

@@ -64,7 +64,7 @@ class Calibration:
             return f"The fitted design predicts the presses held out better: {shares}."
         return (
             f"The fitted design predicts the presses held out worse: {shares}. Keep the design "
-            "that you had, fit fewer numbers (--keep), or take more photographs at other places."
+            "that you had, fit fewer numbers, or take more photographs at other places."
         )
 
     def as_data(self) -> dict[str, Any]:
