@@ -47,5 +47,46 @@ def test_no_module_imports_a_private_name_of_another() -> None:
     assert found == []
 
 
+def test_a_module_that_only_its_package_uses_is_private() -> None:
+    """Its name begins with an underscore, unless the documentation names it for users.
+
+    `cli` and `engine` are programs, which nothing imports; the modules beside the packages are the
+    base of all of them.
+    """
+    documentation = "".join(
+        (ROOT / "docs" / page).read_text(encoding="utf-8") for page in ("api.md", "extending.md")
+    )
+    users: dict[str, set[str]] = defaultdict(set)
+    for path, tree in modules("optisense", "paper", "studio", "benchmarks"):
+        for name in imported(tree):
+            users[name].add(path.rpartition("/")[0] + "/")
+    found = []
+    for path, _ in modules("optisense"):
+        folder, _, file = path.rpartition("/")
+        if folder in ("optisense", "optisense/cli", "optisense/engine") or file.startswith("_"):
+            continue
+        if file == "base.py" and folder.startswith("optisense/design/"):
+            continue  # docs/extending.md names these files by their folder
+        name = path.removesuffix(".py").replace("/", ".")
+        if name not in documentation and all(
+            user.startswith(f"{folder}/") for user in users.get(name, ())
+        ):
+            found.append(path)
+    assert found == []
+
+
+def imported(tree: ast.Module) -> set[str]:
+    """Dotted names of all modules, and of all names in them, that a module imports or names."""
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found |= {node.module, *(f"{node.module}.{name.name}" for name in node.names)}
+        elif isinstance(node, ast.Import):
+            found |= {name.name for name in node.names}
+        elif isinstance(node, ast.Constant) and str(node.value).startswith("optisense."):
+            found.add(str(node.value))
+    return found
+
+
 def is_private(name: str) -> bool:
     return name.startswith("_") and not name.startswith("__")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
+    from optisense.calibration._synthetic_photographs import photograph_model, save_photographs
     from optisense.calibration.calibrating import calibrate
     from optisense.calibration.comparing import Comparison, compare
     from optisense.calibration.layouts import read_photographs
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from optisense.calibration.realism import Realism
     from optisense.calibration.result import Calibration
     from optisense.calibration.settings import CalibrationSettings
-    from optisense.calibration.synthetic_photographs import photograph_model, save_photographs
 
 _HOMES = {
     "Calibration": ".result",
@@ -28,9 +28,9 @@ _HOMES = {
     "Realism": ".realism",
     "calibrate": ".calibrating",
     "compare": ".comparing",
-    "photograph_model": ".synthetic_photographs",
+    "photograph_model": "._synthetic_photographs",
     "read_photographs": ".layouts",
-    "save_photographs": ".synthetic_photographs",
+    "save_photographs": "._synthetic_photographs",
 }
 
 __all__ = [

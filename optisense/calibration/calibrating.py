@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.calibration.body_changes import with_single_lights
+from optisense.calibration._body_changes import with_single_lights
+from optisense.calibration._cross_readings import realism_and_readings
+from optisense.calibration._fit_rounds import FitRounds, Progress
+from optisense.calibration._fitted_numbers import FittedNumber, correlated_pairs, fitted_numbers
 from optisense.calibration.comparing import Comparison, usable
-from optisense.calibration.cross_readings import realism_and_readings
 from optisense.calibration.families import LEDS
-from optisense.calibration.fit_rounds import FitRounds, Progress
-from optisense.calibration.fitted_numbers import FittedNumber, correlated_pairs, fitted_numbers
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.model_pictures import model_pictures
 from optisense.calibration.photographs import Photographs

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from optisense.calibration.contact_placing import FIT_WIDTH, placed, scaled_contact
-from optisense.calibration.cross_readings import realism_and_readings
+from optisense.calibration._contact_placing import FIT_WIDTH, placed, scaled_contact
+from optisense.calibration._cross_readings import realism_and_readings
 from optisense.calibration.model_pictures import ModelPictures, model_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import Realism

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from optisense.calibration import body_changes, camera_families
+from optisense.calibration import _body_changes, _camera_families
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
 from optisense.design.materials import Coating, Dielectric
@@ -102,7 +102,7 @@ def _powers(design: SensorDesign, plausible_range: float = POWER_RANGE) -> list[
 
 
 def _leds(design: SensorDesign) -> list[FitQuantity]:
-    return _powers(body_changes.with_single_lights(design), LED_RANGE)
+    return _powers(_body_changes.with_single_lights(design), LED_RANGE)
 
 
 def _lights(design: SensorDesign) -> list[FitQuantity]:
@@ -112,12 +112,12 @@ def _lights(design: SensorDesign) -> list[FitQuantity]:
             FitQuantity(
                 f"lights.{name}.along", f"place of the {name} lights towards the skin", "mm",
                 0.0, -2.0, 2.0, LIGHT_PLACE_RANGE, False, True, False,
-                _of_group(body_changes.with_lights_moved, name), f"lights.{name}",
+                _of_group(_body_changes.with_lights_moved, name), f"lights.{name}",
             ),
             FitQuantity(
                 f"lights.{name}.tilt", f"tilt of the {name} lights towards the skin", "degrees",
                 0.0, -40.0, 40.0, LIGHT_TILT_RANGE, False, True, False,
-                _of_group(body_changes.with_lights_tilted, name), f"lights.{name}",
+                _of_group(_body_changes.with_lights_tilted, name), f"lights.{name}",
             ),
         ]  # fmt: skip
     return found
@@ -126,13 +126,13 @@ def _lights(design: SensorDesign) -> list[FitQuantity]:
 def _rows(design: SensorDesign) -> list[FitQuantity]:
     found = []
     for name in design.lights:
-        length = body_changes.row_length(design, name)
+        length = _body_changes.row_length(design, name)
         if length is not None:
             found.append(
                 FitQuantity(
                     f"lights.{name}.row", f"length of the row of {name} lights", "mm", length,
                     ROW_LIMITS[0] * length, ROW_LIMITS[1] * length, ROW_RANGE, True, True, False,
-                    _of_group(body_changes.with_row_length, name), f"lights.{name}.lights",
+                    _of_group(_body_changes.with_row_length, name), f"lights.{name}.lights",
                 )
             )  # fmt: skip
     return found
@@ -145,26 +145,26 @@ def _of_group(
 
 
 def _emission(design: SensorDesign) -> list[FitQuantity]:
-    if not body_changes.widens(design):
+    if not _body_changes.widens(design):
         return []
     return [
         FitQuantity(
             "lights.emission", "width of the emission of all lights, times", "", 1.0, 0.3, 1.5,
-            WIDTH_RANGE, True, True, False, body_changes.with_emission_width, "lights",
+            WIDTH_RANGE, True, True, False, _body_changes.with_emission_width, "lights",
         )
     ]  # fmt: skip
 
 
 def _gel(design: SensorDesign) -> list[FitQuantity]:
     found = []
-    thickness = body_changes.flat_gel_thickness(design)
+    thickness = _body_changes.flat_gel_thickness(design)
     if thickness is not None:
         name = design.parts_of(Role.ELASTOMER)[0]
         found.append(
             FitQuantity(
                 f"parts.{name}.thickness", "thickness of the gel", "mm", thickness,
                 0.7 * thickness, 1.4 * thickness, THICKNESS_RANGE, True, True, True,
-                body_changes.with_gel_thickness, f"parts.{name}",
+                _body_changes.with_gel_thickness, f"parts.{name}",
             )
         )  # fmt: skip
     gels = design.parts_of(Role.ELASTOMER)
@@ -205,21 +205,21 @@ def _coating(design: SensorDesign) -> list[FitQuantity]:
             FitQuantity(
                 "coating.brightness", "reflectance of the coating, times", "", 1.0, 0.2,
                 1.0 / brightest, REFLECTANCE_RANGE, True, True, False,
-                body_changes.with_reflectance, "coating.reflectance",
+                _body_changes.with_reflectance, "coating.reflectance",
             )
         )  # fmt: skip
     return found
 
 
 def _edges(design: SensorDesign) -> list[FitQuantity]:
-    parts = body_changes.edge_parts(design)
+    parts = _body_changes.edge_parts(design)
     if not parts:
         return []
 
-    known = body_changes.edge_roughness(design, parts)
+    known = _body_changes.edge_roughness(design, parts)
 
     def rough(changed: SensorDesign, value: float) -> SensorDesign:
-        return body_changes.with_edge_roughness(changed, parts, value)
+        return _body_changes.with_edge_roughness(changed, parts, value)
 
     return [
         FitQuantity(
@@ -247,16 +247,18 @@ LEDS = "leds"
 
 FAMILIES = {
     "powers": Family("power of each light group", _powers),
-    "colours": Family("colour matrix of the camera", camera_families.colours),
-    "tone": Family("exponent of the tone curve", camera_families.tone),
+    "colours": Family("colour matrix of the camera", _camera_families.colours),
+    "tone": Family("exponent of the tone curve", _camera_families.tone),
     "black": Family(
-        "level of each channel in the dark: black level and stray light", camera_families.black
+        "level of each channel in the dark: black level and stray light", _camera_families.black
     ),
-    "shading": Family("dimming of the picture's corners", camera_families.shading),
-    "view": Family("field of view", camera_families.view),
-    "place": Family("place of the camera across its axis", camera_families.place),
-    "pose": Family("turn of the camera, and its place along its axis", camera_families.pose, False),
-    "distortion": Family("radial distortion of the lens", camera_families.distortion, False),
+    "shading": Family("dimming of the picture's corners", _camera_families.shading),
+    "view": Family("field of view", _camera_families.view),
+    "place": Family("place of the camera across its axis", _camera_families.place),
+    "pose": Family(
+        "turn of the camera, and its place along its axis", _camera_families.pose, False
+    ),
+    "distortion": Family("radial distortion of the lens", _camera_families.distortion, False),
     LEDS: Family("power of each single light, which replaces that of the groups", _leds, False),
     "lights": Family("place and tilt of each light group, along the camera's axis", _lights, False),
     "rows": Family("length of each straight row of lights", _rows, False),

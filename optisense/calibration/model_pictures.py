@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from optisense.calibration._layered_pictures import layered_pictures
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
-from optisense.calibration.layered_pictures import layered_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact, check_shape
 from optisense.errors import CalibrationError

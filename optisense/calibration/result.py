@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
+from optisense.calibration._fitted_numbers import FittedNumber
 from optisense.calibration.comparing import Comparison
-from optisense.calibration.fitted_numbers import FittedNumber
 from optisense.calibration.realism import Realism
 from optisense.design import SensorDesign
 

@@ -103,11 +103,12 @@ def _from_ies(file: Path, given: IesOptions, name: str | None, description: str 
         typer.BadParameter: an option is missing while there is no terminal.
     """
     from optisense import library
+    from optisense.design.ies import read_ies
     from optisense.library.adding import check_new_name
     from optisense.library.own_parts import own_folder
 
     check_new_name(file.stem if name is None else name)
-    profile = library.ies.read_ies(file)
+    profile = read_ies(file)
     if given.colour is None or given.flux is None:
         if not sys.stdin.isatty():
             missing = "--colour" if given.colour is None else "--flux"

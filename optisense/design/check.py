@@ -7,11 +7,11 @@ from collections.abc import Collection
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design._focus_checks import focus_problems
 from optisense.design.addressing import get_value
 from optisense.design.arrangement import overlaps
 from optisense.design.cage_checks import cage_problems, half_caged
 from optisense.design.camera_checks import lens_problems, place_problems, view_problems
-from optisense.design.focus_checks import focus_problems
 from optisense.design.lens_checks import fold_problems
 from optisense.design.limits import placed_things, unit_slips
 from optisense.design.material_checks import absorption_problems, index_problems

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from optisense.design._spectrum import LightSpectra
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector, is_left_out
-from optisense.design.spectrum import LightSpectra
 
 MOST_LIGHTS = 10_000
 """Largest number of lights of one group; the built-in sensors have at most some dozens."""

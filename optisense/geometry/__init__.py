@@ -1,5 +1,7 @@
 """Geometry: meshes, cages, indenters, and the places and depths of contacts."""
 
+from optisense.geometry._indenters import Cylinder, MeshIndenter, Plane, Sphere
+from optisense.geometry._places import nine_places
 from optisense.geometry.cage import cage_points, cage_weights, deform
 from optisense.geometry.contact import Contact, available_depth, locate, place
 from optisense.geometry.contact_text import parse_contact, parse_place
@@ -10,9 +12,7 @@ from optisense.geometry.indenter_kinds import (
     quantity,
     register_indenter,
 )
-from optisense.geometry.indenters import Cylinder, MeshIndenter, Plane, Sphere
 from optisense.geometry.mesh import TriangleMesh
-from optisense.geometry.places import nine_places
 from optisense.geometry.rays import RayHits, ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
 

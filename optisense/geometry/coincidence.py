@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from optisense.geometry.box_pairs import overlapping_boxes
+from optisense.geometry._box_pairs import overlapping_boxes
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))

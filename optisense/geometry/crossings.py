@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.geometry.box_pairs import overlapping_boxes, overlapping_pairs
+from optisense.geometry._box_pairs import overlapping_boxes, overlapping_pairs
 from optisense.geometry.mesh import FloatArray, TriangleMesh
 
 TOUCH = 1e-4

@@ -4,7 +4,7 @@ the studio.
 A kind is one class. Its numbers are the fields of a dataclass, each made by `quantity`, which holds
 their units, limits and help; from them follow the text form (`cylinder:2,10`), the form of requests
 (`{"kind": "cylinder", "radius": 2}`) and the controls of front ends. The kinds of this package are
-in `optisense/geometry/indenters.py`; docs/extending.md adds one.
+in `optisense/geometry/_indenters.py`; docs/extending.md adds one.
 """
 
 from __future__ import annotations
@@ -250,11 +250,11 @@ INDENTERS: Registry[type[IndenterKind]] = Registry(
     "optisense.indenters",
     ContactError,
     {
-        "sphere": "optisense.geometry.indenters:Sphere",
-        "cylinder": "optisense.geometry.indenters:Cylinder",
-        "plane": "optisense.geometry.indenters:Plane",
-        "mesh": "optisense.geometry.indenters:MeshIndenter",
-        "object": "optisense.geometry.objects.catalogue:ObjectIndenter",
+        "sphere": "optisense.geometry._indenters:Sphere",
+        "cylinder": "optisense.geometry._indenters:Cylinder",
+        "plane": "optisense.geometry._indenters:Plane",
+        "mesh": "optisense.geometry._indenters:MeshIndenter",
+        "object": "optisense.geometry.objects._catalogue:ObjectIndenter",
     },
     _check,
 )

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import MeshError
-from optisense.geometry.grid_welding import WELD_DISTANCE, welded
+from optisense.geometry._grid_welding import WELD_DISTANCE, welded
 from optisense.geometry.mesh_files import obj_text, read_mesh
 
 FloatArray = NDArray[np.float64]
@@ -191,7 +191,7 @@ class TriangleMesh:
     @cached_property
     def is_closed(self) -> bool:
         """Whether each edge is traversed equally often in both directions."""
-        from optisense.geometry.mesh_checks import unmatched_edges
+        from optisense.geometry._mesh_checks import unmatched_edges
 
         return len(self.faces) > 0 and len(unmatched_edges(self)) == 0
 
@@ -202,7 +202,7 @@ class TriangleMesh:
             MeshError: no triangles, a coordinate that is not finite, a face that names a
                 missing vertex, or (`closed`) an open edge; the message says where.
         """
-        from optisense.geometry.mesh_checks import validate
+        from optisense.geometry._mesh_checks import validate
 
         return validate(self, name, closed)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import MeshError
-from optisense.geometry.grid_welding import WELD_DISTANCE, welded
+from optisense.geometry._grid_welding import WELD_DISTANCE, welded
 from optisense.untrusted_files import MOST_MESH, read_bytes
 
 if TYPE_CHECKING:

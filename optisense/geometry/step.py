@@ -23,8 +23,8 @@ import numpy as np
 
 from optisense import errors
 from optisense.errors import MeshError, OptiSenseError, SetupError
+from optisense.geometry._welding import merged_vertices
 from optisense.geometry.mesh import TriangleMesh
-from optisense.geometry.welding import merged_vertices
 from optisense.untrusted_files import MOST_STEP, check_size
 
 SUFFIXES = (".step", ".stp")
@@ -44,7 +44,7 @@ Open CASCADE's triangles of neighbouring faces meet."""
 BODIES_FILE, ERROR_FILE = "bodies.npz", "wrong.json"
 """Files that the process writes into its folder: the bodies found, or the error."""
 
-READER = "optisense.geometry.step_process"
+READER = "optisense.geometry._step_process"
 """Module of the process that reads a file."""
 
 
@@ -90,8 +90,8 @@ def no_step(error: ImportError, action: str, instead: str, where: Path | None = 
 def read_step(path: str | Path) -> list[StepBody]:
     """Read all bodies of a STEP file, in its order, placed by its assembly.
 
-    Another process reads it (`optisense.geometry.step_process`), as some malformed files crash Open
-    CASCADE.
+    Another process reads it, because some malformed files crash Open CASCADE
+    (`optisense.geometry._step_process`).
 
     Raises:
         SetupError: the extra is not installed.

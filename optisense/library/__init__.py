@@ -1,7 +1,6 @@
 """Materials, coatings, lights and cameras that designs can name, each number with its source."""
 
 from optisense.design.materials import flake_lobe, specularity_to_roughness
-from optisense.library import ies
 from optisense.library._entries import (
     AnyEntry,
     CameraModel,
@@ -41,7 +40,6 @@ __all__ = [
     "emitter",
     "entry",
     "flake_lobe",
-    "ies",
     "is_own",
     "light",
     "material",

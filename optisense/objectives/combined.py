@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from optisense.errors import ObjectiveError, UnknownPartError
 from optisense.near import suggestion
-from optisense.objectives import figures
+from optisense.objectives import _figures
 from optisense.objectives.expressions import Expression, ScoreTerm
 from optisense.objectives.named import is_plain
 from optisense.objectives.registry import Objective, find
@@ -68,7 +68,7 @@ def combined(
         name=expression.text,
         function=function,
         title=expression.text,
-        draw=figures.draw_parts,
+        draw=_figures.draw_parts,
         beside=tuple(str(quantity) for quantity in expression.quantities),
         reads=None if any(each.reads is None for each in terms.values()) else _reads(terms),
         unit=_unit(expression, terms),

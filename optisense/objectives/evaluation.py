@@ -17,17 +17,17 @@ from optisense.design.material_checks import index_problems
 from optisense.design.problems import Diagnostic
 from optisense.errors import ObjectiveError
 from optisense.geometry import Contact, Sphere
-from optisense.objectives.cached_values import CachedValues
-from optisense.objectives.exposure import exposure_for
-from optisense.objectives.frames import frame_of, nearest_press
-from optisense.objectives.press import Press
-from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
-from optisense.objectives.unexposed import (
+from optisense.objectives._cached_values import CachedValues
+from optisense.objectives._exposure import exposure_for
+from optisense.objectives._press import Press
+from optisense.objectives._unexposed import (
     UnexposedPress,
     are_apart,
     box_around,
     radiance_in,
 )
+from optisense.objectives.frames import frame_of, nearest_press
+from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
 from optisense.objectives.view import View, view_of
 from optisense.quality import SCORE_PHOTONS
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ObjectiveError
-from optisense.objectives import figures
-from optisense.objectives.colour_boxes import ranges_in_boxes
-from optisense.objectives.press import FloatArray, Press, azimuths, refuse_kind
+from optisense.objectives import _figures
+from optisense.objectives._colour_boxes import ranges_in_boxes
+from optisense.objectives._press import FloatArray, Press, azimuths, refuse_kind
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
@@ -111,7 +111,7 @@ designs in docs/experiments.md."""
 @objective(
     "normdiff",
     title="NormDiff",
-    draw=figures.draw_normdiff,
+    draw=_figures.draw_normdiff,
     beside=("theta_range", "phi_range"),
     reads=sample_shares,
     range=bounds,

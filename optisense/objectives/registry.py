@@ -19,8 +19,8 @@ from optisense.objectives.score import Drawing
 from optisense.registry import Registry, place_of_definition
 
 if TYPE_CHECKING:
+    from optisense.objectives._press import Press
     from optisense.objectives.evaluation import Evaluation, Reads
-    from optisense.objectives.press import Press
 
 BUILT_IN = ("rgb2normal", "normdiff", "aoap", "2to3pw")
 """The four objectives of the OptiSense paper."""
@@ -169,8 +169,8 @@ OBJECTIVES: Registry[Objective] = Registry(
     {
         "rgb2normal": "optisense.objectives.rgb2normal:rgb2normal",
         "normdiff": "optisense.objectives.normdiff:normdiff",
-        "aoap": "optisense.objectives.aoap:aoap",
-        "2to3pw": "optisense.objectives.projection_warping:projection_warping",
+        "aoap": "optisense.objectives._aoap:aoap",
+        "2to3pw": "optisense.objectives._projection_warping:projection_warping",
         **{name: f"optisense.objectives.{name}:{name}" for name in FURTHER},
     },
     _check,

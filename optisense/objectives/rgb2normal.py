@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ObjectiveError
-from optisense.objectives import figures
-from optisense.objectives.press import FloatArray, Press, refuse_kind
+from optisense.objectives import _figures
+from optisense.objectives._press import FloatArray, Press, refuse_kind
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
@@ -80,7 +80,7 @@ docs/experiments.md, and DIGIT."""
 @objective(
     "rgb2normal",
     title="RGB2Normal",
-    draw=figures.draw_rgb2normal,
+    draw=_figures.draw_rgb2normal,
     beside=("worst_line",),
     reads=on_lines,
     range=(0.0, 1.0),

@@ -78,7 +78,7 @@ class Score:
 
     def figure(self) -> Figure:
         """Draw the parts; objectives without a figure of their own have a plain one."""
-        from optisense.objectives.figures import draw_failure, draw_parts
+        from optisense.objectives._figures import draw_failure, draw_parts
 
         if self.failure is not None:
             return draw_failure(self)

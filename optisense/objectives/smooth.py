@@ -15,9 +15,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.objectives.aoap import COVERAGE_WEIGHT
-from optisense.objectives.distortion import MOST_ANISOTROPY
-from optisense.objectives.projection_warping import MOST_EVEN
+from optisense.objectives._aoap import COVERAGE_WEIGHT
+from optisense.objectives._distortion import MOST_ANISOTROPY
+from optisense.objectives._projection_warping import MOST_EVEN
 
 FloatArray = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
-from optisense.objectives.projection_warping import triangle_areas
+from optisense.objectives._projection_warping import triangle_areas
 from optisense.objectives.settings import Settings
 
 if TYPE_CHECKING:

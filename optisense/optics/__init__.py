@@ -14,23 +14,23 @@ from typing import TYPE_CHECKING
 from optisense.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from optisense.optics.coarse import CoarseModel
+    from optisense.optics._coarse import CoarseModel
+    from optisense.optics._model import OpticalModel, RenderProgress
     from optisense.optics.imaging.tactile_image import TactileImage
     from optisense.optics.ledger import LightLedger, light_ledger
     from optisense.optics.light_at_camera import CameraLight, camera_light
-    from optisense.optics.model import OpticalModel, RenderProgress
     from optisense.optics.place_light import PlaceLight, light_at
     from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
 _HOMES = {
     "CameraLight": ".light_at_camera",
     "ChiefRays": ".transport.chief_rays",
-    "CoarseModel": ".coarse",
+    "CoarseModel": "._coarse",
     "LightLedger": ".ledger",
-    "OpticalModel": ".model",
+    "OpticalModel": "._model",
     "PlaceLight": ".place_light",
     "RayOutcome": ".transport.chief_rays",
-    "RenderProgress": ".model",
+    "RenderProgress": "._model",
     "TactileImage": ".imaging.tactile_image",
     "camera_light": ".light_at_camera",
     "light_at": ".place_light",

@@ -21,15 +21,15 @@ from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.mechanics import ELASTIC
 from optisense.optics._carried_contacts import PressedContacts
-from optisense.optics.draft_light import DraftCacheStore, KeptView
+from optisense.optics._draft_light import DraftCacheStore, KeptView
+from optisense.optics._model import ContactView, OpticalModel
+from optisense.optics._ray_model import RayModel
+from optisense.optics._skin_view import VIEW_RESOLUTION, SkinView
 from optisense.optics.imaging.tactile_image import TactileImage
-from optisense.optics.model import ContactView, OpticalModel
 from optisense.optics.radiance_cache.lit_scene import LitScene
-from optisense.optics.ray_model import RayModel
 from optisense.optics.scene.assembly import assemble
 from optisense.optics.scene.media import same_faces
 from optisense.optics.scene.sensor_scenes import SensorScenes
-from optisense.optics.skin_view import VIEW_RESOLUTION, SkinView
 from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays
 from optisense.quality import photons_of
 

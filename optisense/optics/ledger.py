@@ -20,7 +20,7 @@ from optisense.optics.transport.photons import TargetCells
 from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
-    from optisense.optics.model import OpticalModel
+    from optisense.optics._model import OpticalModel
 
 VIEW_CELL = 0.5
 """Side (mm) of the cells of the sensing surface that record the part in the camera's view: that of

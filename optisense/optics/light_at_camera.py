@@ -14,7 +14,7 @@ from optisense.optics.camera.projection import RayCamera
 from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
-    from optisense.optics.model import OpticalModel
+    from optisense.optics._model import OpticalModel
 
 WIDTH = 96
 """Width (pixels) of the picture that is summed up. The sum does not depend on the size of pixels;

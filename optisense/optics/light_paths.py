@@ -13,7 +13,7 @@ from optisense.optics.ledger import GIVEN_UP, cells_in_view, places_of
 from optisense.optics.transport.photon_paths import TracedPhotons, trace_photon_paths
 
 if TYPE_CHECKING:
-    from optisense.optics.model import OpticalModel
+    from optisense.optics._model import OpticalModel
     from optisense.optics.transport.photons import TargetCells
 
 TYPICAL = 100

@@ -26,7 +26,7 @@ from optisense.optics.transport.place_light import (
 from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
-    from optisense.optics.model import OpticalModel
+    from optisense.optics._model import OpticalModel
 
 Place = tuple[float, float] | tuple[float, float, float]
 """Coordinates (mm) on the sensing surface, or a point (mm) in the frame of the design."""

@@ -17,7 +17,7 @@ from optisense.optics.transport.chief_rays import RayOutcome
 from optisense.optics.transport.interact import Path, interact
 
 if TYPE_CHECKING:
-    from optisense.optics.model import OpticalModel
+    from optisense.optics._model import OpticalModel
 
 ESCAPE_LENGTH = 5.0
 """Length (mm) of the last segment of a ray that escapes, in a drawing: enough to show its direction

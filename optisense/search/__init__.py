@@ -7,8 +7,8 @@
 (manufacturing errors).
 """
 
+from optisense.search._run_search import run_study, search
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.run_search import run_study, search
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.space.parameters import Around, CagePoints, Choice, Continuous, Integer
 from optisense.search.space.search_space import BoundSpace, SearchSpace

@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, get_value
 from optisense.errors import SearchError
+from optisense.search._run_search import run_study
 from optisense.search.evaluation.evaluator import Goal
-from optisense.search.run_search import run_study
 from optisense.search.space.parameters import Choice
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.search.study.best import tied

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from optisense.calibration._fitted_numbers import FittedNumber
 from optisense.calibration.comparing import Comparison
-from optisense.calibration.fitted_numbers import FittedNumber
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import PhotographedPress, Photographs
 from optisense.calibration.realism import realism

@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 
 import optisense as ots
 from optisense.calibration import Photographs, photograph_model, save_photographs
-from optisense.calibration.body_changes import with_single_lights
+from optisense.calibration._body_changes import with_single_lights
+from optisense.calibration._gauss_newton import LayeredFit
+from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.calibrating import calibrate
 from optisense.calibration.families import chosen_families
-from optisense.calibration.gauss_newton import LayeredFit
 from optisense.calibration.kept_renderings import KeptRenderings
-from optisense.calibration.layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import distances
 from optisense.calibration.seen_contacts import SeenContact, seen_contacts

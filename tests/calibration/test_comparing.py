@@ -20,8 +20,8 @@ from optisense.calibration import (
     photograph_model,
     save_photographs,
 )
+from optisense.calibration._cross_readings import cross_readings
 from optisense.calibration.contact_finding import find_contact
-from optisense.calibration.cross_readings import cross_readings
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.realism import realism, similarity
 from optisense.calibration.seen_contacts import SeenContact, contact_of, doubts, seen_contacts

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import optisense as ots
-from optisense.calibration.body_changes import with_single_lights
+from optisense.calibration._body_changes import with_single_lights
 from optisense.calibration.families import FAMILIES, LEDS, USUAL, chosen_families
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.design import SensorDesign, get_value, set_value

@@ -10,16 +10,16 @@ import pytest
 
 import optisense as ots
 from optisense.calibration import photograph_model
+from optisense.calibration._camera_changes import with_camera_turned
+from optisense.calibration._covered_view import CoveredView, with_smooth_outline
+from optisense.calibration._fit_rounds import FitRounds
+from optisense.calibration._layered_pictures import LayeredPictures
+from optisense.calibration._view_slopes import displacements, view_changes
 from optisense.calibration.calibrating import calibrate
-from optisense.calibration.camera_changes import with_camera_turned
-from optisense.calibration.covered_view import CoveredView, with_smooth_outline
-from optisense.calibration.fit_rounds import FitRounds
 from optisense.calibration.kept_renderings import KEPT_NOWHERE
-from optisense.calibration.layered_pictures import LayeredPictures
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
-from optisense.calibration.view_slopes import displacements, view_changes
 
 from .conftest import PHOTONS, PLACES, SIZE
 

@@ -7,8 +7,8 @@ import pytest
 
 from optisense import sensors
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
+from optisense.design._focus_checks import apparent_distances
 from optisense.design.camera_checks import camera_fault, view_shares
-from optisense.design.focus_checks import apparent_distances
 from optisense.geometry import TriangleMesh
 
 

@@ -64,7 +64,7 @@ def read_contact(folder: Path) -> None:
 
 @cache
 def _sensor() -> Any:
-    from optisense.optics.ray_model import RayModel
+    from optisense.optics._ray_model import RayModel
 
     return RayModel(ots.load("gelsight-mini-ideal"), "llvm")
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.geometry import box_pairs
-from optisense.geometry.box_pairs import overlapping_boxes, overlapping_pairs
+from optisense.geometry import _box_pairs
+from optisense.geometry._box_pairs import overlapping_boxes, overlapping_pairs
 from optisense.geometry.mesh import FloatArray
 
 
@@ -35,8 +35,8 @@ def as_set(one: FloatArray, other: FloatArray) -> set[tuple[int, int]]:
 def test_pairs_are_those_of_comparing_all(
     counts: tuple[int, int], at_once: int, dense: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(box_pairs, "_AT_ONCE", at_once)
-    monkeypatch.setattr(box_pairs, "_DENSE", dense)
+    monkeypatch.setattr(_box_pairs, "_AT_ONCE", at_once)
+    monkeypatch.setattr(_box_pairs, "_DENSE", dense)
     one, other = boxes(counts[0], 1.0, 1), boxes(counts[1], 0.5, 2)
     assert as_set(*overlapping_boxes(*one, *other)) == pairs_one_by_one(*one, *other)
 
@@ -46,7 +46,7 @@ def test_pairs_are_those_of_comparing_all(
 def test_pairs_of_one_lot_come_once(
     count: int, dense: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(box_pairs, "_DENSE", dense)
+    monkeypatch.setattr(_box_pairs, "_DENSE", dense)
     low, high = boxes(count, 1.0, 3)
     everything = pairs_one_by_one(low, high, low, high)
     assert as_set(*overlapping_pairs(low, high)) == {(a, b) for a, b in everything if a < b}

@@ -11,7 +11,7 @@ from optisense.errors import ContactError
 from optisense.geometry import Contact, TriangleMesh, parse_contact
 from optisense.geometry.indenter_kinds import indenter_from_plain
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
-from optisense.geometry.objects.relief import TOP
+from optisense.geometry.objects._relief import TOP
 from optisense.mechanics._height_map import heights
 
 FINE = 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from optisense.errors import MeshError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.mesh_checks import with_consistent_winding
+from optisense.geometry._mesh_checks import with_consistent_winding
 from optisense.geometry.repair import refuse_bad_sheet, repaired, shells
 
 BLOCK = TriangleMesh.box((0, 0, 0), (10, 8, 4), (3, 3, 3))

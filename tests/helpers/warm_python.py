@@ -96,7 +96,7 @@ def import_all() -> None:
     import optisense.cli
     import optisense.commands.rendering
     import optisense.objectives
-    import optisense.optics.model
+    import optisense.optics._model
     import optisense.report
     import optisense.search
     import optisense.sensors

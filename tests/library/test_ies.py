@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from optisense.design.ies import IesProfile, parse_ies, read_ies
 from optisense.errors import LibraryError
-from optisense.library.ies import IesProfile, parse_ies, read_ies
 
 FLUX_TOLERANCE = 1e-4
 

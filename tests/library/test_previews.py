@@ -21,10 +21,10 @@ from optisense.design.reflectance import (
 )
 from optisense.errors import OutputError
 from optisense.library import CameraModel, previews
-from optisense.library.previews.ball import picture_of_ball
+from optisense.library.previews._ball import picture_of_ball
+from optisense.library.previews._material import lobes
 from optisense.library.previews.camera import border_directions, footprint, footprint_size
 from optisense.library.previews.light import equivalent_solid_angle
-from optisense.library.previews.material import lobes
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import Contact, Sphere, TriangleMesh
 from optisense.mechanics import is_attached, refuse_loose_gel
-from optisense.optics.ray_model import RayModel
+from optisense.optics._ray_model import RayModel
 from optisense.sensors import load
 
 SENSORS = (

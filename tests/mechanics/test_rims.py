@@ -4,7 +4,7 @@ import pytest
 
 from optisense.geometry import Contact, Sphere
 from optisense.mechanics import rims_in_words
-from optisense.optics.ray_model import RayModel
+from optisense.optics._ray_model import RayModel
 from optisense.sensors import load
 
 BALL = Sphere(1.5)

@@ -7,7 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from optisense.objectives.colour_boxes import ranges_in_boxes
+from optisense.objectives._colour_boxes import ranges_in_boxes
 
 Points = tuple[np.ndarray, ...]
 

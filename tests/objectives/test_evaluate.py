@@ -18,7 +18,7 @@ from optisense.design import set_value
 from optisense.design.responses import USUAL_RESPONSE
 from optisense.errors import ObjectiveError
 from optisense.objectives import BUILT_IN, Evaluation, Objective, Press, Settings
-from optisense.objectives.exposure import MOST_SATURATED, exposure_for
+from optisense.objectives._exposure import MOST_SATURATED, exposure_for
 from optisense.objectives.normdiff import SAMPLE_SHARE, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of

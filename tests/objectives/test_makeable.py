@@ -11,9 +11,9 @@ import pytest
 from optisense import load, set_value
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
-from optisense.objectives.cage_roughness import cage_roughness, unevenness
-from optisense.objectives.clearance import clearance, distance
-from optisense.objectives.draft import draft, draft_of
+from optisense.objectives._cage_roughness import cage_roughness, unevenness
+from optisense.objectives._clearance import clearance, distance
+from optisense.objectives._draft import draft, draft_of
 
 SHEET = TriangleMesh.grid((20.0, 10.0), (40, 20))
 

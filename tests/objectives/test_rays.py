@@ -11,10 +11,10 @@ from scipy.integrate import dblquad
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
 from optisense.objectives import Evaluation
-from optisense.objectives.aoap import aoap
-from optisense.objectives.coverage import coverage
-from optisense.objectives.distortion import distortion, footprints
-from optisense.objectives.projection_warping import projection_warping, triangle_areas
+from optisense.objectives._aoap import aoap
+from optisense.objectives._coverage import coverage
+from optisense.objectives._distortion import distortion, footprints
+from optisense.objectives._projection_warping import projection_warping, triangle_areas
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind

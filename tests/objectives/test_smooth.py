@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from optisense.objectives.projection_warping import triangle_areas
+from optisense.objectives._projection_warping import triangle_areas
 from optisense.objectives.smooth import SMOOTH
 
 STEP = 1e-6

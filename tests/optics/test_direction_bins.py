@@ -7,7 +7,7 @@ import pytest
 import optisense as ots
 from optisense.optics import OpticalModel
 from optisense.optics.drafts import DraftModel
-from optisense.optics.radiance_cache.direction_bins import (
+from optisense.optics.radiance_cache._direction_bins import (
     COARSE_BINS,
     CURVED_BINS,
     FINE_BINS,

@@ -13,7 +13,7 @@ from scipy import stats
 
 import optisense.library
 from optisense.design.emitters import Intensity, SpotEmitter
-from optisense.library.ies import read_ies
+from optisense.design.ies import read_ies
 from optisense.optics.backend.sequences import sequence_4d
 from optisense.optics.scene.emitters import (
     Emitter,

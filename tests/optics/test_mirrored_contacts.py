@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from optisense.optics.backend.arrays import joined
-from optisense.optics.imaging.film import Film
+from optisense.optics.imaging._film import Film
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 

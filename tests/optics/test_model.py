@@ -13,7 +13,7 @@ from optisense.design import set_value
 from optisense.errors import LibraryError, RenderError
 from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
-from optisense.optics.radiance_cache.direction_bins import COARSE_BINS
+from optisense.optics.radiance_cache._direction_bins import COARSE_BINS
 from optisense.sensors import build
 
 PIXELS = (80, 60)

@@ -8,7 +8,7 @@ from comparing import same_light
 
 from optisense import Contact, OpticalModel, Sphere
 from optisense.optics.imaging import cached
-from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
+from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.transport.chief_rays import ChiefRays
 from optisense.sensors import build
 

@@ -23,7 +23,7 @@ def test_rounding_keeps_the_mean_power(weight: float) -> None:
     use_variant("llvm")
     import mitsuba as mi
 
-    from optisense.optics.radiance_cache.power_rounding import (
+    from optisense.optics.radiance_cache._power_rounding import (
         LEAST_QUANTA,
         QUANTA_PER_PHOTON,
         PowerRounding,

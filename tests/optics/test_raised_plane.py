@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from optisense.optics.radiance_cache.raised_plane import (
+from optisense.optics.radiance_cache._raised_plane import (
     RAISED_HEIGHT,
     areas,
     crossings,

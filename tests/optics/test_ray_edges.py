@@ -10,7 +10,7 @@ from optisense.optics.backend.variant import use_variant
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
-from optisense.optics.transport.ray_edges import Discontinuity
+from optisense.optics.transport._ray_edges import Discontinuity
 from optisense.optics.transport.ray_gradient import DifferentiableRays
 
 WIDTH, HEIGHT = 96, 72

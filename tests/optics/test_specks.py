@@ -12,7 +12,7 @@ from optisense import sensors
 from optisense.design import Light, SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.optics import OpticalModel
-from optisense.optics.imaging.film import Film
+from optisense.optics.imaging._film import Film
 
 WIDTH, HEIGHT = 80, 60
 NOWHERE = np.zeros((HEIGHT, WIDTH), dtype=bool)

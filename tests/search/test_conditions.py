@@ -353,7 +353,7 @@ def test_long_searches_read_the_start_and_the_best_so_far(
     goal: str,
     options: dict[str, Any],
 ) -> None:
-    monkeypatch.setattr("optisense.search.study.reading_watch.FIRST_SECONDS", 0.0)
+    monkeypatch.setattr("optisense.search.study._reading_watch.FIRST_SECONDS", 0.0)
     settings = {"photons": 60_000, "resolution": [160, 120]}
     found = search(mini, space, goal, budget=3, settings=settings, **options)
     best = max((each for each in found.trials if not each.failure), key=lambda each: each.score)

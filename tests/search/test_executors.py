@@ -23,7 +23,7 @@ from optisense.errors import SearchError, SetupError
 from optisense.search import SearchProgress, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.executors import ExecutorRunner, ProcessPool, remote
+from optisense.search.executors import ExecutorRunner, ProcessPool, _remote
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 
 LINE = {"coating.specularity": (0.0, 1.0, 11)}
@@ -171,7 +171,7 @@ class TestDask:
         tmp_path: Path,
         monkeypatch: pytest.MonkeyPatch,
     ) -> None:
-        monkeypatch.setattr(remote, "CONNECT_SECONDS", 1.0)
+        monkeypatch.setattr(_remote, "CONNECT_SECONDS", 1.0)
         with pytest.raises(SetupError, match="is not the address"):
             search(mini, LINE, goals.nearness, workers="somewhere", out=tmp_path / "study")
         with pytest.raises(SetupError, match="no Dask scheduler answers") as told:

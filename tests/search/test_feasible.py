@@ -7,7 +7,7 @@ import pytest
 
 from optisense import SensorDesign
 from optisense.search import Around, SearchSpace
-from optisense.search.methods.feasible import FeasibleRegion
+from optisense.search.methods._feasible import FeasibleRegion
 from optisense.search.space.constraints import NoCrossings
 from optisense.sensors import gelsight_svelte
 

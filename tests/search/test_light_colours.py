@@ -20,7 +20,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.relit import RelitEvaluator
 from optisense.search.methods import Problem, find, make
-from optisense.search.methods.light_colours import LightColours
+from optisense.search.methods._light_colours import LightColours
 
 COLOURS = {"lights.*.colour": ["red", "green", "blue"]}
 QUICK = {"resolution": (200, 150), "photons": 100_000, "places": ((0.0, 0.0), (3.0, 2.0))}

@@ -12,7 +12,7 @@ from optisense.errors import SearchError
 from optisense.search import SearchSpace
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import Problem, find, make
-from optisense.search.methods.light_types import FOR_ALL, FOR_GROUPS, FOR_LIGHTS, LightTypes
+from optisense.search.methods._light_types import FOR_ALL, FOR_GROUPS, FOR_LIGHTS, LightTypes
 from optisense.search.space.search_space import BoundSpace
 
 TYPES = ["osram-topled-black-30", "chanzon-5730", "generic-spot"]

@@ -12,7 +12,7 @@ import pytest
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.search import Around, CagePoints
-from optisense.search.methods.registry import METHODS
+from optisense.search.methods._registry import METHODS
 from optisense.search.space.search_space import BoundSpace
 from optisense.search.testing import Landscape, MethodContract, general_spaces
 from optisense.sensors import gelsight_svelte

@@ -14,7 +14,7 @@ from optisense.design import SensorDesign, save_design, set_value
 from optisense.errors import SearchError
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search import Plan, SearchProgress, SearchSpace, Study, search
-from optisense.search.run_search import run_study
+from optisense.search._run_search import run_study
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
 
@@ -190,7 +190,7 @@ def test_several_goals_are_weighed(mini: SensorDesign, goals: ModuleType) -> Non
 def test_trade_offs_are_scored_again_from_end_to_end(mini: SensorDesign) -> None:
     from optisense.search import Outcome
     from optisense.search.methods import register
-    from optisense.search.methods.pareto import Pareto
+    from optisense.search.methods._pareto import Pareto
 
     class Noisy:
         """Two opposite scores of the specularity, with luck that depends on seed and design."""

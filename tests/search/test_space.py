@@ -10,7 +10,7 @@ from optisense.design import Role, SensorDesign, add_cage, get_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError, OptiSenseError, SearchError
 from optisense.search import Around, CagePoints, Choice, Integer, SearchSpace
-from optisense.search.space.expansion import expand
+from optisense.search.space._expansion import expand
 from optisense.search.space.search_space import BoundSpace
 
 

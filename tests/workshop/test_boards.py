@@ -10,9 +10,9 @@ import pytest
 
 from optisense import sensors
 from optisense.design import Light, SensorDesign
-from optisense.sensors.from_meshes.pick_and_place import read_pick_and_place
+from optisense.sensors.from_meshes._pick_and_place import read_pick_and_place
+from optisense.sensors.from_meshes._strips import from_table
 from optisense.sensors.from_meshes.recipe_lights import FromTable
-from optisense.sensors.from_meshes.strips import from_table
 from optisense.workshop import bill_of_materials, export, placements
 from optisense.workshop._boards import axes_at_rest, boards_of
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
 
-from optisense.design.emitters.intensity import Intensity
+from optisense.design.emitters._intensity import Intensity
 from optisense.design.fields import DEGREES, Number
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError, LibraryError
@@ -66,9 +66,9 @@ class LightModel(KindModel):
         "optisense.emitters",
         DesignError,
         {
-            "area": "optisense.design.emitters.area:AreaEmitter",
-            "ies": "optisense.design.emitters.ies:IesEmitter",
-            "spot": "optisense.design.emitters.spot:SpotEmitter",
+            "area": "optisense.design.emitters._area:AreaEmitter",
+            "ies": "optisense.design.emitters._ies:IesEmitter",
+            "spot": "optisense.design.emitters._spot:SpotEmitter",
         },
     )
 

@@ -58,7 +58,7 @@ class LensBlur(KindModel):
         "optisense.blurs",
         DesignError,
         {
-            "gaussian": "optisense.design.lenses.gaussian_blur:GaussianBlur",
+            "gaussian": "optisense.design.lenses._gaussian_blur:GaussianBlur",
             "defocus": "optisense.design.lenses.defocus:Defocus",
         },
     )

@@ -31,7 +31,7 @@ class LensShading(KindModel):
         "optisense.shadings",
         DesignError,
         {
-            "table": "optisense.design.lenses.table_shading:TableShading",
+            "table": "optisense.design.lenses._table_shading:TableShading",
             "radial": "optisense.design.lenses.radial_shading:RadialShading",
         },
     )

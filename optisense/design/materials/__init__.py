@@ -3,7 +3,9 @@
 `Material` stands for any material of a part, `CoatingModel` for any coating.
 """
 
-from optisense.design.materials.absorber import Absorber
+from optisense.design.materials._absorber import Absorber
+from optisense.design.materials._conductor import Conductor
+from optisense.design.materials._diffuse import Diffuse
 from optisense.design.materials.base import (
     CoatingModel,
     Material,
@@ -12,9 +14,7 @@ from optisense.design.materials.base import (
     kinds_for,
 )
 from optisense.design.materials.coating import Coating, flake_lobe, specularity_to_roughness
-from optisense.design.materials.conductor import Conductor
 from optisense.design.materials.dielectric import Dielectric
-from optisense.design.materials.diffuse import Diffuse
 
 __all__ = [
     "Absorber",

@@ -106,9 +106,9 @@ class Material(KindModel):
         DesignError,
         {
             "dielectric": "optisense.design.materials.dielectric:Dielectric",
-            "conductor": "optisense.design.materials.conductor:Conductor",
-            "diffuse": "optisense.design.materials.diffuse:Diffuse",
-            "absorber": "optisense.design.materials.absorber:Absorber",
+            "conductor": "optisense.design.materials._conductor:Conductor",
+            "diffuse": "optisense.design.materials._diffuse:Diffuse",
+            "absorber": "optisense.design.materials._absorber:Absorber",
         },
     )
     roles: ClassVar[tuple[Role, ...]] = (Role.MIRROR, Role.BLOCKER, Role.INDENTER)

@@ -24,6 +24,7 @@ from optisense.design.fields import Colour, PositiveRGB
 from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurred, reach_of
 from optisense.design.lenses.film import PictureWindow, film_places
 from optisense.design.lenses.shading import LensShading
+from optisense.design.responses._tone_curve import ToneCurve
 from optisense.design.responses.base import CameraResponse
 from optisense.design.responses.electronics import (
     BlackLevel,
@@ -34,7 +35,6 @@ from optisense.design.responses.electronics import (
     normal_numbers,
 )
 from optisense.design.responses.full_well import FullWellResponse
-from optisense.design.responses.tone_curve import ToneCurve
 
 FloatArray = NDArray[np.floating]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from optisense.design.fields import Positive
-from optisense.design.responses.tone_curve import ToneCurve
+from optisense.design.responses._tone_curve import ToneCurve
 
 FloatArray = NDArray[np.floating]
 

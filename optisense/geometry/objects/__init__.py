@@ -4,7 +4,7 @@ All are computed from formulas, so that no mesh files are needed. `optisense.tas
 designs with them, since no objective uses them; `object:coin@0,0:0.4` presses one.
 """
 
-from optisense.geometry.objects.catalogue import OBJECTS, ObjectIndenter
-from optisense.geometry.objects.relief import Relief
+from optisense.geometry.objects._catalogue import OBJECTS, ObjectIndenter
+from optisense.geometry.objects._relief import Relief
 
 __all__ = ["OBJECTS", "ObjectIndenter", "Relief"]

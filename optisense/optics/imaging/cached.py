@@ -17,14 +17,14 @@ from scipy import ndimage
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.contact_light import (
+from optisense.optics.imaging._contact_light import (
     MIRRORED_ROUGHNESS,
     beside_layers,
     mirrored_contact_layers,
 )
-from optisense.optics.imaging.film import REFERENCE_WIDTH, Film, repeated
+from optisense.optics.imaging._film import REFERENCE_WIDTH, Film, repeated
+from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.imaging.known_view import KnownView
-from optisense.optics.imaging.pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.shading import shade, shade_in_contacts

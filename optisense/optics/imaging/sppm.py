@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.density_estimation import build_grid, estimate_radiance
-from optisense.optics.imaging.film import Film
+from optisense.optics.imaging._density_estimation import build_grid, estimate_radiance
+from optisense.optics.imaging._film import Film
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
 from optisense.optics.transport.photons import Emission, trace_photons

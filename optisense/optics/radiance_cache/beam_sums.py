@@ -6,13 +6,13 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import GOLDEN_BITS, next_random, unit_float
+from optisense.optics.radiance_cache._irradiance import vector_sum
 from optisense.optics.radiance_cache.angular_variance import (
     angular_variance,
     broadened_coating,
     sample_direction,
 )
 from optisense.optics.radiance_cache.beams import Beams
-from optisense.optics.radiance_cache.irradiance import vector_sum
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.transport.photon_map import GROUP_MASK

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.radiance_cache._direction_bins import FINE_BINS, Tables
 from optisense.optics.radiance_cache.angular_variance import angular_variance, passes_near
-from optisense.optics.radiance_cache.direction_bins import FINE_BINS, Tables
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis
 
 STRONG_SHARE = 0.03

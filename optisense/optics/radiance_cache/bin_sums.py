@@ -6,6 +6,12 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import GOLDEN_BITS, next_random, richtmyer
+from optisense.optics.radiance_cache._irradiance import irradiance
+from optisense.optics.radiance_cache._raised_plane import (
+    RAISED_HEIGHT,
+    below_crossing,
+    sampled_plane,
+)
 from optisense.optics.radiance_cache.angular_variance import (
     AngularVariance,
     angular_variance,
@@ -18,12 +24,6 @@ from optisense.optics.radiance_cache.angular_variance import (
     two_discs,
 )
 from optisense.optics.radiance_cache.cache import BinnedLight
-from optisense.optics.radiance_cache.irradiance import irradiance
-from optisense.optics.radiance_cache.raised_plane import (
-    RAISED_HEIGHT,
-    below_crossing,
-    sampled_plane,
-)
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.scene.contact_scenes import ContactScenes

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import mitsuba as mi
 
+from optisense.optics.radiance_cache._direction_bins import Tables
 from optisense.optics.radiance_cache.beams import Beams
-from optisense.optics.radiance_cache.direction_bins import Tables
 from optisense.optics.scene.surface_cells import SurfaceCells
 
 

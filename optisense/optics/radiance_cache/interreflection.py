@@ -14,8 +14,8 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
+from optisense.optics.radiance_cache._irradiance import irradiance
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.irradiance import irradiance
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import albedo_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes

@@ -15,10 +15,10 @@ from scipy.spatial import cKDTree
 from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.backend.stages import Stage, StageCallback
+from optisense.optics.radiance_cache._direction_bins import COARSE_BINS, CURVED_BINS, DirectionBins
+from optisense.optics.radiance_cache._pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.direction_bins import COARSE_BINS, CURVED_BINS, DirectionBins
 from optisense.optics.radiance_cache.lit_scene import LitScene
-from optisense.optics.radiance_cache.pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.radiance_cache.tally import DENSE, CacheTally
 from optisense.optics.scene.emitters import Emitter

@@ -13,9 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.radiance_cache.beams import collect_beams
-from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
-from optisense.optics.radiance_cache.direction_bins import (
+from optisense.optics.radiance_cache._direction_bins import (
     COARSE_BINS,
     FINEST_BINS,
     DirectionBins,
@@ -25,10 +23,12 @@ from optisense.optics.radiance_cache.direction_bins import (
     dither,
     landing_bits,
 )
-from optisense.optics.radiance_cache.irradiance import irradiance_table
-from optisense.optics.radiance_cache.noise import noise_of_worst_places, relative_noise
-from optisense.optics.radiance_cache.power_rounding import PowerRounding
-from optisense.optics.radiance_cache.raised_plane import areas, crossings
+from optisense.optics.radiance_cache._irradiance import irradiance_table
+from optisense.optics.radiance_cache._noise import noise_of_worst_places, relative_noise
+from optisense.optics.radiance_cache._power_rounding import PowerRounding
+from optisense.optics.radiance_cache._raised_plane import areas, crossings
+from optisense.optics.radiance_cache.beams import collect_beams
+from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
 from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, smooth
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap

@@ -15,15 +15,15 @@ from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
+from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
+from optisense.optics.scene._solids import Interface, Sheet, Solid
 from optisense.optics.scene.emitters import (
     Emitter,
     EmitterShape,
     frame_of,
 )
-from optisense.optics.scene.finishes import ShapeCache, finishes_of, frosted
 from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece
-from optisense.optics.scene.solids import Interface, Sheet, Solid
 from optisense.optics.scene.surfaces import CLEAR, RGB, Region, Surface, SurfaceKind
 
 SMOOTH_METAL = 0.01

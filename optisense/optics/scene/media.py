@@ -29,7 +29,7 @@ from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
 from optisense.geometry.common_space import as_manifold, thick_place
 from optisense.geometry.mesh import TriangleMesh
-from optisense.optics.scene.solids import AROUND, Interface, Sheet, Solid
+from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 
 COINCIDENCE_TOLERANCE = 0.002
 """Distance (mm) below which faces touch, and thickness below which an overlap is a contact: a tenth

@@ -13,6 +13,7 @@ from optisense.design.materials import CoatingModel
 from optisense.geometry import Contact, TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMesh
 from optisense.optics.backend.arrays import floats
+from optisense.optics.scene._fine_scene import FineScene, fine_scene
 from optisense.optics.scene.assembly import Assembly, coating_surface, indenter_piece
 from optisense.optics.scene.bsdf import surface_table
 from optisense.optics.scene.contact_scenes import (
@@ -22,7 +23,6 @@ from optisense.optics.scene.contact_scenes import (
     bounding_ball,
 )
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
-from optisense.optics.scene.fine_scene import FineScene, fine_scene
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 

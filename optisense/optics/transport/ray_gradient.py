@@ -26,8 +26,8 @@ from optisense.optics.camera.projection import Pose, RayCamera
 from optisense.optics.scene.bsdf import refract
 from optisense.optics.scene.ray_scene import Piece, RayScene, leave
 from optisense.optics.scene.surfaces import Region
+from optisense.optics.transport._ray_edges import Discontinuity, PathVertex, find_edges, walk
 from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays, trace_path_codes
-from optisense.optics.transport.ray_edges import Discontinuity, PathVertex, find_edges, walk
 
 FloatArray = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ class ModelCache(PickledWithoutCaches):
 
         Args:
             variant: variant of the renderer.
-            coarse: whether images are coarse (see `optisense.optics.coarse`).
+            coarse: whether images are coarse (see `optisense.optics._coarse`).
         """
         self.variant = variant
         self.coarse = coarse

@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.executors._wire import receive, send
 from optisense.search.executors.base import Runner, pickled
-from optisense.search.executors.wire import receive, send
 from optisense.usual_times import processors
 
 MOST_DEATHS = 2
@@ -192,7 +192,7 @@ class ProcessPool(Runner):
             if self._closed or self._error is not None:
                 return None
             process = subprocess.Popen(
-                [sys.executable, "-m", "optisense.search.executors.worker"],
+                [sys.executable, "-m", "optisense.search.executors._worker"],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=stderr,

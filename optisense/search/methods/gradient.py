@@ -12,10 +12,10 @@ depends on the parameters and the objective (`GradientSource`):
   at both sides are trials of their own, which workers score at the same time.
 
 The stored scores are the true ones. Conditions are met by an augmented Lagrangian
-(`optisense.search.methods.augmented_lagrangian`).
+(`optisense.search.methods._augmented_lagrangian`).
 
 A point that constraints on shapes forbid is replaced by the nearest feasible one
-(`optisense.search.methods.feasible`), so that the ascent slides along the constraint and no trial
+(`optisense.search.methods._feasible`), so that the ascent slides along the constraint and no trial
 is spent. An ascent that treated the forbidden point as a bad one stopped at the first wall.
 
 At the start the ray derivative is compared with central differences of the true score
@@ -38,11 +38,20 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.relit import RelitEvaluator
 from optisense.search.evaluation.requirements import Requirement
 from optisense.search.evaluation.views import SameMirrors, may_change_view
-from optisense.search.methods.augmented_lagrangian import (
+from optisense.search.methods._augmented_lagrangian import (
     CONDITION_TOLERANCE,
     ROUNDS,
     AugmentedLagrangian,
 )
+from optisense.search.methods._feasible import FeasiblePoint, FeasibleRegion
+from optisense.search.methods._gradient_sources import (
+    GradientSource,
+    LocalValues,
+    PointsWantedError,
+    TrialDifferences,
+    source_of,
+)
+from optisense.search.methods._jacobian import moving_parts
 from optisense.search.methods.base import FloatArray, Method, Problem
 from optisense.search.methods.checked_gradients import (
     DIFFERENCES,
@@ -55,15 +64,6 @@ from optisense.search.methods.checked_gradients import (
     TOLERANCE,
     GradientEvaluator,
 )
-from optisense.search.methods.feasible import FeasiblePoint, FeasibleRegion
-from optisense.search.methods.gradient_sources import (
-    GradientSource,
-    LocalValues,
-    PointsWantedError,
-    TrialDifferences,
-    source_of,
-)
-from optisense.search.methods.jacobian import moving_parts
 from optisense.search.methods.score_differences import STEP
 from optisense.search.space.search_space import BoundSpace
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign, set_value
 from optisense.errors import DesignError, SearchError
-from optisense.search.space.expansion import expand
+from optisense.search.space._expansion import expand
 from optisense.search.space.parameters import Around, CagePoints, Continuous, Integer, Parameter
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 

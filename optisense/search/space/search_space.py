@@ -12,10 +12,10 @@ from pydantic import ValidationError
 from optisense.design import SensorDesign, get_value, set_values
 from optisense.design.problems import design_error
 from optisense.errors import OptiSenseError, SearchError
+from optisense.search.space._edit import Edit
+from optisense.search.space._expansion import expand
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.design_variables import LightType, with_light_types
-from optisense.search.space.edit import Edit
-from optisense.search.space.expansion import expand
 from optisense.search.space.parameters import (
     Choice,
     Continuous,
@@ -40,7 +40,7 @@ class SearchSpace:
 
     A value is (low, high), (low, high, steps), `Integer`, `Choice` or a list of options, `Around`
     (a distance from the present value), or `CagePoints`. A path to a vector or to a cage's points
-    stands for all their numbers. See `optisense.search.space.variable_paths` for paths that move
+    stands for all their numbers. See `optisense.search.space._variable_paths` for paths that move
     whole groups and parts.
     """
 

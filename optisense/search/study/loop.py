@@ -18,12 +18,13 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
 from optisense.search.executors.base import outcome_of
 from optisense.search.methods import Method, Problem, make
+from optisense.search.study._evaluators import evaluators, usual_times
+from optisense.search.study._promotion import promote
+from optisense.search.study._reading_watch import ReadingWatch
+from optisense.search.study._tally import Tally
 from optisense.search.study.best import tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
-from optisense.search.study.evaluators import evaluators, usual_times
 from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
-from optisense.search.study.promotion import promote
-from optisense.search.study.reading_watch import ReadingWatch
 from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
 from optisense.search.study.rescoring import rescore
 from optisense.search.study.settings import package_versions
@@ -37,7 +38,6 @@ from optisense.search.study.stages import (
 )
 from optisense.search.study.store import START, Row
 from optisense.search.study.study import Study
-from optisense.search.study.tally import Tally
 from optisense.search.study.trial import Trial
 from optisense.time_left import TimeLeft
 

@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from optisense.errors import OutputError, SearchError
 from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.study.reader import Reader
-from optisense.search.study.store_errors import damaged, translated_errors
+from optisense.search.study._reader import Reader
+from optisense.search.study._store_errors import damaged, translated_errors
 from optisense.untrusted_files import MOST_STORE, check_size
 
 FloatArray = NDArray[np.float64]

@@ -4,10 +4,10 @@
 writes one, and `design_from_meshes` turns one into a design.
 """
 
+from optisense.sensors.from_meshes._saving import RECIPE_FILE, save_recipe
 from optisense.sensors.from_meshes.building import FromMeshes, design_from_meshes
 from optisense.sensors.from_meshes.guessing import guess_recipe
 from optisense.sensors.from_meshes.recipe import Recipe, read_recipe
-from optisense.sensors.from_meshes.saving import RECIPE_FILE, save_recipe
 
 __all__ = [
     "RECIPE_FILE",

@@ -28,17 +28,17 @@ from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
-from optisense.sensors.from_meshes.files import refuse_odd_units
-from optisense.sensors.from_meshes.moving import laid_on, resting_order
-from optisense.sensors.from_meshes.posing import check_places, place_camera, place_lights
-from optisense.sensors.from_meshes.recipe import Recipe, read_recipe
-from optisense.sensors.from_meshes.recipe_state import RecipeState
-from optisense.sensors.from_meshes.surfaces import chosen
-from optisense.sensors.from_meshes.touching import (
+from optisense.sensors.from_meshes._moving import laid_on, resting_order
+from optisense.sensors.from_meshes._posing import check_places, place_camera, place_lights
+from optisense.sensors.from_meshes._recipe_state import RecipeState
+from optisense.sensors.from_meshes._touching import (
     lay_on_elastomer,
     look_inward,
     settle_contacts,
 )
+from optisense.sensors.from_meshes.files import refuse_odd_units
+from optisense.sensors.from_meshes.recipe import Recipe, read_recipe
+from optisense.sensors.from_meshes.surfaces import chosen
 
 USUAL_MATERIAL = {
     Role.ELASTOMER: "silicone-xp565",

@@ -14,11 +14,11 @@ from optisense import sensors
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe, read_recipe, save_recipe
-from optisense.sensors.from_meshes.moving import laid_on, posed, rotation
-from optisense.sensors.from_meshes.pick_and_place import BoardPart, read_pick_and_place
+from optisense.sensors.from_meshes._moving import laid_on, posed, rotation
+from optisense.sensors.from_meshes._pick_and_place import BoardPart, read_pick_and_place
+from optisense.sensors.from_meshes._strips import along, from_table
 from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
 from optisense.sensors.from_meshes.recipe_parts import PartChoice
-from optisense.sensors.from_meshes.strips import along, from_table
 from tests.sensors.from_meshes.conftest import Cad
 
 BOX = TriangleMesh.box((0.0, 0.0, 0.0), (2.0, 4.0, 6.0))

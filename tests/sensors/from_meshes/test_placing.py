@@ -11,8 +11,8 @@ import trimesh
 from optisense.design import Camera
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.sensors.from_meshes.camera import make_camera
-from optisense.sensors.from_meshes.lights import over, ring, row
+from optisense.sensors.from_meshes._camera import make_camera
+from optisense.sensors.from_meshes._lights import over, ring, row
 from optisense.sensors.from_meshes.recipe import CameraChoice
 from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
 from optisense.sensors.from_meshes.surfaces import pick

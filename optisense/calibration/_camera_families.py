@@ -1,0 +1,198 @@
+"""Families of numbers of the camera that a calibration may fit, with their plausible ranges."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from optisense.calibration import _camera_changes
+from optisense.calibration.quantity import FitQuantity
+from optisense.design import SensorDesign
+from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design.responses.gamma_curve import GammaCurve
+
+MIX_RANGE = 0.5
+"""Plausible range of an entry of the colour matrix off its diagonal; those of published camera
+tunings reach 1.
+"""
+
+GAMMA_START, GAMMA_RANGE = 1.8, 0.4
+"""Initial exponent of the tone curve, and the plausible range of its logarithm: cameras of sensors
+lie between linear (1) and sRGB (about 2.2).
+"""
+
+DARK_RANGE = 0.05
+"""Plausible range of the level of a channel in the dark, as a share of full: black levels of
+published camera tunings are 0.06 and less.
+"""
+
+FALLOFF_START, FALLOFF_RANGE = 0.2, 0.3
+"""Share of the light that the lens loses in the picture's corners: initial value and plausible
+range.
+"""
+
+SHADING_POWER, SHADING_RANGE = 2.0, 0.4
+"""Power of the distance with which the loss grows, initial value, and the plausible range of its
+logarithm: lenses alone lose with the square or faster, and light guides add to it.
+"""
+
+FIELD_RANGE = 0.08
+"""Plausible range of the logarithm of the field of view: views of one type of sensor differ by a
+tenth.
+"""
+
+PLACE_RANGE = 0.8
+"""Plausible range of the camera's position across its axis, mm; it is glued in by hand."""
+
+TURN_RANGE = 1.5
+"""Plausible range of a turn of the camera about each of its axes, degrees; it is glued in by
+hand.
+"""
+
+AHEAD_RANGE = 0.5
+"""Plausible range of the camera's position along its axis, mm: lenses are focused by moving
+them.
+"""
+
+DISTORTION_RANGE = 0.1
+"""Plausible range of the coefficient of radial distortion; that of wide lenses is -0.3 to 0.1."""
+
+_LETTERS = "RGB"
+
+
+def lit_channels(design: SensorDesign) -> list[int]:
+    """Return the channels 0 to 2 (R, G, B) in which a light of the design emits."""
+    return [
+        channel
+        for channel in range(3)
+        if any(group.channel_flux()[channel] > 0.0 for group in design.lights.values())
+    ]
+
+
+def colours(design: SensorDesign) -> list[FitQuantity]:
+    """Return the entries of the colour matrix off its diagonal, without the shares of channels in
+    which no light emits: pictures do not show them.
+    """
+    lit = lit_channels(design)
+    matrix = np.eye(3) if design.camera.colour_matrix is None else design.camera.colour_matrix
+    return [
+        FitQuantity(
+            f"camera.colour_matrix[{row}][{column}]",
+            f"share of {_LETTERS[column]} in the picture's {_LETTERS[row]}",
+            "", float(matrix[row][column]), -4.0, 4.0, MIX_RANGE, home="camera.colour_matrix",
+        )
+        for row in range(3)
+        for column in lit
+        if row != column
+    ]  # fmt: skip
+
+
+def tone(design: SensorDesign) -> list[FitQuantity]:
+    """Return the exponent of the tone curve."""
+    curve = design.camera.tone_curve
+    start = curve.gamma if isinstance(curve, GammaCurve) else GAMMA_START
+    return [
+        FitQuantity(
+            "camera.tone_curve.gamma", "exponent of the tone curve", "", start, 0.5, 5.0,
+            GAMMA_RANGE, True, home="camera.tone_curve",
+        )
+    ]  # fmt: skip
+
+
+def black(design: SensorDesign) -> list[FitQuantity]:
+    """Return the level of each channel in the dark."""
+    start = design.camera.stray_light or (0.0, 0.0, 0.0)
+    return [
+        FitQuantity(
+            f"camera.stray_light[{channel}]", f"level of {letter} in the dark", "",
+            start[channel], 0.0, 0.5, DARK_RANGE, home="camera.stray_light",
+        )
+        for channel, letter in enumerate(_LETTERS)
+    ]  # fmt: skip
+
+
+def shading(design: SensorDesign) -> list[FitQuantity]:
+    """Return strength of the lens shading in each channel in which a light emits, and its power."""
+    own, lit = design.camera.shading, lit_channels(design)
+    green, red, blue, power = FALLOFF_START, FALLOFF_START, FALLOFF_START, SHADING_POWER
+    if isinstance(own, RadialShading):
+        green, power = own.falloff, own.power
+        red = green if own.red_falloff is None else own.red_falloff
+        blue = green if own.blue_falloff is None else own.blue_falloff
+    found = [
+        FitQuantity(
+            f"camera.shading.{name}", f"dimming of {letter} in the picture's corners", "", start,
+            0.0, 0.95, FALLOFF_RANGE, home="camera.shading",
+        )
+        for channel, name, letter, start in (
+            (1, "falloff", "G", green), (0, "red_falloff", "R", red), (2, "blue_falloff", "B", blue)
+        )
+        if channel in lit
+    ]  # fmt: skip
+    outwards = FitQuantity(
+        "camera.shading.power", "exponent of the dimming by the distance from the middle", "",
+        power, 1.0, 8.0, SHADING_RANGE, True, home="camera.shading",
+    )  # fmt: skip
+    return [*found, outwards]
+
+
+def view(design: SensorDesign) -> list[FitQuantity]:
+    """Return the field of view."""
+    fov = design.camera.fov
+    most = 175.0 if design.camera.projection == "perspective" else 360.0
+    return [
+        FitQuantity(
+            "camera.fov", "field of view", "degrees", fov, 0.3 * fov, min(most, 3.0 * fov),
+            FIELD_RANGE, True, True, views=True,
+        )
+    ]  # fmt: skip
+
+
+def place(design: SensorDesign) -> list[FitQuantity]:
+    """Return the camera's place across its axis."""
+    return [
+        FitQuantity(
+            f"camera.across.{axis}", f"place of the camera {words}", "mm", 0.0, -10.0, 10.0,
+            PLACE_RANGE, renders=True, views=True,
+            change=partial(_camera_changes.with_camera_moved, number), home="camera.position",
+        )
+        for number, (axis, words) in enumerate(
+            (("right", "to the picture's right"), ("up", "to its top"))
+        )
+    ]  # fmt: skip
+
+
+def pose(design: SensorDesign) -> list[FitQuantity]:
+    """Return the turns of the camera about its axes, and its place along its axis."""
+    found = [
+        FitQuantity(
+            f"camera.turn.{name}", f"turn of the camera {words}", "degrees", 0.0, -20.0, 20.0,
+            TURN_RANGE, renders=True, views=True,
+            change=partial(_camera_changes.with_camera_turned, number), home="camera.direction",
+        )
+        for number, (name, words) in enumerate(
+            (("pitch", "up"), ("yaw", "to the left"), ("roll", "clockwise"))
+        )
+    ]  # fmt: skip
+    ahead = FitQuantity(
+        "camera.along", "place of the camera towards the skin", "mm", 0.0, -5.0, 5.0, AHEAD_RANGE,
+        renders=True, views=True, change=partial(_camera_changes.with_camera_moved, 2),
+        home="camera.position",
+    )  # fmt: skip
+    return [*found, ahead]
+
+
+def distortion(design: SensorDesign) -> list[FitQuantity]:
+    """Return the first coefficient of the lens's radial distortion."""
+    own = design.camera.distortion
+    start = 0.0 if own is None else getattr(own, "k1", None)
+    if start is None:
+        return []
+    return [
+        FitQuantity(
+            "camera.distortion.k1", "radial distortion of the lens (k1)", "", start,
+            min(start, -0.5), max(start, 0.5), DISTORTION_RANGE, renders=True, views=True,
+            change=_camera_changes.with_distortion, home="camera.distortion",
+        )
+    ]  # fmt: skip

@@ -1,0 +1,277 @@
+"""Rounds of rendering and fitting by which a design is fitted to photographs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.calibration._contact_placing import (
+    FIT_WIDTH,
+    moved_contact,
+    placed,
+    scaled_contact,
+)
+from optisense.calibration._covered_view import CoveredView
+from optisense.calibration._gauss_newton import LayeredFit, RoughFit
+from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
+from optisense.calibration._solution import Solution
+from optisense.calibration._view_slopes import view_changes, with_view
+from optisense.calibration.kept_renderings import KeptRenderings
+from optisense.calibration.model_pictures import matched_exposure
+from optisense.calibration.photographs import Photographs
+from optisense.calibration.quantities import designed
+from optisense.calibration.quantity import FitQuantity
+from optisense.calibration.seen_contacts import SeenContact
+from optisense.calibration.settings import CalibrationSettings
+from optisense.design import SensorDesign
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+FloatArray = NDArray[np.float64]
+
+DIFFERENCE = 0.35
+"""Step of the difference quotients of numbers that need a rendering, in plausible ranges; it is
+large because renderings have noise.
+"""
+
+VIEW_DIFFERENCE = 0.25
+"""Step of the difference quotients of numbers of the view, in plausible ranges. Chief rays have no
+noise, but the coverage of a pixel changes in steps of a sixteenth.
+"""
+
+VIEW_SOLVES, VIEW_MOVED = 3, 0.03
+"""Largest number of fits to the layers of one rendering, and the change of the view, in plausible
+ranges, at which they end. Pictures with sharp borders change linearly for shifts of a pixel only,
+and a fit to linear changes finds about half of a larger shift.
+"""
+
+BLURS = 6.0, 3.0, 0.0
+"""Standard deviations, pixels, by which pictures are blurred in the successive fits of a rough
+round. Details fit over displacements of about their size only, and the start is off by up to a
+tenth of the width.
+"""
+
+ROUGH_SHARE, ROUGH_PIXELS = 0.5, 36.0
+"""Share of the rounds, the first one at least, that count one independent error for so many pixels
+of each picture. The errors of the start extend over the whole picture: weights estimated from them
+would neglect the background, and its errors would remain.
+"""
+
+OUTLYING = 1.7
+"""Ratio of a press's error to the median from which on it is named as an outlier."""
+
+Progress = Callable[[str, int, int], None]
+"""Function that is called with the current step, the number of finished pieces, and that of all."""
+
+
+class FitRounds:
+    """Rounds of a fit."""
+
+    def __init__(
+        self,
+        design: SensorDesign,
+        model: OpticalModel,
+        photographs: Photographs,
+        seen: list[SeenContact],
+        chosen: list[FitQuantity],
+        settings: CalibrationSettings,
+        kept: KeptRenderings,
+        progress: Progress,
+    ) -> None:
+        self._design, self._model, self._settings = design, model, settings
+        self._chosen, self._kept, self._progress = chosen, kept, progress
+        self._small = photographs.scaled(FIT_WIDTH)
+        factor = self._small.size[0] / photographs.size[0]
+        self._factor = factor
+        self._seen = [scaled_contact(place, factor) for place in seen]
+        count = len(photographs.presses)
+        self.held_out = settings.indices_held_out(photographs)
+        self._used = [index for index in range(count) if index not in self.held_out]
+        self._rendering = [number for number, each in enumerate(chosen) if each.renders]
+        self.exposure = 1.0
+        self._done = 0
+        self._count = 2 * settings.rounds + 3
+        self._count += sum(not chosen[number].views for number in self._rendering)
+
+    def report_step(self, what: str) -> None:
+        """Report the progress by one piece."""
+        self._progress(what, self._done, self._count)
+        self._done += 1
+
+    def run(self) -> Solution:
+        """Run all rounds; the contacts of the fitted photographs move along.
+
+        Difference quotients of two renderings are taken in the first round only; later rounds start
+        from new renderings, and their corrections are small. Those of the camera's view cost no
+        rendering, and each round has its own.
+        """
+        steps = np.zeros(len(self._chosen))
+        small = self._small.subset(self._used)
+        solution: Solution | None = None
+        slopes: dict[int, list[NDArray[np.float32]]] = {}
+        for number in range(self._settings.rounds):
+            seen = [self._seen[index] for index in self._used]
+            self.report_step("rendering")
+            layers = self._layers(small, seen, steps, number)
+            if number == 0:
+                total = layers.background.sum(axis=0)
+                self.exposure = matched_exposure(total, layers.chain, small.background)
+                slopes = self._slopes(small, seen, steps, layers)
+            self.report_step("fitting")
+            rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
+            found = self._solution(small, seen, layers, steps, slopes, rough)
+            if number:
+                found = found.with_changes(found.steps - steps)
+            solution, steps = found, found.steps
+            for index, moved in zip(self._used, solution.contacts, strict=True):
+                self._seen[index] = moved_contact(self._seen[index], moved)
+        assert solution is not None
+        return solution
+
+    def _solution(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        layers: LayeredPictures,
+        steps: FloatArray,
+        slopes: dict[int, list[NDArray[np.float32]]],
+        rough: bool,
+    ) -> Solution:
+        """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
+        displaced to it and fitted again.
+        """
+        views = [number for number in self._rendering if self._chosen[number].views]
+        contacts = np.zeros((len(seen), 3))
+        if not views:
+            fit = LayeredFit(
+                small, seen, layers, self._chosen, self.exposure, steps, slopes,
+                RoughFit(ROUGH_PIXELS) if rough else None,
+            )  # fmt: skip
+            return fit.solve(steps, contacts)
+        rendered = self._view(small, steps)
+        start, shown, view = steps.copy(), layers, rendered
+        for blur in BLURS if rough else (0.0,) * VIEW_SOLVES:
+            every = slopes | self._view_slopes(small, seen, start, shown, view)
+            fit = LayeredFit(
+                small, seen, shown, self._chosen, self.exposure, start, every,
+                RoughFit(ROUGH_PIXELS, blur) if rough else None,
+            )  # fmt: skip
+            found = fit.solve(steps, contacts)
+            steps, contacts = found.steps, found.contacts
+            moved = float(np.abs(steps[views] - start[views]).max())
+            if moved < VIEW_MOVED and not blur:
+                break
+            start = start.copy()
+            start[views] = steps[views]
+            view = self._view(small, start)
+            shown = with_view(layers, seen, rendered, view)
+        return found
+
+    def places(self, fitted: SensorDesign, exposure: float) -> list[SeenContact]:
+        """Return the contact in each photograph by the fitted model, at the full size.
+
+        Those that were held out are located here, with nothing else fitted.
+        """
+        if self.held_out:
+            self.report_step("placing what was held out")
+            small = self._small.subset(self.held_out)
+            self._model.set_design(fitted)
+            found = placed(
+                self._model, small, [self._seen[index] for index in self.held_out],
+                photons=self._settings.photons, seed=self._settings.seed, exposure=exposure,
+                kept=self._kept,
+            )  # fmt: skip
+            for index, place in zip(self.held_out, found, strict=True):
+                self._seen[index] = place
+        return [scaled_contact(place, 1.0 / self._factor) for place in self._seen]
+
+    def doubts(self, solution: Solution) -> list[str]:
+        """Return notes on presses that the fit explains far worse than the others."""
+        names = [self._small.presses[index].name for index in self._used]
+        usual = float(np.median(solution.outlying))
+        return [
+            f"{name}: the fit explains it worse than the others, with an error of {error:.1f} "
+            f"levels instead of {usual:.1f}; check its ball and whether it slipped"
+            for name, error in zip(names, solution.outlying, strict=True)
+            if error > OUTLYING * usual
+        ]
+
+    def _layers(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        steps: FloatArray,
+        number: int,
+        contacts: LayeredPictures | None = None,
+    ) -> LayeredPictures:
+        """Return layers of a round, with light of its own noise, at the current values of numbers
+        that need a rendering; all others are those of the design.
+        """
+        moved = [self._chosen[number] for number in self._rendering]
+        self._model.set_design(designed(self._design, moved, steps[self._rendering]))
+        return layered_pictures(
+            self._model, small, seen, self._settings.photons_of(number),
+            self._settings.seed + number,
+            None if contacts is None else contacts.contacts, self._kept,
+        )  # fmt: skip
+
+    def _view_slopes(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        steps: FloatArray,
+        layers: LayeredPictures,
+        view: CoveredView,
+    ) -> dict[int, list[NDArray[np.float32]]]:
+        """Return the slopes of the numbers of the view, by index, at layers with this view."""
+        found: dict[int, list[NDArray[np.float32]]] = {}
+        for number in self._rendering:
+            if self._chosen[number].views:
+                other = self._other(number, steps, VIEW_DIFFERENCE)
+                size = np.float32(other[number] - steps[number])
+                changes = view_changes(layers, seen, view, self._view(small, other))
+                found[number] = [change / size for change in changes]
+        return found
+
+    def _view(self, small: Photographs, steps: FloatArray) -> CoveredView:
+        moved = [self._chosen[number] for number in self._rendering]
+        self._model.set_design(designed(self._design, moved, steps[self._rendering]))
+        return CoveredView.of(self._model, small.size)
+
+    def _other(self, number: int, steps: FloatArray, by: float) -> FloatArray:
+        """Return steps with one of them changed, downwards if the number is at its upper limit."""
+        each = self._chosen[number]
+        other = steps.copy()
+        other[number] += by
+        if each.value(float(other[number])) == each.value(float(steps[number])):
+            other[number] -= 2.0 * by
+        return other
+
+    def _slopes(
+        self,
+        small: Photographs,
+        seen: Sequence[SeenContact],
+        steps: FloatArray,
+        layers: LayeredPictures,
+    ) -> dict[int, list[NDArray[np.float32]]]:
+        found: dict[int, list[NDArray[np.float32]]] = {}
+        for number in self._rendering:
+            each = self._chosen[number]
+            if each.views:
+                continue
+            self.report_step(f"rendering another {each.words}")
+            other = self._other(number, steps, DIFFERENCE)
+            size = float(other[number] - steps[number])
+            same = None if each.moves_contacts else layers
+            moved = self._layers(small, seen, other, 0, same)
+            pairs = zip(
+                [moved.background, *moved.presses], [layers.background, *layers.presses],
+                strict=True,
+            )  # fmt: skip
+            found[number] = [((one - two) / size).astype(np.float32) for one, two in pairs]
+        return found

@@ -1,0 +1,383 @@
+"""Fit of a layered model to photographs by damped Gauss-Newton steps.
+
+The residuals are those of the background, divided by its usual error, and of each press's response
+near its contact, divided by the usual error of all responses. Each set counts as many times as it
+contains independent errors. Both are estimated anew before each descent. So the background, whose
+errors are larger and smoother, does not outweigh the contacts. Priors of the plausible ranges are
+added. Huber's weights limit the influence of dust and scratches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from optisense.calibration._correlated_errors import ErrorScale, error_scale
+from optisense.calibration._layered_pictures import LayeredPictures, contact_slopes
+from optisense.calibration._solution import Solution
+from optisense.calibration.model_pictures import levels_of
+from optisense.calibration.photographs import Photographs
+from optisense.calibration.quantities import chain_with, power_factors
+from optisense.calibration.quantity import FitQuantity
+from optisense.calibration.realism import distances
+from optisense.calibration.seen_contacts import SeenContact
+
+FloatArray = NDArray[np.float64]
+
+NEAR = 2.2
+"""Radius within which the response of a press counts, in radii of its contact; beyond, there is
+noise.
+"""
+
+HUBER = 2.0
+"""Residual, in units of the usual error, beyond which it counts linearly instead of quadratically
+(Huber 1964): 5 % of normally distributed residuals are larger.
+"""
+
+LEVELS = 2.0, 253.0
+"""Smallest and largest level that is compared; beyond, pictures are clipped and noise is cut off,
+so that they do not show how dark or bright it is.
+"""
+
+STEP = 0.02
+"""Step of a number's difference quotient, in plausible ranges: small enough for pictures to change
+linearly, and, as they are not rounded, far above the rounding of their levels."""
+
+CONTACT_SPREAD = (2.0, 2.0, 0.1)
+"""Plausible ranges of a contact's column and row, in pixels at a width of 320, and of the logarithm
+of its radius: the errors of hand labels.
+"""
+
+TILE = 2.0
+"""Side of tiles, relative to the side of the square that contains one independent error, whose
+errors are regarded as independent of each other in the estimate of uncertainties. Errors at one
+place of all pictures are not: those of the light are the same in all, and those of the background
+are in each response.
+"""
+
+MOST_STEPS = 20
+"""Largest number of damped steps of one descent; several times as many as a fit needs."""
+
+MOST_DESCENTS = 4
+"""Largest number of descents, each with the scales of the residuals that the one before leaves."""
+
+SMALL_GAIN = 0.02
+"""Decrease of the sum of squares below which a descent ends. A number that is off by its
+uncertainty adds 1.
+"""
+
+LARGEST_STEP = 1.0
+"""Largest change of a number in one step, in plausible ranges; the model is nearly linear there."""
+
+TRUST = 2.5
+"""Largest change over which layers are extrapolated by their difference quotients, in plausible
+ranges; the next round renders them anew.
+"""
+
+Scales = tuple[ErrorScale, ErrorScale]
+"""Errors of the background and of the responses."""
+
+
+@dataclass(frozen=True)
+class RoughFit:
+    """Comparison of pictures in a rough round.
+
+    Attributes:
+        pixels: number of pixels for which there is one independent error; otherwise it is estimated
+            from the errors.
+        blur: standard deviation, pixels, by which both pictures are blurred: details of blurred
+            pictures fit over larger displacements.
+    """
+
+    pixels: float
+    blur: float = 0.0
+
+
+class LayeredFit:
+    """Photographs, and the layers of a model with their slopes."""
+
+    def __init__(
+        self,
+        photographs: Photographs,
+        seen: Sequence[SeenContact],
+        layers: LayeredPictures,
+        chosen: Sequence[FitQuantity],
+        exposure: float,
+        start: FloatArray,
+        slopes: dict[int, list[NDArray[np.float32]]],
+        rough: RoughFit | None = None,
+    ) -> None:
+        """Prepare a round.
+
+        Args:
+            photographs: photographs to fit.
+            seen: contacts in the photographs.
+            layers: layers of the model at `start`.
+            chosen: quantities to fit.
+            exposure: factor on the radiance.
+            start: steps (n,) of the quantities at which the layers were rendered.
+            slopes: slopes of quantities that need a rendering, by index: changes of the layers of
+                the background and of each press per plausible range.
+            rough: how pictures are compared in a rough round; None in the others.
+        """
+        self._pixels = None if rough is None else rough.pixels
+        self._blur = 0.0 if rough is None else rough.blur
+        self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
+        self._start, self._slopes = start, slopes
+        limits = np.array([each.limits() for each in chosen]).reshape(-1, 2)
+        self._low, self._high = limits[:, 0], limits[:, 1]
+        self._real = self._compared(photographs.background)
+        self._responses = [
+            self._compared(press.picture) - self._real for press in photographs.presses
+        ]
+        shape = self._real.shape[:2]
+        self._masks = [distances(shape, place) <= NEAR for place in seen]
+        scale = shape[1] / 320.0
+        self._contact_spread = np.array(CONTACT_SPREAD) * (scale, scale, 1.0)
+        self._contact_slopes = [
+            contact_slopes(layers, index, place) for index, place in enumerate(seen)
+        ]
+
+    @property
+    def count(self) -> int:
+        """Number of quantities."""
+        return len(self._chosen)
+
+    def pictures(self, steps: FloatArray, contacts: FloatArray) -> list[FloatArray]:
+        """Return the levels (h, w, 3) of the background and of each press, within those that are
+        compared.
+
+        Args:
+            steps: (n,) steps of the quantities, in plausible ranges from their starts.
+            contacts: (presses, 3) changes of column and row, pixels, and of the logarithm of the
+                radius.
+        """
+        return [self._shown(-1, steps, None)] + [
+            self._shown(index, steps, contacts[index]) for index in range(len(self._masks))
+        ]
+
+    def _shown(self, index: int, steps: FloatArray, contact: FloatArray | None) -> FloatArray:
+        """Return the levels of a press, or of the background (index -1)."""
+        layers = self._layers.background if index < 0 else self._layers.presses[index]
+        moved = layers
+        for number, slopes in self._slopes.items():
+            off = float(np.clip(steps[number] - self._start[number], -TRUST, TRUST))
+            if off:
+                moved = moved + off * slopes[index + 1]
+        if contact is not None and index >= 0:
+            for amount, slope in zip(contact, self._contact_slopes[index], strict=True):
+                if amount:
+                    moved = moved + np.float32(amount) * slope
+        factors = power_factors(self._layers.groups, self._chosen, steps)
+        radiance = np.tensordot(factors.astype(np.float32), moved, axes=1)
+        chain = chain_with(self._layers.chain, self._chosen, steps)
+        levels = levels_of(np.maximum(radiance, 0.0), chain, self._exposure)
+        return self._compared(levels)
+
+    def _compared(self, levels: NDArray[Any]) -> FloatArray:
+        """Return the levels of a picture that are compared: within limits, and blurred."""
+        found = np.clip(levels.astype(np.float64), *LEVELS)
+        if self._blur:
+            found = gaussian_filter(found, (self._blur, self._blur, 0.0))
+        return np.asarray(found)
+
+    def solve(
+        self,
+        steps: FloatArray,
+        contacts: FloatArray,
+        progress: Callable[[], None] = lambda: None,
+    ) -> Solution:
+        """Run damped Gauss-Newton steps until the sum of squares stops falling.
+
+        Args:
+            steps, contacts: start of the descent, as in `pictures`.
+            progress: function that is called before each step.
+        """
+        for _ in range(MOST_DESCENTS):
+            steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
+            # The errors are smaller now, and so are the scales of the residuals.
+            if all(
+                now.like(used) for now, used in zip(self._scales(pictures), scales, strict=True)
+            ):
+                break
+        matrix, _, tiles = self._normal(pictures, steps, contacts, scales)
+        inverse = np.linalg.inv(matrix)
+        # The first term comes from noise and priors, the second from errors correlated within
+        # tiles.
+        spread = np.asarray(inverse + inverse @ tiles @ inverse, dtype=np.float64)
+        return Solution(
+            steps,
+            contacts,
+            spread[: self.count, : self.count],
+            self._errors(pictures),
+            self._press_errors(pictures),
+        )
+
+    def _descend(
+        self, steps: FloatArray, contacts: FloatArray, progress: Callable[[], None]
+    ) -> tuple[FloatArray, FloatArray, list[FloatArray], Scales]:
+        """Return steps, contacts, their pictures and the scales of the residuals at the least
+        cost.
+        """
+        pictures = self.pictures(steps, contacts)
+        scales = self._scales(pictures)
+        cost = self._cost(pictures, steps, contacts, scales)
+        damping = 1e-3
+        for _ in range(MOST_STEPS):
+            progress()
+            matrix, gradient, _ = self._normal(pictures, steps, contacts, scales)
+            fell = False
+            free = self._free(steps, gradient)
+            for _ in range(6):
+                damped = (matrix + damping * np.diag(np.diag(matrix)))[np.ix_(free, free)]
+                move = np.zeros(len(gradient))
+                move[free] = -np.linalg.solve(damped, gradient[free])
+                move *= min(1.0, LARGEST_STEP / max(float(np.abs(move).max()), 1e-12))
+                new_steps = np.clip(steps + move[: self.count], self._low, self._high)
+                new_contacts = contacts + move[self.count :].reshape(-1, 3) * self._contact_spread
+                shown = self.pictures(new_steps, new_contacts)
+                new_cost = self._cost(shown, new_steps, new_contacts, scales)
+                if new_cost < cost:
+                    fell = True
+                    damping = max(0.3 * damping, 1e-9)
+                    break
+                damping = 10.0 * max(damping, 1e-6)
+            if not fell:
+                break
+            gain = cost - new_cost
+            steps, contacts, pictures, cost = new_steps, new_contacts, shown, new_cost
+            if gain < SMALL_GAIN:
+                break
+        return steps, contacts, pictures, scales
+
+    def _free(self, steps: FloatArray, gradient: FloatArray) -> NDArray[np.bool_]:
+        """Return which unknowns may move: all but numbers at a limit that would leave it."""
+        slope = gradient[: self.count]
+        stuck = (steps <= self._low) & (slope > 0.0) | (steps >= self._high) & (slope < 0.0)
+        return np.concatenate([~stuck, np.ones(len(gradient) - self.count, dtype=bool)])
+
+    def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:
+        ground = float(np.sqrt(((pictures[0] - self._real) ** 2).mean()))
+        pressed = self._press_errors(pictures)
+        return ground, float(np.sqrt((pressed**2).mean()))
+
+    def _press_errors(self, pictures: list[FloatArray]) -> FloatArray:
+        return np.array(
+            [
+                np.sqrt(((shown - pictures[0] - real)[mask] ** 2).mean())
+                for shown, real, mask in zip(
+                    pictures[1:], self._responses, self._masks, strict=True
+                )
+            ]
+        )
+
+    def _scales(self, pictures: list[FloatArray]) -> Scales:
+        """Return the errors of the background and of responses, unaffected by dust."""
+        ground = pictures[0] - self._real
+        pressed = [
+            shown - pictures[0] - real
+            for shown, real in zip(pictures[1:], self._responses, strict=True)
+        ]
+        everywhere = np.ones(ground.shape[:2], dtype=bool)
+        return (
+            error_scale([ground], [everywhere], HUBER, self._pixels),
+            error_scale(pressed, self._masks, HUBER, self._pixels),
+        )
+
+    def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
+        """Return the residuals (k, 3) of the background (index -1), or of a press's pixels near its
+        contact.
+        """
+        if index < 0:
+            return ((pictures[0] - self._real) / scales[0].size).reshape(-1, 3)
+        error = pictures[index + 1] - pictures[0] - self._responses[index]
+        return np.asarray(error[self._masks[index]] / scales[1].size)
+
+    def _cost(
+        self,
+        pictures: list[FloatArray],
+        steps: FloatArray,
+        contacts: FloatArray,
+        scales: Scales,
+    ) -> float:
+        total = float((steps**2).sum() + ((contacts / self._contact_spread) ** 2).sum())
+        for index in range(-1, len(self._masks)):
+            size = np.abs(self._residuals(pictures, index, scales))
+            loss = np.where(size < HUBER, size**2, HUBER * (2.0 * size - HUBER))
+            total += float(loss.sum()) / scales[min(index + 1, 1)].pixels
+        return total
+
+    def _normal(
+        self,
+        pictures: list[FloatArray],
+        steps: FloatArray,
+        contacts: FloatArray,
+        scales: Scales,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return matrix and gradient of the normal equations, and the covariance of the tiles'
+        gradients.
+        """
+        n, count = self.count, len(self._masks)
+        size = n + 3 * count
+        matrix, gradient = np.zeros((size, size)), np.zeros(size)
+        tiles = self._tiles(scales)
+        sums = np.zeros((int(tiles.max()) + 1, size))
+        moved = [self._moved(steps, contacts, k) for k in range(n)]
+        for index in range(-1, count):
+            residual = self._residuals(pictures, index, scales)
+            columns = list(range(n))
+            if not columns and index < 0:
+                continue
+            slopes = [(self._residuals(m, index, scales) - residual) / by for by, m in moved]
+            if index >= 0:
+                columns += range(n + 3 * index, n + 3 * index + 3)
+                slopes += [
+                    (self._residuals(m, index, scales) - residual) / STEP
+                    for m in self._contact_moved(pictures, steps, contacts, index)
+                ]
+            jacobian = np.stack(slopes, axis=-1)  # (k, 3, columns)
+            weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
+            weight /= scales[min(index + 1, 1)].pixels
+            flat = jacobian.reshape(-1, len(columns))
+            weighted = flat * weight.reshape(-1, 1)
+            place = np.ix_(columns, columns)
+            matrix[place] += weighted.T @ flat
+            scores = (jacobian * (weight * residual)[..., None]).sum(axis=1)
+            gradient[columns] += scores.sum(axis=0)
+            where = tiles.ravel() if index < 0 else tiles[self._masks[index]]
+            np.add.at(sums, (where[:, None], np.array(columns)[None, :]), scores)
+        prior = np.concatenate([steps, (contacts / self._contact_spread).ravel()])
+        return matrix + np.eye(size), gradient + prior, sums.T @ sums
+
+    def _tiles(self, scales: Scales) -> NDArray[np.int64]:
+        """Return the number of the tile of each pixel, (h, w)."""
+        height, width = self._real.shape[:2]
+        side = round(TILE * np.sqrt(max(scale.pixels for scale in scales)))
+        rows, columns = np.mgrid[:height, :width] // side
+        return np.asarray(rows * (width // side + 1) + columns, dtype=np.int64)
+
+    def _moved(
+        self, steps: FloatArray, contacts: FloatArray, number: int
+    ) -> tuple[float, list[FloatArray]]:
+        """Return a small step of a number, away from its upper limit, and the pictures after it."""
+        by = -STEP if steps[number] + STEP > self._high[number] else STEP
+        other = steps.copy()
+        other[number] += by
+        return by, self.pictures(other, contacts)
+
+    def _contact_moved(
+        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray, index: int
+    ) -> list[list[FloatArray]]:
+        found = []
+        for axis in range(3):
+            other = contacts[index].copy()
+            other[axis] += STEP * self._contact_spread[axis]
+            changed = list(pictures)
+            changed[index + 1] = self._shown(index, steps, other)
+            found.append(changed)
+        return found

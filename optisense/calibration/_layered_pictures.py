@@ -1,0 +1,124 @@
+"""Pictures of photographed presses as layers, and their derivatives by the fitted numbers.
+
+Light adds up: a layer for each light group is rendered once, and mixed for any powers. For small
+changes of numbers that need a new rendering, the layers change linearly: by difference quotients
+for numbers of the design, and in closed form for the position and radius of a contact. If a contact
+of one ball is slightly wider, its response is the same, stretched and stronger in proportion: the
+slope of a ball's surface grows with the distance from its middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.calibration._covered_view import CoveredView, with_smooth_outline
+from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
+from optisense.calibration.photographs import Photographs
+from optisense.calibration.seen_contacts import SeenContact, contact_of
+from optisense.mechanics import ELASTIC
+
+if TYPE_CHECKING:
+    from optisense.design.responses import PictureChain
+    from optisense.geometry import Contact
+    from optisense.optics import OpticalModel
+
+FloatArray = NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class LayeredPictures:
+    """Layers of the background and of each press.
+
+    Attributes:
+        groups: names of the light groups.
+        background: radiance (groups, h, w, 3).
+        presses: radiance of each press, (groups, h, w, 3).
+        chain: picture chain of the model's camera, without noise.
+        contacts: contacts that were pressed in.
+    """
+
+    groups: tuple[str, ...]
+    background: FloatArray = field(repr=False)
+    presses: tuple[FloatArray, ...] = field(repr=False)
+    chain: PictureChain
+    contacts: tuple[Contact, ...]
+
+
+def layered_pictures(
+    model: OpticalModel,
+    photographs: Photographs,
+    seen: Sequence[SeenContact],
+    photons: int,
+    seed: int,
+    contacts: Sequence[Contact] | None = None,
+    kept: KeptRenderings = KEPT_NOWHERE,
+    progress: Callable[[int], None] = lambda done: None,
+) -> LayeredPictures:
+    """Render the background and the presses of photographs as layers.
+
+    Args:
+        model: model of the sensor.
+        photographs: photographs whose size and presses are used.
+        seen: contact in each photograph.
+        photons: number of photons of the light that all pictures share.
+        seed: seed of the light.
+        contacts: contacts to press in, if they are known already.
+        kept: store of renderings.
+        progress: function that is called with the number of finished pictures.
+
+    Raises:
+        CalibrationError: a contact is not on the skin.
+        OptiSenseError: the model can't be rendered, or a rendering can't be stored.
+    """
+    view = CoveredView.of(model, photographs.size)
+    if contacts is None:
+        contacts = [
+            contact_of(press, place, model, view.rays)
+            for press, place in zip(photographs.presses, seen, strict=True)
+        ]
+    pictures: list[FloatArray] = []
+    for number, pressed in enumerate([(), *((contact,) for contact in contacts)]):
+        progress(number)
+        layers = kept.layers(
+            model.design,
+            pressed,
+            (photographs.size, photons, seed),
+            partial(_rendered, model, pressed, photographs.size, photons, seed),
+        )
+        pictures.append(with_smooth_outline(np.stack(list(layers.values())), view.coverage))
+    return LayeredPictures(
+        tuple(model.design.lights), pictures[0], tuple(pictures[1:]),
+        model.picture_chain.without_noise(), tuple(contacts),
+    )  # fmt: skip
+
+
+def _rendered(
+    model: OpticalModel,
+    pressed: Sequence[Contact],
+    size: tuple[int, int],
+    photons: int,
+    seed: int,
+) -> dict[str, FloatArray]:
+    image = model.render(
+        pressed, resolution=size, photons=photons, seed=seed, partial=False, skin=ELASTIC
+    )
+    return {name: np.asarray(layer, dtype=np.float32) for name, layer in image.layers.items()}
+
+
+def contact_slopes(layers: LayeredPictures, index: int, seen: SeenContact) -> FloatArray:
+    """Return the derivatives of a press by its column and row, in pixels, and by the logarithm of
+    its radius, (3, groups, h, w, 3).
+    """
+    response = layers.presses[index] - layers.background
+    down, across = np.gradient(response, axis=(1, 2))
+    rows, columns = np.mgrid[: response.shape[1], : response.shape[2]] + 0.5
+    x = (columns - seen.centre[0]).astype(np.float32)[..., None]
+    y = (rows - seen.centre[1]).astype(np.float32)[..., None]
+    wider = response - x * across - y * down
+    return np.stack([-across, -down, wider]).astype(np.float32)

@@ -1,0 +1,124 @@
+"""Derivatives of layers by the camera's field of view and place.
+
+A camera that moves sees the same light on other places of the skin. So the derivative follows from
+the chief rays of two cameras and from the rendered layers alone. A difference quotient of two
+renderings would contain their noise: a step of a few per cent changes a smooth background less than
+the noise of the light does. At the outline of the skin, such as the edge of a small mirror, the
+share of a pixel that sees skin changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import map_coordinates
+
+from optisense.calibration._covered_view import CoveredView, outline_of
+from optisense.calibration._layered_pictures import LayeredPictures
+from optisense.calibration.seen_contacts import SeenContact
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from optisense.optics import ChiefRays
+
+FloatArray = NDArray[np.float64]
+
+FARTHEST = 0.1
+"""Largest displacement of a point in the picture, as a share of the picture's width; pixels with a
+larger one see another part of the skin, such as by another mirror.
+"""
+
+
+def view_changes(
+    layers: LayeredPictures,
+    seen: Sequence[SeenContact],
+    before: CoveredView,
+    after: CoveredView,
+) -> list[NDArray[np.float32]]:
+    """Return the changes (groups, h, w, 3) of the layers of the background and of each press by a
+    change of the view.
+
+    Contacts stay where the photographs show them. A contact of the same radius in pixels covers
+    more of the skin if a pixel does, and the tilts of a ball's surface grow in proportion: so does
+    the response.
+
+    Args:
+        layers: layers before the change.
+        seen: contacts in the photographs.
+        before, after: views before and after the change, at the size of the layers.
+    """
+    columns, rows = displacements(before.rays, after.rays)
+    outline = outline_of(before.coverage, after.coverage)
+    skin = layers.background if outline is None else outline.continued(layers.background)
+    ground = _moved(skin, columns, rows) - layers.background
+    if outline is not None:
+        more = (after.coverage - before.coverage)[outline.where, None].astype(np.float32)
+        ground[:, outline.outside] = 0.0
+        ground[:, outline.where] = more * outline.contrast(layers.background)
+    scales = [_pixel_sizes(view.rays) for view in (before, after)]
+    found = [ground]
+    for picture, place in zip(layers.presses, seen, strict=True):
+        row, column = int(place.centre[1]), int(place.centre[0])
+        one, other = (float(scale[row, column]) for scale in scales)
+        growth = other / one - 1.0 if np.isfinite(one + other) and one > 0.0 else 0.0
+        found.append(ground + np.float32(growth) * (picture - layers.background))
+    return found
+
+
+def with_view(
+    layers: LayeredPictures,
+    seen: Sequence[SeenContact],
+    before: CoveredView,
+    after: CoveredView,
+) -> LayeredPictures:
+    """Return layers after a change of the view, see `view_changes`."""
+    ground, *presses = view_changes(layers, seen, before, after)
+    return replace(
+        layers,
+        background=layers.background + ground,
+        presses=tuple(one + two for one, two in zip(layers.presses, presses, strict=True)),
+    )
+
+
+def displacements(before: ChiefRays, after: ChiefRays) -> tuple[FloatArray, FloatArray]:
+    """Return where the skin that each pixel sees after a change was seen before it: columns and
+    rows (h, w) from that pixel, in pixels. They are 0 where either camera sees no skin.
+    """
+    points = np.where(before.hit[..., None], before.points, np.nan).astype(np.float64)
+    down, across = np.gradient(points, axis=(0, 1))
+    off = after.points.astype(np.float64) - points
+    aa, bb, ab = (
+        (one * other).sum(axis=-1)
+        for one, other in ((across, across), (down, down), (across, down))
+    )
+    a, b = (across * off).sum(axis=-1), (down * off).sum(axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        area = aa * bb - ab * ab
+        columns, rows = (bb * a - ab * b) / area, (aa * b - ab * a) / area
+    limit = FARTHEST * before.hit.shape[1]
+    valid = after.hit & (np.hypot(columns, rows) < limit)  # false where either is NaN
+    return np.where(valid, columns, 0.0), np.where(valid, rows, 0.0)
+
+
+def _moved(
+    layers: NDArray[np.float32], columns: FloatArray, rows: FloatArray
+) -> NDArray[np.float32]:
+    """Return layers (groups, h, w, 3) whose pixels are those at other places of the picture."""
+    height, width = columns.shape
+    places = np.mgrid[:height, :width] + np.stack([rows, columns])
+    moved = [
+        [map_coordinates(layer[..., c], places, order=1, mode="nearest") for c in range(3)]
+        for layer in layers
+    ]
+    return np.moveaxis(np.array(moved, dtype=np.float32), 1, -1)
+
+
+def _pixel_sizes(rays: ChiefRays) -> FloatArray:
+    """Return the side (h, w) of the square of skin that a pixel sees, mm; NaN where none."""
+    points = np.where(rays.hit[..., None], rays.points, np.nan).astype(np.float64)
+    down, across = np.gradient(points, axis=(0, 1))
+    return np.asarray(np.sqrt(np.linalg.norm(np.cross(across, down), axis=-1)))

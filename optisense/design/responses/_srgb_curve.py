@@ -1,0 +1,29 @@
+"""Tone curve of sRGB."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design.colour import encode, srgb_curve
+from optisense.design.responses._tone_curve import ToneCurve
+
+FloatArray = NDArray[np.floating]
+
+
+class SrgbCurve(ToneCurve):
+    """The transfer curve of sRGB (IEC 61966-2-1)."""
+
+    title: ClassVar[str] = "sRGB"
+
+    kind: Literal["srgb"] = "srgb"
+
+    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+        """Return the stored levels (...), 0 to 1: a power of 1 / 2.4, linear in the dark."""
+        return srgb_curve(linear)
+
+    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+        """Return the stored levels (...) in 8 bits, in single precision."""
+        return encode(linear)

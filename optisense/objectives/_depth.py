@@ -1,0 +1,101 @@
+"""Depth: the error of the shape that a calibrated reader finds on presses that it was not fitted
+to.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.objectives import _figures
+from optisense.objectives._press import FloatArray
+from optisense.objectives._reader import (
+    CAMERA_NOISE,
+    LEAST_PIXELS,
+    LEAST_PRESSES,
+    ReadPress,
+    pixels_to_read,
+    read_presses,
+    summarise_places,
+)
+from optisense.objectives.registry import objective
+from optisense.reading.integration import NormalIntegrator
+from optisense.reading.untouched import UntouchedSurface
+
+if TYPE_CHECKING:
+    from optisense.objectives.evaluation import Evaluation
+
+
+@objective(
+    "depth",
+    title="Depth",
+    draw=_figures.draw_depth,
+    beside=("reading_nothing", "worst_place"),
+    reads=pixels_to_read,
+    range=(0.0, math.inf),
+    needs=f"{LEAST_PRESSES} presses or more, each seen, with {LEAST_PIXELS} pixels",
+    unit="mm",
+    lower_is_better=True,
+)
+def depth(
+    evaluation: Evaluation, *, camera_noise: float = CAMERA_NOISE
+) -> tuple[float, dict[str, Any], dict[str, Any]]:
+    """The error, in mm, of the shape that a calibrated reader finds on presses that it was not
+    fitted to.
+
+    The normals of the objective `reading` are integrated to depth below the untouched surface. The
+    value is the median over places of the mean absolute difference over the pixels of a contact.
+
+    Args:
+        evaluation: the sensor.
+        camera_noise: standard deviation of the noise of all pictures, levels of 255.
+    """
+    places: list[dict[str, Any]] = []
+    maps = []
+    for each in read_presses(evaluation, camera_noise):
+        integrator, true = each.press.derived(
+            "integrator and depth", partial(_known, evaluation, each)
+        )
+        read = integrator.depths(each.normals)
+        inside = each.mask
+        places.append(
+            {
+                "place": each.press.place,
+                "error": float(np.abs(read - true)[inside].mean()),
+                "reading_nothing": float(true[inside].mean()),
+                "deepest": float(true[inside].max()),
+                "deepest_read": float(read[inside].max()),
+                "pixels": int(inside.sum()),
+            }
+        )
+        maps.append({"read": _along_middle(read, inside), "true": _along_middle(true, inside)})
+    value, parts = summarise_places(places)
+    return value, parts, {"profiles": maps}
+
+
+def _known(evaluation: Evaluation, read: ReadPress) -> tuple[NormalIntegrator, FloatArray]:
+    """Return the integrator of normals on the grid of a press, and its true depth (h, w), mm."""
+    rays = evaluation.shared(
+        "rays of the images", lambda: evaluation.model.chief_rays(evaluation.resolution)
+    )
+    window = read.press.window
+    box = (slice(None), slice(None)) if window is None else window.box
+    surface = UntouchedSurface(
+        points=rays.points[box][read.grid].astype(np.float64),
+        normals=rays.normals[box][read.grid].astype(np.float64),
+        directions=rays.directions[box][read.grid].astype(np.float64),
+        seen=read.seen,
+    )
+    points = np.where(read.mask[..., None], read.press.points[read.grid], surface.points)
+    return NormalIntegrator(surface), surface.depth(points)
+
+
+def _along_middle(values: FloatArray, inside: NDArray[np.bool_]) -> FloatArray:
+    """Return the values (w,), mm, along the row through the middle of a contact."""
+    row = int(np.argmax(inside.sum(axis=1)))
+    middle: FloatArray = values[row]
+    return middle

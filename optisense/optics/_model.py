@@ -1,0 +1,394 @@
+"""A sensor design prepared for rendering: its scenes, emission guide and radiance caches."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import drjit as dr
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.design import SensorDesign
+from optisense.errors import RenderError
+from optisense.geometry import Contact, TriangleMesh
+from optisense.mechanics import ELASTIC, SKINS, PressedSkin, SkinMesh
+from optisense.optics._ray_model import RayModel
+from optisense.optics._skin_view import VIEW_RESOLUTION, SkinView
+from optisense.optics.backend.interrupts import reraise_interrupts
+from optisense.optics.backend.memory import bound_memory
+from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
+from optisense.optics.backend.versions import versions
+from optisense.optics.camera.projection import RayCamera
+from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
+from optisense.optics.imaging.cached import (
+    ImageLayers,
+    PixelImportance,
+    SamplingPlan,
+    render_cached,
+)
+from optisense.optics.imaging.known_view import KnownView
+from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
+from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
+from optisense.optics.radiance_cache.lit_scene import LitScene
+from optisense.optics.radiance_cache.store import CacheStore
+from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
+from optisense.optics.transport.emission_guide import EmissionGuide
+from optisense.optics.transport.photons import Emission
+from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
+
+MAX_PHOTONS = 512_000_000
+"""Number of photons at which tracing ends even if the wanted noise is not reached. The noise of the
+light is then about 0.1 %, a thirtieth of that of a normal image."""
+
+SPPM_PASS_PHOTONS = 1_000_000
+"""Number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on GelSight
+Mini gets some 300 landings, and a photon map of 60 MB."""
+
+
+@dataclass(frozen=True)
+class RenderProgress:
+    """The progress of a render.
+
+    Attributes:
+        stage: the current stage.
+        part: traced part of the photons, 0 to 1.
+        fraction: approximate completed fraction of the render, 0 to 1.
+        photons: number of photons traced so far.
+        noise: relative noise, per cent; None if it is not known.
+        seconds: time since the start, s.
+    """
+
+    stage: Stage
+    part: float
+    fraction: float
+    photons: int
+    noise: float | None
+    seconds: float
+
+
+@dataclass(frozen=True)
+class ContactView:
+    """What the camera sees of a sensor with contacts, before its light is known.
+
+    Attributes:
+        camera: the camera.
+        placed: meshes of the contacts' indenters in the design's frame, mm.
+        pressed: the elastic skin under the contacts; None without one.
+        scenes: the sensor with its contacts.
+        rays: the chief rays.
+        skin: the mesh of the elastic skin under the contacts; None without one.
+        known: parts of the image that drafts reuse.
+    """
+
+    camera: RayCamera
+    placed: list[TriangleMesh]
+    pressed: PressedSkin | None
+    scenes: ContactScenes
+    rays: ChiefRays
+    skin: SkinMesh | None = None
+    known: KnownView = field(default_factory=KnownView)
+
+
+class OpticalModel(RayModel):
+    """A sensor prepared for rendering many images.
+
+    The scene of the sensor, the emission guide and the radiance cache are computed once. A contact
+    adds only its own surface, a light's flux or colour only scales its layer, and a coating's
+    specularity only changes its row of the surface table.
+    """
+
+    is_draft = False
+    """Whether images are drafts, coarser and faster."""
+
+    store_type: type[CacheStore] = CacheStore
+    """Kind of the store of radiance caches."""
+
+    listener: Callable[[RenderProgress], None] | None = None
+    """A function that is called with the progress of images if `render` is given no other."""
+
+    _caches: CacheStore | None = None
+    """The radiance caches, once they are used."""
+
+    @property
+    def _store(self) -> CacheStore:
+        if self._caches is None:
+            self._caches = self._new_store()
+        return self._caches
+
+    def _new_store(self) -> CacheStore:
+        rays = self.chief_rays(VIEW_RESOLUTION)
+        return self.store_type(LitScene.of(self.scenes), rays.points[rays.hit])
+
+    def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
+        if self._caches is not None:
+            if scenes.assembly is not self.scenes.assembly or view is not self._view:
+                self._caches = None
+            elif scenes is not self.scenes:
+                self._caches = self._caches.coated(LitScene.of(scenes))
+        super()._set(design, scenes, view)
+
+    def forget_light(self, guide: bool = False) -> None:
+        """Drop the radiance caches (hundreds of MB); the next image traces its light again.
+
+        Args:
+            guide: whether the emission guide and the surface cells are dropped as well.
+        """
+        if self._caches is not None:
+            self._caches = None if guide else self._caches.coated(LitScene.of(self.scenes))
+            dr.flush_malloc_cache()
+
+    def guide(self) -> EmissionGuide:
+        """Return the emission guide, which is learned from a pilot pass on first use."""
+        return self._store.guide
+
+    @reraise_interrupts
+    def render(
+        self,
+        contacts: Sequence[Contact] = (),
+        resolution: tuple[int, int] | None = None,
+        photons: int | str | None = None,
+        noise: float | None = None,
+        seconds: float | None = None,
+        seed: int = 0,
+        progress: Callable[[RenderProgress], None] | None = None,
+        estimator: str = RADIANCE_CACHE,
+        only_contacts: bool = False,
+        pixel_importance: PixelImportance | None = None,
+        partial: bool = True,
+        skin: str = ELASTIC,
+    ) -> TactileImage:
+        """Render the camera's image while ``contacts`` press into the skin.
+
+        Args:
+            contacts: indenters, places and depths; none for the untouched sensor.
+            resolution: (width, height) pixels; the camera's own by default.
+            photons: number of photons to trace, or a level of `optisense.quality`; the normal level
+                if no other limit is given.
+            noise: relative RMS noise (per cent) of the light on the sensing surface at which
+                tracing stops.
+            seconds: time limit (s) of the whole render.
+            seed: seed of all random numbers. The same seed and settings give the same image
+                regardless of earlier renders, except for rounding, which may change a shadow ray in
+                single pixels at the edge of a contact.
+            progress: function that is called with the progress during the render.
+            estimator: "radiance-cache" (fast) or "sppm" (progressive photon mapping, to check it).
+            only_contacts: whether only the pixels that see an indenter are shaded and the others
+                stay dark; several times faster, for scores that read no other pixels.
+            pixel_importance: function of the chief rays that gives, with ``only_contacts``, the
+                share (h, w), 0 to 1, of the camera samples of each pixel; each pixel gets at least
+                a few.
+            partial: whether Ctrl-C after the first photons returns an image of the photons so far;
+                otherwise KeyboardInterrupt is raised at once.
+            skin: "elastic" for a skin that deforms like a gel, also around contacts; "conforming"
+                for a skin that takes the shape of the indenters where they overlap and stays flat
+                around them, as in the objectives of the OptiSense paper.
+
+        Returns:
+            The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
+
+        Raises:
+            ContactError: a contact is off the surface or deeper than the gel.
+            RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
+        """
+        if estimator not in ESTIMATORS:
+            raise RenderError(
+                f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
+            )
+        if skin not in SKINS:
+            raise RenderError(
+                f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS)
+            )
+        for name, value in (("noise", noise), ("seconds", seconds)):
+            if value is not None and not value > 0:
+                raise RenderError(
+                    f"the limit '{name}' is {value}", hint="Give a number above 0, or none"
+                )
+        number = None if photons is None else _photons_of(photons)
+        began = time.perf_counter()
+        bound_memory()
+
+        listener = progress or self.listener
+
+        def on_stage(stage: Stage, part: float, traced: int, reached: float | None) -> None:
+            if listener is not None:
+                shown = None if reached is None or not np.isfinite(reached) else 100 * reached
+                now = time.perf_counter() - began
+                listener(
+                    RenderProgress(stage, part, fraction_done(stage, part), traced, shown, now)
+                )
+
+        on_stage(Stage.PREPARING, 0.0, 0, None)
+        view = self._contact_view(contacts, resolution, skin)
+        camera, rays, scenes = view.camera, view.rays, view.scenes
+        placed, pressed = view.placed, view.pressed
+        built = time.perf_counter()
+
+        if estimator == SPPM:
+            layers = self._render_sppm(scenes, camera, rays, number, seconds, seed, began, on_stage)
+        else:
+            target = None if noise is None else noise / 100
+            wanted = number
+            if number is None and noise is None and seconds is None:
+                wanted = PICTURE_PHOTONS
+            store = self._store
+            light = store.radiance_cache(
+                seed, wanted, target, seconds, MAX_PHOTONS, began, on_stage, partial
+            )
+            lit = time.perf_counter()
+            on_stage(Stage.SHADING, 1.0, light[0].photons, light[0].noise)
+            layers = render_cached(
+                light,
+                scenes,
+                camera,
+                rays,
+                store.emitters,
+                seed,
+                SamplingPlan(only_contacts, pixel_importance, self.is_draft),
+                view.known if self.is_draft else None,
+            )
+            layers.light_seconds = lit - built
+        ended = time.perf_counter()
+        on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
+        units = dict(zip(self._traced_groups, layers.radiance, strict=True))
+        markers = None
+        if self.design.markers is not None:
+            factor, markers = self._marked(layers, pressed, camera)
+            units = {name: layer * factor for name, layer in units.items()}
+        image = TactileImage(
+            layers={
+                name: layer * self.design.lights[name].channel_flux().astype(np.float32)
+                for name, layer in units.items()
+            },
+            unit_layers=units,
+            normals=layers.normals,
+            contact_mask=layers.contact_mask,
+            points=layers.points,
+            interrupted=layers.interrupted,
+            chain=self.picture_chain,
+            indenters=_named(contacts, placed),
+            pressed=pressed,
+            markers=markers,
+        )
+        image.settings = {
+            "design": self.design.name,
+            "seed": seed,
+            "resolution": [camera.width, camera.height],
+            "estimator": estimator,
+            "units": {"radiance": RADIANCE_UNIT, "length": "mm"},
+            "photons": layers.photons,
+            "photons_asked": number,
+            "noise_asked_percent": noise,
+            "seconds_asked": seconds,
+            "noise_reached_percent": _percent(layers.noise),
+            "noise_of_worst_places_percent": _percent(layers.worst_noise),
+            "samples_per_pixel": layers.samples,
+            "interrupted": layers.interrupted,
+            "contacts": [repr(contact) for contact in contacts],
+            "skin": skin,
+            "presses": [] if pressed is None else pressed.in_numbers(),
+            "seconds": {
+                "scene": round(built - began, 4),
+                "light": round(layers.light_seconds, 4),
+                "image": round(layers.image_seconds, 4),
+                "total": round(ended - began, 4),
+            },
+            "versions": versions(self.variant),
+        }
+        return image
+
+    def _contact_view(
+        self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
+    ) -> ContactView:
+        """Press the contacts, and trace the chief rays of an image; see `render`."""
+        camera = self.camera(resolution)
+        placed = [self.place(contact) for contact in contacts]
+        pressed = mesh = None
+        if contacts and skin == ELASTIC:
+            pressed = self.pressed(contacts, placed)
+            mesh = self._view.gel.mesh(contacts)
+            scenes = self.scenes.deformed(mesh, pressed)
+        else:
+            scenes = self.scenes.touched(contacts, placed)
+        rays = trace_chief_rays(scenes.full, camera)
+        if not rays.hit.any():
+            raise sees_nothing(rays)
+        return ContactView(camera, placed, pressed, scenes, rays, mesh)
+
+    @property
+    def _traced_groups(self) -> list[str]:
+        """The names of the light groups whose layers are rendered."""
+        return self.groups
+
+    def _marked(
+        self, layers: ImageLayers, pressed: PressedSkin | None, camera: RayCamera
+    ) -> tuple[NDArray[np.float32], MarkerPlaces]:
+        """Return the factors (h, w, 3) by which the markers darken each pixel, and the markers'
+        positions.
+        """
+        markers = self.design.markers
+        assert markers is not None
+        points = layers.points.astype(np.float64)
+        moved = np.zeros_like(points)
+        if pressed is not None:
+            moved = pressed.maps(points, layers.normals).displacement
+        material = points - moved
+        dots = MarkerDots.on(markers, self.surface)
+        share = dots.coverage(material)[..., None]
+        factor = 1.0 - share + share * ink_factor(markers, self.design.coating)
+        untouched = self.chief_rays((camera.width, camera.height))
+        return factor.astype(np.float32), dots.places(untouched, material, moved)
+
+    def _render_sppm(
+        self,
+        scenes: ContactScenes,
+        camera: RayCamera,
+        rays: ChiefRays,
+        photons: int | None,
+        seconds: float | None,
+        seed: int,
+        began: float,
+        on_stage: StageCallback,
+    ) -> ImageLayers:
+        from optisense.optics.imaging.sppm import render_sppm
+
+        per_light = max(1, SPPM_PASS_PHOTONS // self.scenes.emitter_table.count)
+        emitted = per_light * self.scenes.emitter_table.count
+        passes = max(1, -(-(photons or 16 * SCORE_PHOTONS) // emitted))
+
+        def stop(done: int) -> bool:
+            on_stage(Stage.PHOTONS, done / passes, done * emitted, None)
+            return seconds is not None and time.perf_counter() - began > seconds
+
+        result = render_sppm(
+            scenes.full,
+            Emission(self.scenes.emitter_table, self.guide(), per_light, seed),
+            camera,
+            passes,
+            coloured=self.scenes.coloured,
+            stop=stop,
+        )
+        return ImageLayers.from_sppm(result, rays, began)
+
+
+def _named(contacts: Sequence[Contact], placed: list[TriangleMesh]) -> dict[str, TriangleMesh]:
+    """Return the indenters' meshes by name: the kind and a number."""
+    named = {}
+    for number, (contact, mesh) in enumerate(zip(contacts, placed, strict=True), start=1):
+        kind = type(contact.indenter).__name__.removesuffix("Indenter").lower()
+        named[f"{kind} {number}"] = mesh
+    return named
+
+
+def _percent(noise: float | None) -> float | None:
+    return None if noise is None or not np.isfinite(noise) else round(100 * noise, 4)
+
+
+def _photons_of(given: int | str) -> int:
+    try:
+        return photons_of(given)
+    except ValueError as error:
+        raise RenderError(str(error)) from None

@@ -1,0 +1,127 @@
+"""Sources of the gradient of a search, and gradients by differences of trials."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+
+from optisense.errors import ObjectiveError, SearchError
+from optisense.objectives.named import are_rays_only
+from optisense.search.evaluation.evaluator import RELIGHTS
+from optisense.search.evaluation.outcome import Outcome
+from optisense.search.evaluation.requirements import Requirement
+from optisense.search.methods._jacobian import moving_parts
+from optisense.search.methods._smooth_scores import SmoothScore
+from optisense.search.methods.base import FloatArray, Problem
+from optisense.search.methods.score_differences import STEP
+
+
+class GradientSource(Enum):
+    """A source of gradients."""
+
+    RAYS = "derivatives of rays"
+    LAYERS = "relit pictures"
+    TRIALS = "differences of trials"
+
+
+class LocalValues(NamedTuple):
+    """Values and gradients at a point: values (1 + m,) of the score and the limited quantities, and
+    their gradients (1 + m, n) by units of the ranges.
+    """
+
+    values: FloatArray
+    gradients: FloatArray
+
+
+class PointsWantedError(Exception):
+    """Signal that ends a run of the optimiser at points (k, n) that have no score yet."""
+
+    def __init__(self, points: FloatArray) -> None:
+        super().__init__()
+        self.points = points
+
+
+def source_of(problem: Problem) -> GradientSource:
+    """Return the source of the gradients for a problem.
+
+    Raises:
+        SearchError: a parameter is a choice or an integer, or no parameter changes the score.
+    """
+    space, objective = problem.space, problem.objectives[0]
+    for number in np.flatnonzero(space.discrete):
+        raise SearchError(
+            "a choice or a whole number has no gradient",
+            where=space.names[number],
+            hint="Search it with --method grid, or vary it with cma-es",
+        )
+    try:
+        rays_only = are_rays_only([objective])
+    except ObjectiveError:  # a function of the caller's program
+        return GradientSource.TRIALS
+    if not rays_only:
+        relit = all(RELIGHTS.search(name) for name in space.names)
+        return GradientSource.LAYERS if relit else GradientSource.TRIALS
+    moving_parts(space)  # raises an error for a parameter that changes no ray
+    return GradientSource.TRIALS if SmoothScore.of(objective) is None else GradientSource.RAYS
+
+
+class TrialDifferences:
+    """Central differences of trials over `STEP` of the ranges, or as much of it as the bounds
+    allow.
+    """
+
+    def __init__(self, problem: Problem, requirements: Sequence[Requirement]) -> None:
+        """Store what is differentiated: the first objective, and the quantities that conditions
+        limit.
+        """
+        self._space, self._objective = problem.space, problem.objectives[0]
+        self._span = problem.space.upper - problem.space.lower
+        self._requirements = requirements
+
+    def around(self, point: FloatArray, known: Mapping[bytes, Outcome]) -> LocalValues | None:
+        """Return values and gradients at a point (n,), or None if it has no score. If the trial on
+        one side failed, a one-sided difference is taken.
+
+        Raises:
+            PointsWantedError: the point or its neighbours must be scored first.
+        """
+        sides = self._beside(point)
+        wanted = [each for each in (point, *sides) if each.tobytes() not in known]
+        if wanted:
+            raise PointsWantedError(np.array(wanted))
+        values = self._exact(known[point.tobytes()])
+        if values is None:
+            return None
+        gradients = np.zeros((len(values), self._space.size))
+        for number, span in enumerate(self._span):
+            ends = []
+            for side in sides[2 * number : 2 * number + 2]:
+                exact = self._exact(known[side.tobytes()])
+                place = (side[number] - point[number]) / span
+                ends.append((0.0, values) if exact is None else (place, exact))
+            (high, above), (low, below) = ends
+            if high > low:
+                gradients[:, number] = (above - below) / (high - low)
+        return LocalValues(values, gradients)
+
+    def _beside(self, point: FloatArray) -> list[FloatArray]:
+        """Return two points (n,) for each parameter, above and below, within the bounds."""
+        found = []
+        for number, span in enumerate(self._span):
+            low, high = self._space.lower[number], self._space.upper[number]
+            for way in (STEP, -STEP):
+                side = point.copy()
+                side[number] = np.clip(point[number] + way * span, low, high)
+                found.append(side)
+        return found
+
+    def _exact(self, outcome: Outcome) -> FloatArray | None:
+        """Return the score and the limited quantities, (1 + m,), or None if one is missing."""
+        limited = [outcome.conditions.get(str(each)) for each in self._requirements]
+        values = [outcome.scores.get(self._objective, np.nan), *limited]
+        if any(value is None or not np.isfinite(value) for value in values):
+            return None
+        return np.array(values, dtype=np.float64)

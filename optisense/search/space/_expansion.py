@@ -1,0 +1,246 @@
+"""Expansion of a user's paths into single parameters: paths are looked up, and those of vectors,
+cages and wildcards are split.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from optisense.design import Cage, SensorDesign, Share, get_value, parse_path, set_value
+from optisense.design.cage import as_array
+from optisense.design.colour import NAMED_COLOURS
+from optisense.errors import SearchError
+from optisense.search.space._control_points import (
+    as_dicts,
+    as_points,
+    mean_share,
+    point_parameters,
+    shares_of,
+    span_of,
+    with_blend,
+)
+from optisense.search.space._variable_paths import find_variables
+from optisense.search.space.design_variables import DesignVariable
+from optisense.search.space.parameters import (
+    Around,
+    CagePoints,
+    Choice,
+    Continuous,
+    Integer,
+    Parameter,
+    Specification,
+    Target,
+    within,
+)
+
+RGB_FIELDS = (
+    "colour", "reflectance", "eta", "k", "dispersion", "absorption", "extinction", "transmittance",
+)  # fmt: skip
+
+
+def expand(
+    design: SensorDesign, path: str, spec: Specification
+) -> tuple[SensorDesign, list[Parameter]]:
+    """Return the single parameters for one path.
+
+    Returns:
+        The design and the parameters. The design is changed in form, not in shape, where needed: a
+        cage given by its points gets a blend if the blend varies.
+
+    Raises:
+        DesignError: the path names nothing in the design; the message suggests a similar name.
+        SearchError: the path can't be varied like this.
+    """
+    if "*" in path:
+        found: list[Parameter] = []
+        for each in starred(design, path):
+            design, added = expand(design, each, spec)
+            found += added
+        return design, found
+    try:
+        variables = find_variables(design, path)
+        if variables:
+            return design, [_of_variable(design, variable, spec, path) for variable in variables]
+        steps = parse_path(path)
+        if len(steps) > 2 and steps[0] == "cages" and steps[2] in ("points", "blend"):
+            axes = steps[3:]
+            if not axes:
+                return _of_cage(design, str(steps[1]), str(steps[2]), path, spec)
+            if len(axes) == 1 and axes[0] in ("x", "y", "z"):
+                whole, chosen = path.rpartition(".")[0], replace(as_points(spec), axes=str(axes[0]))
+                design, found = _of_cage(design, str(steps[1]), str(steps[2]), whole, chosen)
+                return design, [replace(each, asked=path) for each in found]
+        if isinstance(spec, CagePoints):
+            raise SearchError(
+                "the options of control points do not apply to this path",
+                hint="Vary cages.NAME.points",
+            )
+        single = _of_value(path, get_value(design, path), spec)
+        return design, [replace(each, asked=path) for each in single]
+    except SearchError as error:
+        raise SearchError(error.message, where=error.where or path, hint=error.hint) from None
+
+
+def starred(design: SensorDesign, path: str) -> list[str]:
+    """Return the paths that match one with a wildcard: `lights.*.colour`, `lights.lg*.flux`.
+
+    Raises:
+        SearchError: the wildcard is not in a name, or matches none.
+    """
+    section, _, rest = path.partition(".")
+    pattern, _, leaf = rest.partition(".")
+    sections: dict[str, Collection[str]] = {
+        "lights": design.lights,
+        "parts": design.parts,
+        "materials": design.materials,
+        "cages": design.cages,
+    }
+    names = sections.get(section)
+    if names is None or "*" in leaf or not leaf:
+        raise SearchError(
+            "a * stands for names of lights, parts, materials or cages",
+            where=path,
+            hint="Write it like lights.*.colour",
+        )
+    chosen = [name for name in names if fnmatchcase(name, pattern)]
+    if not chosen:
+        raise SearchError(
+            f"'{section}' has no name like '{pattern}'",
+            where=path,
+            hint="Known: " + ", ".join(names) if names else None,
+        )
+    return [f"{section}.{name}.{leaf}" for name in chosen]
+
+
+def _of_variable(
+    design: SensorDesign, variable: DesignVariable, spec: Specification, asked: str
+) -> Parameter:
+    now = variable.start(design)
+    if variable.numeric:
+        if isinstance(spec, Around):
+            spec = spec.about(0.0)
+        if not isinstance(spec, Continuous):
+            raise SearchError("this parameter takes a range of numbers", hint="Give LOW:HIGH")
+        assert isinstance(now, float)
+        return Parameter(variable.path, spec, within(now, spec), variable=variable, asked=asked)
+    if not isinstance(spec, Choice):
+        raise SearchError(
+            "this parameter takes names to choose from", hint="Give them as NAME,NAME,..."
+        )
+    return Parameter(variable.path, spec, _number_of(now, spec), variable=variable, asked=asked)
+
+
+def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
+    """Return the parameters for an ordinary path: one value, or the two or three numbers of a
+    vector.
+    """
+    if isinstance(spec, Choice):
+        spec = _colours_read(path, spec)
+        return [Parameter(path, spec, _number_of(value, spec), (Target(path),))]
+    if isinstance(value, bool | str) or value is None:
+        raise SearchError(
+            f"the value {value!r} is not a number", hint="Give options: NAME,NAME,..."
+        )
+    if isinstance(value, tuple):
+        letters = _letters(path, len(value))
+        return [
+            each
+            for letter, item in zip(letters, value, strict=True)
+            for each in _of_value(f"{path}{letter}", item, spec)
+        ]
+    if isinstance(value, BaseModel | list | dict):
+        raise SearchError(
+            "this is a section, not a number",
+            hint=f"Name a number in it, such as {_example(path, value)}",
+        )
+    kind = _bounds(value, spec)
+    start = within(float(value), kind)
+    return [Parameter(path, kind, start, (Target(path),))]
+
+
+def _bounds(value: float, spec: Specification) -> Continuous | Integer:
+    """Return bounds for a number; integer bounds for an integer."""
+    assert not isinstance(spec, Choice | CagePoints)
+    whole = isinstance(value, int)
+    if isinstance(spec, Around):
+        spec = spec.about(float(value))
+    if isinstance(spec, Continuous) and whole:
+        if spec.low != round(spec.low) or spec.high != round(spec.high):
+            raise SearchError(
+                f"the value is a whole number, and the bounds {spec.low:g} and {spec.high:g} "
+                "must be, too"
+            )
+        return Integer(round(spec.low), round(spec.high))
+    return spec
+
+
+def _of_cage(
+    design: SensorDesign, name: str, field: str, path: str, spec: Specification
+) -> tuple[SensorDesign, list[Parameter]]:
+    cage: Cage = get_value(design, f"cages.{name}")
+    given = as_points(spec)
+    if field == "blend":
+        if cage.c_min is None or cage.c_max is None:
+            raise SearchError(
+                f"the cage '{name}' has no c_min and c_max to blend",
+                hint=f"Add both to the design, or vary cages.{name}.points",
+            )
+        gridded = isinstance(spec, Continuous) and spec.steps is not None
+        if not isinstance(spec, CagePoints) and (isinstance(cage.blend, float) or gridded):
+            share = cage.blend if isinstance(cage.blend, float) else mean_share(cage)
+            ready = with_blend(design, name, share)
+            return ready, [replace(each, asked=path) for each in _of_value(path, share, spec)]
+        shares = shares_of(cage)
+        ready = with_blend(design, name, [Share(x=x, y=y, z=z) for x, y, z in shares.tolist()])
+        return ready, point_parameters(cage, path, shares, given, free=span_of(cage) != 0.0)
+    if cage.blend is not None:
+        points = cage.current_points()
+        change = {"blend": None, "points": as_dicts(points)}
+        design = set_value(design, f"cages.{name}", {**cage.model_dump(mode="json"), **change})
+    points = as_array(design.cages[name].points)
+    return design, point_parameters(cage, path, points, given, mirror=np.array(cage.box))
+
+
+def _colours_read(path: str, spec: Choice) -> Choice:
+    """Replace names of colours by values, if the path is that of a colour."""
+    if not path.endswith(".colour"):
+        return spec
+    initials = {name[0]: name for name in NAMED_COLOURS}  # R, G, B and W
+    options = []
+    for option in spec.options:
+        if isinstance(option, str):
+            name = initials.get(option.lower(), option.lower())
+            if name not in NAMED_COLOURS:
+                raise SearchError(
+                    f"there is no colour '{option}'", hint="Known: " + ", ".join(NAMED_COLOURS)
+                )
+            options.append(NAMED_COLOURS[name])
+        else:
+            options.append(option)
+    return Choice(options, spec.labels)
+
+
+def _number_of(value: object, spec: Choice) -> float:
+    """Return the index of a value among the options; 0 if it is not one of them."""
+    return float(spec.options.index(value)) if value in spec.options else 0.0
+
+
+def _letters(path: str, count: int) -> list[str]:
+    if count == 3:
+        name = path.rsplit(".", 1)[-1]
+        return [f".{letter}" for letter in ("rgb" if name in RGB_FIELDS else "xyz")]
+    return [f"[{index}]" for index in range(count)]
+
+
+def _example(path: str, value: Any) -> str:
+    """Return an example of a path inside a section."""
+    if isinstance(value, list):
+        return f"{path}[0]"
+    names = list(type(value).model_fields) if isinstance(value, BaseModel) else list(value)
+    return f"{path}.{names[-1]}" if names else path

@@ -1,0 +1,188 @@
+"""Placement of the lights and the camera of a recipe."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydantic import ValidationError
+from scipy.spatial import cKDTree
+
+from optisense import library
+from optisense.design import Camera, LightGroup, Provenance, Role, Status
+from optisense.design.colour import NAMED_COLOURS
+from optisense.design.problems import design_error
+from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.geometry.patches import middle
+from optisense.sensors.from_meshes import _lights as light_placement
+from optisense.sensors.from_meshes import _strips
+from optisense.sensors.from_meshes._camera import make_camera, share_seen
+from optisense.sensors.from_meshes._pick_and_place import read_pick_and_place
+from optisense.sensors.from_meshes._recipe_state import RecipeState
+from optisense.sensors.from_meshes._touching import refuse_contact_with_lamps
+from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference
+from optisense.sensors.from_meshes.surfaces import chosen, pick
+
+LITTLE_SEEN = 0.5
+"""Share of the sensing surface that the camera sees below which a warning states it."""
+
+
+def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGroup:
+    """Return a light group with the positions of its lights.
+
+    Args:
+        state: recipe and meshes; notes and sources are added to it.
+        name: name of the group.
+        choice: model, colour and placement of the lights.
+
+    Raises:
+        DesignError: a light falls off its surface, or a row or ring is impossible.
+        LibraryError: the library lacks its model.
+    """
+    where = state.recipe.where("lights", name)
+    state.check_known("light", choice.model, "lights", name, "model")
+    try:
+        if choice.row is not None:
+            lights = light_placement.row(choice.row, state.meshes[choice.row.part].bounds)
+        elif choice.ring is not None:
+            lights = light_placement.ring(choice.ring, state.meshes[choice.ring.part].bounds)
+        elif choice.over is not None:
+            mesh = state.reference(choice.over, f"lights {name}")
+            found = pick(mesh, choice.over, f"lights {name}")
+            lights = light_placement.over(choice.over, mesh, found, f"lights {name}")
+        elif choice.along is not None:
+            lights = _strips.along(choice.along, state.meshes[choice.along.edge_of])
+        elif choice.table is not None:
+            file = state.recipe.folder / choice.table.file
+            table = read_pick_and_place(file, choice.table.units)
+            lights = _strips.from_table(choice.table, table)
+            state.provenance[f"lights.{name}.lights"] = Provenance(
+                status=Status.SOURCED, source=f"pick-and-place file {choice.table.file}"
+            )
+        else:
+            lights = choice.at or []
+    except DesignError as error:
+        if error.where is None or error.where == f"lights {name}":
+            raise DesignError(error.message, where=where, hint=error.hint) from None
+        raise
+    colour = choice.colour
+    state.provenance[f"lights.{name}.flux"] = Provenance(
+        status=Status.ASSUMED, source="from the recipe; see the LED's datasheet and current"
+    )
+    try:
+        group = LightGroup(
+            model=choice.model,
+            colour=NAMED_COLOURS[colour] if isinstance(colour, str) else colour,
+            flux=choice.flux,
+            lights=lights,
+        )
+    except ValidationError as error:
+        raise design_error(error, {}, where=where, model=LightGroup) from None
+    _note_crowded(state, name, group)
+    if choice.row is not None:
+        _note_beyond(state, name, group, choice.row)
+    return group
+
+
+def _note_beyond(state: RecipeState, name: str, group: LightGroup, row: LightRow) -> None:
+    """Note if a row is longer than the side at which it stands."""
+    part = row.part
+    low, high = state.meshes[part].bounds
+    places = np.array([light.position for light in group.lights])
+    along = light_placement.axis_along(row, state.meshes[part].bounds)
+    beyond = int(((places[:, along] < low[along]) | (places[:, along] > high[along])).sum())
+    if beyond:
+        state.notes.append(
+            f"lights {name}: {beyond} of {len(places)} are beyond the ends of {part}, which is "
+            f"{high[along] - low[along]:.4g} mm long along {'xyz'[along]}"
+        )
+
+
+def _note_crowded(state: RecipeState, name: str, group: LightGroup) -> None:
+    """Note if lights are closer than their bodies are wide."""
+    package = getattr(library.entry("light", group.model), "package", None)
+    if package is None or len(group.lights) < 2:
+        return
+    places = np.array([light.position for light in group.lights])
+    nearest = float(cKDTree(places).query(places, k=2)[0][:, 1].min())
+    if nearest < min(package[:2]) - 1e-6:
+        state.notes.append(
+            f"lights {name}: they are {nearest:.2f} mm apart, but a {group.model} is "
+            f"{package[0]:g} x {package[1]:g} mm"
+        )
+
+
+def place_camera(state: RecipeState) -> Camera:
+    """Return the camera, with a warning if it sees little of the sensing surface.
+
+    Raises:
+        DesignError: the camera can't be placed or aimed like this.
+        LibraryError: the library lacks its model.
+    """
+    choice = state.recipe.camera
+    where = state.recipe.where("camera")
+    state.check_known("camera", choice.model, "camera", "model")
+    skins = [state.meshes[name] for name in state.of(Role.SENSING_SURFACE)]
+    skin = TriangleMesh.joined([TriangleMesh(m.vertices, m.faces) for m in skins])
+    target = middle(skin)
+    if isinstance(choice.look_at, str):
+        target = middle(state.meshes[choice.look_at])
+    elif choice.look_at is not None:
+        target = np.array(choice.look_at)
+    place = None
+    if isinstance(choice.at, ShapeReference):
+        shape = choice.at
+        mesh, _ = chosen(state.reference(shape, "camera"), shape, "camera")
+        place = middle(mesh)
+        state.provenance["camera.position"] = Provenance(
+            status=Status.DERIVED, source=f"middle of {shape.file or shape.faces_of}"
+        )
+    elif choice.at is not None:
+        place = np.array(choice.at)
+    else:
+        state.provenance["camera.position"] = Provenance(
+            status=Status.ASSUMED, source="where the sensing surface fills the picture"
+        )
+    try:
+        camera = make_camera(choice, skin, place, target, state.meshes)
+    except DesignError as error:
+        raise DesignError(error.message, where=where, hint=error.hint) from None
+    except ValidationError as error:
+        raise design_error(error, {}, where=where, model=Camera) from None
+    if not state.of(Role.MIRROR):
+        seen, spread = share_seen(camera, skin)
+        if seen < LITTLE_SEEN:
+            state.notes.append(
+                f"the camera sees about {100 * seen:.0f} % of the sensing surface: check its "
+                "place (at), what it looks at (look_at) and its field of view"
+            )
+        elif spread < 0.3:
+            state.notes.append(
+                f"the sensing surface fills only {100 * spread:.0f} % of the picture: the "
+                "camera is far away, or its field of view is wide"
+            )
+    return camera
+
+
+def check_places(state: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:
+    """Check that neither the camera nor a light lies in a face, and note those inside solids.
+
+    Raises:
+        DesignError: a camera or light lies in a face.
+    """
+    places = [("the camera", np.array(camera.position))]
+    for name, group in groups.items():
+        for number, light in enumerate(group.lights):
+            places.append((f"light {number} of '{name}'", np.array(light.position)))
+    refuse_contact_with_lamps(places, state.meshes)
+    for name in state.solids():
+        buried = [
+            group
+            for group, lights in groups.items()
+            if inside(np.array([li.position for li in lights.lights]), state.meshes[name]).any()
+        ]
+        if buried:
+            state.notes.append(f"lights {', '.join(buried)} are inside {name}")
+        if inside(np.array([camera.position]), state.meshes[name]).any():
+            state.notes.append(f"the camera is inside {name}")
