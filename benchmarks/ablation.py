@@ -97,7 +97,7 @@ def ablations() -> list[Ablation]:
     import mitsuba as mi
 
     from optisense.optics.backend import sequences
-    from optisense.optics.imaging import cached
+    from optisense.optics.imaging import _grain, cached, sampling
     from optisense.optics.radiance_cache import (
         angular_variance,
         beam_sums,
@@ -166,8 +166,8 @@ def ablations() -> list[Ablation]:
         shading_only("shading of every second pixel",
                      Change(cached, "SPARSE_SHADING_BEAMS", np.inf),
                      Change(cached, "SPARSE_METALLIC_BEAMS", np.inf)),
-        shading_only("more samples in noisy areas", Change(cached, "GRAIN_THRESHOLD", np.inf)),
-        shading_only("more samples in small contacts", Change(cached, "MIN_CONTACT_SAMPLES", 0)),
+        shading_only("more samples in noisy areas", Change(_grain, "GRAIN_THRESHOLD", np.inf)),
+        shading_only("more samples in small contacts", Change(sampling, "MIN_CONTACT_SAMPLES", 0)),
         shading_only("several cells per sample", Change(shading, "CELLS_PER_SAMPLE", 1)),
         shading_only("interpolation of cells", Change(shading, "interpolating_cell", own_cell)),
         shading_only("low-discrepancy samples of a pixel",

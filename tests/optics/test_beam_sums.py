@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from optisense import OpticalModel
 from optisense.geometry import Contact, Sphere
-from optisense.optics.imaging import cached
+from optisense.optics.imaging import sampling
 from optisense.optics.radiance_cache import beams, shading
 from optisense.optics.radiance_cache.angular_variance import occluder_horizon
 from optisense.sensors import build
@@ -120,7 +120,7 @@ def test_shadows_on_the_skin_are_those_of_the_pixels_next_to_contacts(
     """
     size = {"resolution": (160, 120), "photons": 2_000_000, "skin": "conforming"}
     merged = mini.render([BALL], **size)
-    monkeypatch.setattr(cached, "RIM_WIDTH", 12.5 / 160)
+    monkeypatch.setattr(sampling, "RIM_WIDTH", 12.5 / 160)
     apart = mini.render([BALL], **size)
     away = ndimage.distance_transform_edt(~merged.contact_mask)
     rows, columns = np.indices(away.shape)

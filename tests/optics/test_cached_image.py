@@ -8,6 +8,7 @@ from scipy import ndimage
 
 from optisense import Contact, OpticalModel, Plane, Sphere
 from optisense.optics.imaging import cached
+from optisense.optics.imaging._grain import grainy
 from optisense.sensors import build
 
 
@@ -18,11 +19,11 @@ def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> 
     image[10:30, 10:30] *= 1 + 0.05 * random.normal(size=(20, 20))
     image[:, 60:] = 0.005 * random.random((60, 20))
     where = (x < 75) & (y > 2)
-    found = cached._grainy(image.astype(np.float32), where)
+    found = grainy(image.astype(np.float32), where)
     assert found[14:26, 14:26].all()
     assert not found[36:, :50].any()
     assert not found[:, 66:].any()
-    assert not cached._grainy(image.astype(np.float32), np.zeros_like(where)).any()
+    assert not grainy(image.astype(np.float32), np.zeros_like(where)).any()
 
 
 def test_a_contact_may_fill_the_picture() -> None:
@@ -33,7 +34,24 @@ def test_a_contact_may_fill_the_picture() -> None:
     assert (image.radiance.sum(axis=2) > 0).all()
 
 
-def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_show() -> None:
+def test_a_contact_out_of_view_bends_the_skin_in_view() -> None:
+    """Its skin is sampled thoroughly, the rest of the image as usual, and no pixel sees it."""
+    design = build("gelsight-mini")
+    design.camera.fov = 25.0
+    model = OpticalModel(design, "llvm")
+    ball = Contact(Sphere(radius=1.5), at=(5.5, 0.0), depth=0.5)
+    size = {"resolution": (80, 60), "photons": 100_000}
+    image, untouched = model.render([ball], **size), model.render([], **size)
+    assert not image.contact_mask.any()
+    change = np.abs(image.radiance - untouched.radiance).sum(axis=(0, 2))
+    right = change[60:].sum()
+    assert right > 5 * change[:20].sum()
+    assert not model.render([ball], **size, only_contacts=True).radiance.any()
+
+
+def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_show(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """With metal in the coating: diffuse light has no grain (see test_beam_sums.py)."""
     design = build("gelsight-mini-ideal")
     design.coating.specularity = 0.5
@@ -44,12 +62,8 @@ def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_sh
         return float(np.abs(np.diff(image, n=2, axis=1)).mean() / image.mean())
 
     often = grain()
-    usual = cached._grainy
-    try:
-        cached._grainy = lambda image, where: np.zeros_like(where)
-        once = grain()
-    finally:
-        cached._grainy = usual
+    monkeypatch.setattr(cached, "grainy", lambda image, where: np.zeros_like(where))
+    once = grain()
     assert often < 0.9 * once  # the rest is noise of photons
 
 

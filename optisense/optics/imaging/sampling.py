@@ -1,0 +1,125 @@
+"""The camera samples of an image's pixels: more in contacts and around them than elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from optisense.optics.imaging._film import REFERENCE_WIDTH
+from optisense.optics.scene.surfaces import Region
+from optisense.optics.transport.camera_paths import MAX_PIXEL_SAMPLES
+from optisense.optics.transport.chief_rays import ChiefRays
+
+CONTACT_SAMPLES = 12
+"""Number of camera samples per pixel inside contacts, where tilt and shadow vary within a pixel, in
+an image `REFERENCE_WIDTH` wide. Twelve keep the noise of the samples below 1 % in the contact of a
+1.5 mm ball on GelSight Mini. Finer images have smaller pixels and take fewer."""
+MIN_CONTACT_SAMPLES = 16_000
+"""Lower bound on the number of camera samples in all contacts together: that of 1,300 pixels of
+twelve samples. If contacts fill fewer pixels, tilt and shadow vary more within each pixel, and each
+gets more samples; without it, the error in a contact of GelSight Svelte is up to 26 % larger
+(benchmarks/ablation.md)."""
+RIM_SAMPLES = 6
+"""Number of camera samples per pixel around contacts, in an image `REFERENCE_WIDTH` wide: half of
+those inside, as the skin is not tilted there."""
+DRAFT_SAMPLES = 3, 1
+"""Numbers of camera samples per pixel of a draft, in contacts and around them: a quarter or less of
+those of a full image, as the light of a draft is some 9 % off (see `DRAFT_CELL_SCALE`)."""
+MIN_PIXEL_SAMPLES = 2
+"""Number of camera samples of a contact pixel of importance 0, which is only averaged with others:
+a sixth of the usual number or less."""
+RIM_WIDTH = 8.0 / 320.0
+"""Width of the rim around a contact that gets `RIM_SAMPLES`, as a fraction of the image width: 0.5
+mm on GelSight Mini, about the depth of a contact."""
+
+PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
+"""A function of the chief rays that gives the importance (h, w) of each contact pixel to a score,
+0 to 1: the share of the camera samples that it gets."""
+
+
+@dataclass(frozen=True)
+class SamplingPlan:
+    """The pixels that are shaded, and their camera samples.
+
+    Attributes:
+        only_contacts: whether all pixels that do not see an indenter stay dark.
+        importance: function that gives, with ``only_contacts``, the share of the samples of each
+            pixel; a pixel gets at least `MIN_PIXEL_SAMPLES`.
+        draft: whether few samples are taken in contacts and grain is not resampled.
+    """
+
+    only_contacts: bool = False
+    importance: PixelImportance | None = None
+    draft: bool = False
+
+    def of_contacts(self, regions: PixelRegions) -> list[tuple[NDArray[np.bool_], int]]:
+        """Return the masks (h, w) of the pixels in contacts and around them, with their number of
+        samples per pixel; contacts come first, and masks may be empty.
+
+        With ``only_contacts``, the masks are those of each number of samples in contacts.
+        """
+        inner, outer = self.contact_samples(regions)
+        if not self.only_contacts:
+            inside = regions.distance <= 1.0  # with the pixels that touch the edge of a contact
+            return [(inside, inner), (regions.near & ~inside, outer)]
+        contacts = regions.contacts
+        share = np.clip(1.0 if self.importance is None else self.importance(regions.rays), 0, 1)
+        counts = np.maximum(np.round(inner * share), min(inner, MIN_PIXEL_SAMPLES))
+        counts = np.broadcast_to(counts, contacts.shape)
+        return [(contacts & (counts == times), int(times)) for times in np.unique(counts[contacts])]
+
+    def contact_samples(self, regions: PixelRegions) -> tuple[int, int]:
+        """Return the numbers of samples per pixel in contacts and around them."""
+        if self.draft:
+            return DRAFT_SAMPLES
+        share = min(1.0, REFERENCE_WIDTH / regions.width)
+        inner, outer = (max(2, round(n * share)) for n in (CONTACT_SAMPLES, RIM_SAMPLES))
+        pixels = max(1, int(regions.contacts.sum()))
+        return max(inner, min(MAX_PIXEL_SAMPLES, MIN_CONTACT_SAMPLES // pixels)), outer
+
+
+FULL_SAMPLING = SamplingPlan()
+"""Full number of samples in all pixels."""
+
+
+@dataclass(frozen=True)
+class PixelRegions:
+    """The pixels in contacts, around them, and far from them.
+
+    Attributes:
+        rays: chief rays of the image.
+        contacts: (h, w) mask of the pixels that see an indenter.
+        distance: (h, w) distance of each pixel from them, pixels; infinite without contacts.
+        near: (h, w) mask of the pixels in contacts, around them, or where an elastic skin is bent.
+    """
+
+    rays: ChiefRays
+    contacts: NDArray[np.bool_]
+    distance: NDArray[np.floating]
+    near: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, rays: ChiefRays) -> PixelRegions:
+        """Return the regions of an image by its chief rays."""
+        region = np.where(rays.hit, rays.region, 0)
+        contacts = region == Region.INDENTER
+        distance = np.full(contacts.shape, np.inf)
+        if contacts.any():
+            distance = ndimage.distance_transform_edt(~contacts)
+        around = distance <= max(2.0, RIM_WIDTH * contacts.shape[1])
+        return cls(rays, contacts, distance, around | (region == Region.BENT))
+
+    @property
+    def width(self) -> int:
+        """The width of the image, pixels."""
+        return int(self.contacts.shape[1])
+
+    def within(self, fraction: float) -> NDArray[np.bool_]:
+        """Return the mask (h, w) of the pixels within a distance of contacts, which is given as a
+        fraction of the image's width.
+        """
+        return self.distance <= fraction * self.width
