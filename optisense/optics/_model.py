@@ -191,41 +191,19 @@ class OpticalModel(RayModel):
             ContactError: a contact is off the surface or deeper than the gel.
             RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
         """
-        if estimator not in ESTIMATORS:
-            raise RenderError(
-                f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
-            )
-        if skin not in SKINS:
-            raise RenderError(
-                f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS)
-            )
-        for name, value in (("noise", noise), ("seconds", seconds)):
-            if value is not None and not value > 0:
-                raise RenderError(
-                    f"the limit '{name}' is {value}", hint="Give a number above 0, or none"
-                )
+        _check_choices(estimator, skin, noise, seconds)
         number = None if photons is None else _photons_of(photons)
         began = time.perf_counter()
         bound_memory()
-
-        listener = progress or self.listener
-
-        def on_stage(stage: Stage, part: float, traced: int, reached: float | None) -> None:
-            if listener is not None:
-                shown = None if reached is None or not np.isfinite(reached) else 100 * reached
-                now = time.perf_counter() - began
-                listener(
-                    RenderProgress(stage, part, fraction_done(stage, part), traced, shown, now)
-                )
+        on_stage = _stage_callback(progress or self.listener, began)
 
         on_stage(Stage.PREPARING, 0.0, 0, None)
         view = self._contact_view(contacts, resolution, skin)
-        camera, rays, scenes = view.camera, view.rays, view.scenes
-        placed, pressed = view.placed, view.pressed
+        camera = view.camera
         built = time.perf_counter()
 
         if estimator == SPPM:
-            layers = self._render_sppm(scenes, camera, rays, number, seconds, seed, began, on_stage)
+            layers = self._render_sppm(view, number, seconds, seed, began, on_stage)
         else:
             target = None if noise is None else noise / 100
             wanted = number
@@ -239,9 +217,9 @@ class OpticalModel(RayModel):
             on_stage(Stage.SHADING, 1.0, light[0].photons, light[0].noise)
             layers = render_cached(
                 light,
-                scenes,
+                view.scenes,
                 camera,
-                rays,
+                view.rays,
                 store.emitters,
                 seed,
                 SamplingPlan(only_contacts, pixel_importance, self.is_draft),
@@ -250,26 +228,7 @@ class OpticalModel(RayModel):
             layers.light_seconds = lit - built
         ended = time.perf_counter()
         on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
-        units = dict(zip(self._traced_groups, layers.radiance, strict=True))
-        markers = None
-        if self.design.markers is not None:
-            factor, markers = self._marked(layers, pressed, camera)
-            units = {name: layer * factor for name, layer in units.items()}
-        image = TactileImage(
-            layers={
-                name: layer * self.design.lights[name].channel_flux().astype(np.float32)
-                for name, layer in units.items()
-            },
-            unit_layers=units,
-            normals=layers.normals,
-            contact_mask=layers.contact_mask,
-            points=layers.points,
-            interrupted=layers.interrupted,
-            chain=self.picture_chain,
-            indenters=_named(contacts, placed),
-            pressed=pressed,
-            markers=markers,
-        )
+        image = self._image(layers, view, contacts)
         image.settings = {
             "design": self.design.name,
             "seed": seed,
@@ -286,7 +245,7 @@ class OpticalModel(RayModel):
             "interrupted": layers.interrupted,
             "contacts": [repr(contact) for contact in contacts],
             "skin": skin,
-            "presses": [] if pressed is None else pressed.in_numbers(),
+            "presses": [] if view.pressed is None else view.pressed.in_numbers(),
             "seconds": {
                 "scene": round(built - began, 4),
                 "light": round(layers.light_seconds, 4),
@@ -296,6 +255,31 @@ class OpticalModel(RayModel):
             "versions": versions(self.variant),
         }
         return image
+
+    def _image(
+        self, layers: ImageLayers, view: ContactView, contacts: Sequence[Contact]
+    ) -> TactileImage:
+        """Return the tactile image of an image's layers, with the markers of the skin."""
+        units = dict(zip(self._traced_groups, layers.radiance, strict=True))
+        markers = None
+        if self.design.markers is not None:
+            factor, markers = self._marked(layers, view.pressed, view.camera)
+            units = {name: layer * factor for name, layer in units.items()}
+        return TactileImage(
+            layers={
+                name: layer * self.design.lights[name].channel_flux().astype(np.float32)
+                for name, layer in units.items()
+            },
+            unit_layers=units,
+            normals=layers.normals,
+            contact_mask=layers.contact_mask,
+            points=layers.points,
+            interrupted=layers.interrupted,
+            chain=self.picture_chain,
+            indenters=_named(contacts, view.placed),
+            pressed=view.pressed,
+            markers=markers,
+        )
 
     def _contact_view(
         self, contacts: Sequence[Contact], resolution: tuple[int, int] | None, skin: str
@@ -341,9 +325,7 @@ class OpticalModel(RayModel):
 
     def _render_sppm(
         self,
-        scenes: ContactScenes,
-        camera: RayCamera,
-        rays: ChiefRays,
+        view: ContactView,
         photons: int | None,
         seconds: float | None,
         seed: int,
@@ -361,14 +343,45 @@ class OpticalModel(RayModel):
             return seconds is not None and time.perf_counter() - began > seconds
 
         result = render_sppm(
-            scenes.full,
+            view.scenes.full,
             Emission(self.scenes.emitter_table, self.guide(), per_light, seed),
-            camera,
+            view.camera,
             passes,
             coloured=self.scenes.coloured,
             stop=stop,
         )
-        return ImageLayers.from_sppm(result, rays, began)
+        return ImageLayers.from_sppm(result, view.rays, began)
+
+
+def _check_choices(estimator: str, skin: str, noise: float | None, seconds: float | None) -> None:
+    """Raise RenderError if a setting of `OpticalModel.render` is invalid."""
+    if estimator not in ESTIMATORS:
+        raise RenderError(
+            f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
+        )
+    if skin not in SKINS:
+        raise RenderError(f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS))
+    for name, value in (("noise", noise), ("seconds", seconds)):
+        if value is not None and not value > 0:
+            raise RenderError(
+                f"the limit '{name}' is {value}", hint="Give a number above 0, or none"
+            )
+
+
+def _stage_callback(
+    listener: Callable[[RenderProgress], None] | None, began: float
+) -> StageCallback:
+    """Return a function that tells a listener of each stage of a render that began at a time, s."""
+
+    def on_stage(stage: Stage, part: float, traced: int, reached: float | None) -> None:
+        if listener is not None:
+            noise = None if reached is None or not np.isfinite(reached) else 100 * reached
+            seconds = time.perf_counter() - began
+            listener(
+                RenderProgress(stage, part, fraction_done(stage, part), traced, noise, seconds)
+            )
+
+    return on_stage
 
 
 def _named(contacts: Sequence[Contact], placed: list[TriangleMesh]) -> dict[str, TriangleMesh]:
