@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from optisense.geometry import Contact
 from optisense.optics.scene.ray_scene import Ray
 from optisense.optics.transport.chief_rays import RayOutcome
-from optisense.optics.transport.interact import Path, interact
+from optisense.optics.transport.interact import RayKind, interact
 
 if TYPE_CHECKING:
     from optisense.optics._model import OpticalModel
@@ -69,7 +69,7 @@ def trace_paths(
     total = np.zeros(count, dtype=bool)
     ray = Ray(origin, direction, dr.full(mi.Bool, True, count))
     while (going := np.asarray(ray.active).astype(bool)).any():
-        step = interact(scene, ray, Path.CHIEF)
+        step = interact(scene, ray, RayKind.CHIEF)
         end = dr.select(step.hit.valid, step.hit.point, ray.origin + ESCAPE_LENGTH * ray.direction)
         dr.eval(step, end)
         points.append(_rows(end))

@@ -10,7 +10,13 @@ from reference_scenes import diffuse_coating, quad
 
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
-from optisense.optics.transport.interact import MAX_DEPTH, Interaction, LobeSample, Path, interact
+from optisense.optics.transport.interact import (
+    MAX_DEPTH,
+    Interaction,
+    LobeSample,
+    RayKind,
+    interact,
+)
 
 SINE = 0.6
 INDEX = 1.5
@@ -32,17 +38,17 @@ def slanting(depth: int = 0) -> Ray:
     return Ray(origin, direction, dr.full(mi.Bool, True, RAYS), dr.full(mi.UInt32, depth, RAYS))
 
 
-def met(surface: Surface, path: Path, depth: int = 0) -> Interaction:
+def met(surface: Surface, ray_kind: RayKind, depth: int = 0) -> Interaction:
     even = (dr.arange(mi.Float, RAYS) + 0.5) / RAYS
     place = mi.Point2f(0.5, 0.5) + dr.zeros(mi.Point2f, RAYS)
-    step = interact(wide(surface), slanting(depth), path, LobeSample(even, place))
+    step = interact(wide(surface), slanting(depth), ray_kind, LobeSample(even, place))
     dr.eval(step)
     return step
 
 
-@pytest.mark.parametrize("path", Path)
-def test_refraction_follows_snell_and_fresnel(path: Path) -> None:
-    step = met(Surface(SurfaceKind.DIELECTRIC, eta=INDEX), path)
+@pytest.mark.parametrize("ray_kind", RayKind)
+def test_refraction_follows_snell_and_fresnel(ray_kind: RayKind) -> None:
+    step = met(Surface(SurfaceKind.DIELECTRIC, eta=INDEX), ray_kind)
     turned = np.asarray(step.turned).astype(bool)
     way = np.asarray(step.ray.direction).T
     cos_i, cos_t = np.sqrt(1 - SINE**2), np.sqrt(1 - (SINE / INDEX) ** 2)
@@ -52,39 +58,41 @@ def test_refraction_follows_snell_and_fresnel(path: Path) -> None:
     along = (INDEX * cos_i - cos_t) / (INDEX * cos_i + cos_t)
     reflectance = (across**2 + along**2) / 2
     weight = np.asarray(step.lobe.weight)[0]
-    if path.draws:
+    if ray_kind.draws:
         assert turned.mean() == pytest.approx(reflectance, abs=1 / RAYS)
     else:
         assert not turned.any()
-    if path is Path.PHOTON:  # power is shared out by the draw
+    if ray_kind is RayKind.PHOTON:  # power is shared out by the draw
         assert np.allclose(weight, 1)
-    if path is Path.CAMERA:  # radiance in the denser medium is larger by the square of the index
+    if (
+        ray_kind is RayKind.CAMERA
+    ):  # radiance in the denser medium is larger by the square of the index
         assert np.allclose(weight, (1 - reflectance) / INDEX**2, rtol=1e-5)
         assert np.allclose(np.asarray(step.reflection.weight), reflectance, rtol=1e-5)
 
 
-@pytest.mark.parametrize("path", Path)
-def test_mirrors_reflect_to_the_same_place_with_the_same_weight(path: Path) -> None:
-    step = met(SILVER, path)
+@pytest.mark.parametrize("ray_kind", RayKind)
+def test_mirrors_reflect_to_the_same_place_with_the_same_weight(ray_kind: RayKind) -> None:
+    step = met(SILVER, ray_kind)
     cosine = np.sqrt(1 - SINE**2)
     assert np.allclose(np.asarray(step.ray.direction).T, (SINE, 0, cosine), atol=1e-6)
     assert (np.asarray(step.ray.origin)[2] > 0).all()
-    if path is not Path.CHIEF:
-        expected = met(SILVER, Path.PHOTON).lobe.weight
+    if ray_kind is not RayKind.CHIEF:
+        expected = met(SILVER, RayKind.PHOTON).lobe.weight
         assert np.array_equal(np.asarray(step.lobe.weight), np.asarray(expected))
         assert 0.9 < float(step.lobe.weight[0][0]) < 1
 
 
-@pytest.mark.parametrize("path", Path)
-def test_only_photons_go_on_from_opaque_surfaces(path: Path) -> None:
-    step = met(diffuse_coating(0.5), path)
+@pytest.mark.parametrize("ray_kind", RayKind)
+def test_only_photons_go_on_from_opaque_surfaces(ray_kind: RayKind) -> None:
+    step = met(diffuse_coating(0.5), ray_kind)
     assert dr.all(step.sensed)
-    assert dr.all(step.ray.active == (path is Path.PHOTON))
-    if path is Path.PHOTON:
+    assert dr.all(step.ray.active == (ray_kind is RayKind.PHOTON))
+    if ray_kind is RayKind.PHOTON:
         assert np.allclose(np.asarray(step.lobe.weight), 0.5)
 
 
-@pytest.mark.parametrize("path", Path)
-def test_every_ray_is_given_up_after_the_same_number_of_surfaces(path: Path) -> None:
-    assert dr.all(met(SILVER, path, MAX_DEPTH - 2).ray.active)
-    assert not dr.any(met(SILVER, path, MAX_DEPTH - 1).ray.active)
+@pytest.mark.parametrize("ray_kind", RayKind)
+def test_every_ray_is_given_up_after_the_same_number_of_surfaces(ray_kind: RayKind) -> None:
+    assert dr.all(met(SILVER, ray_kind, MAX_DEPTH - 2).ray.active)
+    assert not dr.any(met(SILVER, ray_kind, MAX_DEPTH - 1).ray.active)

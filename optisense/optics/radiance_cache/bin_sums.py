@@ -53,7 +53,7 @@ def sum_bins(
     scenes: ContactScenes,
     at: ShadingPoints,
     shadow_rays: mi.Float,
-    sky: mi.Float,
+    horizon: mi.Float,
 ) -> list[mi.Color3f]:
     """Return the radiance (3, n) towards the camera due to the direction bins, for each group.
 
@@ -71,7 +71,7 @@ def sum_bins(
         scenes: the scenes of the image, with indenters.
         at: the points.
         shadow_rays: number of shadow rays of each point and light group.
-        sky: the occluder horizon (n,) of each point (see `occluder_horizon`).
+        horizon: the occluder horizon (n,) of each point (see `occluder_horizon`).
     """
     moments, heights, colours = light.tables
     upper, groups, bins, points = light.above, light.groups, light.bins, at.seen
@@ -125,7 +125,7 @@ def sum_bins(
                 half_width = dr.select(raised, cosine_half_width(beam, points.normal, upright), 0)
                 reflected = _reflected(light, at, beam, cosine, half_width)
                 sine = dr.dot(upright, towards)
-                doubtful = sine - dr.sqrt(squared_radius(cosine)) < sky
+                doubtful = sine - dr.sqrt(squared_radius(cosine)) < horizon
                 weight = dr.select(doubtful, mi.Float(0), 1)
                 share = dr.abs(value.w) * grey(reflected) / steps[g]
                 before = dr.floor(running[g])

@@ -195,7 +195,7 @@ def light_of(cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> 
     """Return the light (3, n) of the cache that places reflect towards the points that see them,
     for each light group.
     """
-    sky = occluder_horizon(
+    horizon = occluder_horizon(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
         at.seen.point,
@@ -203,4 +203,4 @@ def light_of(cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> 
         at.raised & dr.opaque(mi.Bool, scenes.convex),
     )
     rays = dr.opaque(mi.Float, PLACE_SHADOW_RAYS)
-    return sum_bins(cache.binned, scenes, at, rays, sky)
+    return sum_bins(cache.binned, scenes, at, rays, horizon)

@@ -30,7 +30,7 @@ from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, follow, generator
-from optisense.optics.transport.interact import Path
+from optisense.optics.transport.interact import RayKind
 
 MIN_LANES = 2
 """Lower bound on the number of places that are shaded at once, as Dr.Jit compiles other kernels for
@@ -102,7 +102,7 @@ def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEn
     ray.active &= first.valid & (kind == int(SurfaceKind.DIELECTRIC))
     if scene.absorbing:
         ray.absorption = mi.Color3f(0) if scenes.absorption is None else scenes.absorption
-    end, branch, rest = follow(scene, ray, weight, generator(bits), Path.CAMERA)
+    end, branch, rest = follow(scene, ray, weight, generator(bits), RayKind.CAMERA)
     number = dr.arange(mi.UInt32, dr.width(points.pixel))
     dr.eval(end, branch, rest, number, bits)
     yield end, number
@@ -114,7 +114,7 @@ def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEn
         gathered(branch, lanes),
         dr.gather(mi.Color3f, rest, lanes),
         generator(dr.gather(mi.UInt32, bits, lanes) * 69069),
-        Path.REFLECTION,
+        RayKind.REFLECTION,
     )
     dr.eval(again)
     yield again, lanes

@@ -74,14 +74,14 @@ def shade_in_contacts(
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, cache.metallic)
     at = ShadingPoints(points, coating, start, cell, shift, active, raised)
-    sky = occluder_horizon(
+    horizon = occluder_horizon(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
         points.point,
         plane_of(cache.binned.cells, cell, active)[0],
         raised & dr.opaque(mi.Bool, scenes.convex),
     )
-    far = sum_bins(cache.binned, scenes, at, dr.opaque(mi.Float, CONTACT_SHADOW_RAYS), sky)
+    far = sum_bins(cache.binned, scenes, at, dr.opaque(mi.Float, CONTACT_SHADOW_RAYS), horizon)
     if not interreflection:
         return far, None
     between = glossy_interreflection if cache.metallic else interreflected

@@ -24,7 +24,7 @@ from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.transport.chief_rays import trace_path_codes
-from optisense.optics.transport.interact import Path, interact
+from optisense.optics.transport.interact import RayKind, interact
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -123,7 +123,7 @@ def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[Pa
     active = dr.full(mi.Bool, True, dr.width(direction))
     ray = Ray(dr.detach(origin), dr.detach(direction), active)
     while dr.any(ray.active):
-        step = interact(scene, ray, Path.CHIEF)
+        step = interact(scene, ray, RayKind.CHIEF)
         hit = step.hit
         bent = hit.shading_normal != hit.normal
         stop = PathVertex(

@@ -18,7 +18,7 @@ from optisense.optics.backend.sequences import folded_lattice, sequence_2d
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.bsdf import grey, surface_light
 from optisense.optics.scene.ray_scene import Ray, RayScene, leave
-from optisense.optics.transport.interact import LobeSample, Path, interact
+from optisense.optics.transport.interact import LobeSample, RayKind, interact
 
 
 @dataclass
@@ -66,7 +66,7 @@ class VisiblePoints(PathEnd):
 
 @dr.syntax
 def follow(
-    scene: RayScene, ray: Ray, weight: mi.Color3f, rng: mi.PCG32, path: Path
+    scene: RayScene, ray: Ray, weight: mi.Color3f, rng: mi.PCG32, ray_kind: RayKind
 ) -> tuple[PathEnd, Ray, mi.Color3f]:
     """Follow paths to their ends.
 
@@ -75,7 +75,7 @@ def follow(
         ray: the rays that the paths begin with.
         weight: factor (3, n) on the radiance at the paths' beginnings.
         rng: a random generator for each path.
-        path: the kind of the rays, `Path.CAMERA` or `Path.REFLECTION`.
+        ray_kind: the kind of the rays, `RayKind.CAMERA` or `RayKind.REFLECTION`.
 
     Returns:
         The ends; and for each path from the camera one of its reflections at interfaces, drawn in
@@ -94,11 +94,11 @@ def follow(
     branch_absorption = ray.absorption
     while ray.active:
         sample = None
-        if dr.hint(path.draws or scene.rough, mode="scalar"):
+        if dr.hint(ray_kind.draws or scene.rough, mode="scalar"):
             sample = LobeSample(rng.next_float32())
             if dr.hint(scene.rough, mode="scalar"):
                 sample.place = mi.Point2f(rng.next_float32(), rng.next_float32())
-        step = interact(scene, ray, path, sample)
+        step = interact(scene, ray, ray_kind, sample)
         hit = step.hit
         seen = step.opaque
         ends = seen | step.light
@@ -111,7 +111,7 @@ def follow(
         surface = dr.select(seen, hit.surface, surface)
         found |= seen
         weight *= step.transmittance
-        if dr.hint(path is Path.CAMERA, mode="scalar"):
+        if dr.hint(ray_kind is RayKind.CAMERA, mode="scalar"):
             branch = weight * step.reflection.weight
             total += branch
             chosen = dr.max(branch) > 0
@@ -204,7 +204,7 @@ def find_visible_points(
     if channel is not None:
         start.channel = dr.opaque(mi.UInt32, channel, dr.width(film))
         weight = mi.Color3f(*(dr.select(start.channel == k, mi.Float(1), 0) for k in range(3)))
-    end, branch, total = follow(scene, start, weight, generator(own), Path.CAMERA)
+    end, branch, total = follow(scene, start, weight, generator(own), RayKind.CAMERA)
     dr.eval(end, branch, total, own, other, series)
     main = VisiblePoints(**vars(end), pixel=pixel, random=own, series=series, number=number)
     if only_main:
@@ -218,7 +218,7 @@ def find_visible_points(
         gathered(branch, lanes),
         dr.gather(mi.Color3f, total, lanes),
         generator(other),
-        Path.REFLECTION,
+        RayKind.REFLECTION,
     )
     dr.eval(end, other, series, number)
     kept = dr.compress(end.valid | (end.light > 0))

@@ -16,7 +16,7 @@ from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surfaces import Region
-from optisense.optics.transport.interact import Path, interact
+from optisense.optics.transport.interact import RayKind, interact
 
 HASH_FACTOR = 0x9E3779B1
 """Multiplier that mixes the patches of a ray's path into one number: 2^32 over the golden ratio,
@@ -85,7 +85,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
     mirrors = mi.UInt32(0)
     path = mi.UInt32(0)
     while ray.active:
-        step = interact(scene, ray, Path.CHIEF)
+        step = interact(scene, ray, RayKind.CHIEF)
         hit = step.hit
         outcome = dr.select(ray.active & ~hit.valid, int(RayOutcome.ESCAPED), outcome)
         outcome = dr.select(step.ended, int(RayOutcome.ABSORBED), outcome)

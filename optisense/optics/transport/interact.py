@@ -37,7 +37,7 @@ symmetry leaves components of 1e-16 and less, with which Embree misses triangles
 of 160 in the middle row. A ray of 1 m length moves by 1e-9 mm."""
 
 
-class Path(Enum):
+class RayKind(Enum):
     """The kind of a ray, which decides the quantity it carries and the lobe it follows."""
 
     PHOTON = 0  # carries power; a lobe is drawn, and opaque surfaces scatter
@@ -48,24 +48,24 @@ class Path(Enum):
     @property
     def draws(self) -> bool:
         """Whether the lobe of a smooth interface is drawn in proportion to its reflectance."""
-        return self in (Path.PHOTON, Path.REFLECTION)
+        return self in (RayKind.PHOTON, RayKind.REFLECTION)
 
     @property
     def scatters(self) -> bool:
         """Whether rays continue from opaque surfaces; others end there."""
-        return self is Path.PHOTON
+        return self is RayKind.PHOTON
 
     @property
     def carries_radiance(self) -> bool:
         """Whether weights count radiance, which changes with the square of the index."""
-        return self in (Path.CAMERA, Path.REFLECTION)
+        return self in (RayKind.CAMERA, RayKind.REFLECTION)
 
     @property
     def is_coherent(self) -> bool:
         """Whether rays of neighbouring lanes are similar, which lets the ray tracer handle them
         faster.
         """
-        return self in (Path.CAMERA, Path.CHIEF)
+        return self in (RayKind.CAMERA, RayKind.CHIEF)
 
 
 @dataclass
@@ -161,18 +161,18 @@ def _media(
 
 @dr.syntax
 def interact(
-    scene: RayScene, ray: Ray, path: Path, sample: LobeSample | None = None
+    scene: RayScene, ray: Ray, ray_kind: RayKind, sample: LobeSample | None = None
 ) -> Interaction:
     """Follow rays to the next surface and compute how they continue; symbolic loops may call it.
 
     Args:
         scene: the surfaces.
         ray: the rays.
-        path: the kind of the rays.
+        ray_kind: the kind of the rays.
         sample: random numbers; not needed for chief rays, nor for camera rays in smooth scenes.
     """
     drawn = LobeSample() if sample is None else sample
-    hit = scene.intersect(ray, path.is_coherent)
+    hit = scene.intersect(ray, ray_kind.is_coherent)
     side = -dr.sign(dr.dot(ray.direction, hit.normal))
     kind, eta, alpha = surface_kind(scene.table, hit.surface, hit.valid)
     region = surface_region(scene.table, hit.surface, hit.valid)
@@ -186,13 +186,13 @@ def interact(
     sensed = opaque & (region != int(Region.OTHER))
     scattered = mirror
     goes_on = interface | mirror
-    if dr.hint(path.scatters, mode="scalar"):
+    if dr.hint(ray_kind.scatters, mode="scalar"):
         scattered = mirror | opaque
         goes_on = goes_on | opaque
 
     reflectance, reflected, transmitted, relative = refract(ray.direction, hit.shading_normal, eta)
     totally = interface & (reflectance >= 1)
-    if dr.hint(path.draws, mode="scalar"):
+    if dr.hint(ray_kind.draws, mode="scalar"):
         through = drawn.pick >= reflectance
         passed = mi.Float(1)
         beside = mi.Float(0)
@@ -203,22 +203,22 @@ def interact(
     turned = goes_on & (mirror | ~through)
     outgoing = dr.select(turned, reflected, transmitted)
     weight = mi.Color3f(1)
-    if dr.hint(path.carries_radiance, mode="scalar"):
+    if dr.hint(ray_kind.carries_radiance, mode="scalar"):
         weight = mi.Color3f(dr.select(through, passed / (relative * relative), passed))
-    if dr.hint(scene.rough and path is not Path.CHIEF, mode="scalar"):  # noqa: SIM102
+    if dr.hint(scene.rough and ray_kind is not RayKind.CHIEF, mode="scalar"):  # noqa: SIM102
         if interface & (alpha > SMOOTH_ALPHA):
             outgoing, kept, _through, ratio = sample_rough_interface(
                 ray.direction, hit.shading_normal, eta, alpha, drawn.pick, drawn.place
             )
-            if dr.hint(path.carries_radiance, mode="scalar"):
+            if dr.hint(ray_kind.carries_radiance, mode="scalar"):
                 kept = kept / (ratio * ratio)
             weight = mi.Color3f(kept)
-    if dr.hint(path is not Path.CHIEF, mode="scalar"):  # noqa: SIM102
+    if dr.hint(ray_kind is not RayKind.CHIEF, mode="scalar"):  # noqa: SIM102
         if scattered:
             coating = coating_of(scene.table, hit.surface, scattered)
             cosine = dr.abs(dr.dot(ray.direction, hit.shading_normal))
             weight = fresnel_metal(cosine, coating.metal_eta, coating.metal_k)
-            if dr.hint(path.scatters, mode="scalar"):
+            if dr.hint(ray_kind.scatters, mode="scalar"):
                 spread, albedo = sample_coating(
                     coating,
                     hit.shading_normal * side,
@@ -230,14 +230,14 @@ def interact(
                 outgoing = dr.select(mirror, outgoing, spread)
 
     direction = dr.normalize(outgoing)
-    if dr.hint(path.is_coherent, mode="scalar"):
+    if dr.hint(ray_kind.is_coherent, mode="scalar"):
         direction = mi.Vector3f(
             *(dr.select(dr.abs(each) < LEAST_COMPONENT, 0, each) for each in direction)
         )
     depth = ray.depth + 1
     transmittance = mi.Color3f(1)
     here = absorption = ray.absorption
-    if dr.hint(scene.absorbing and path is not Path.CHIEF, mode="scalar"):
+    if dr.hint(scene.absorbing and ray_kind is not RayKind.CHIEF, mode="scalar"):
         media = _media(scene, ray, hit, side, interface)
         transmittance = dr.exp(-media.here * dr.select(hit.valid, hit.distance, 0))
         leaving = dr.select(dr.dot(direction, hit.normal) > 0, media.before, media.behind)

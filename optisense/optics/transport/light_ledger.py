@@ -22,7 +22,7 @@ from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.interact import Interaction, LobeSample, Path, interact
+from optisense.optics.transport.interact import Interaction, LobeSample, RayKind, interact
 from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import Emission, TargetCells, launch
 
@@ -191,7 +191,7 @@ def _follow(
     side = mi.UInt32(int(Fate.BEFORE))
     while ray.active:
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
-        step = interact(scene, ray, Path.PHOTON, sample)
+        step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
         if dr.hint(scene.absorbing, mode="scalar"):
             bound, side = medium_before(step, bound, side)

@@ -21,7 +21,7 @@ from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, Path, interact
+from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, RayKind, interact
 from optisense.optics.transport.light_ledger import Fate, medium_after, medium_before
 from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import Emission, TargetCells, launch
@@ -103,7 +103,7 @@ def _follow(
     side = mi.UInt32(int(Fate.BEFORE))
     while ray.active:
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
-        step = interact(scene, ray, Path.PHOTON, sample)
+        step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
         end = dr.select(hit.valid, hit.point, ray.origin + ESCAPE_LENGTH * ray.direction)
         stopped = mi.Bool(False)

@@ -20,7 +20,7 @@ from optisense.optics.scene.emitters import EmitterTable, emit
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 from optisense.optics.transport.emission_guide import GUIDE_CELLS, EmissionGuide, warp
-from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, Path, interact
+from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, RayKind, interact
 from optisense.optics.transport.photon_map import (
     HALF_SHIFT,
     SURFACE_SHIFT,
@@ -186,7 +186,7 @@ def _fly(
     rng = mi.PCG32(initstate=seed, initseq=mi.UInt64(flight.number))
     while ray.active & (ray.depth < limit):
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
-        step = interact(scene, ray, Path.PHOTON, sample)
+        step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
         if recording.flux_layer is not None:
             # Light that leaves an opaque surface and meets no other is handled by

@@ -21,7 +21,7 @@ from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.interact import LobeSample, Path, interact
+from optisense.optics.transport.interact import LobeSample, RayKind, interact
 from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, Flight, TargetCells, launch
 
@@ -102,7 +102,7 @@ def _count(
     way = mi.UInt32(0)
     while ray.active:
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
-        step = interact(scene, ray, Path.PHOTON, sample)
+        step = interact(scene, ray, RayKind.PHOTON, sample)
         power *= step.transmittance
         offset = mi.Vector3f(step.hit.point) - middle
         lands = step.sensed & (dr.squared_norm(offset) < tally.radius * tally.radius)
