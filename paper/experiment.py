@@ -63,8 +63,8 @@ class Experiment:
         tables: returns the tables for readers, from the numbers.
         draw: returns the figure, from the numbers and the pictures.
         notes: returns remarks for readers, paragraphs of Markdown, from the numbers.
-        again: whether its statements are also those of other experiments; the page then counts
-            them once.
+        repeats_claims: whether its claims are also those of other experiments; the page then
+            counts them once.
     """
 
     name: str
@@ -75,7 +75,7 @@ class Experiment:
     tables: Callable[[Values], list[Table]]
     draw: Callable[[Values, Pictures], Figure]
     notes: Callable[[Values], list[str]] = lambda numbers: []
-    again: bool = False
+    repeats_claims: bool = False
 
     def settings(self, quick: bool = False, seeds: int | None = None) -> Values:
         """Return the settings of its YAML file, with those of a quick run and the number of seeds.

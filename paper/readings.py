@@ -350,5 +350,5 @@ EXPERIMENT = Experiment(
     tables=tables,
     draw=draw,
     notes=notes,
-    again=True,
+    repeats_claims=True,
 )

@@ -126,7 +126,7 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         chapters.append(chapter(experiment, result, f"{beside.name}/{name}.png"))
         spent |= result["spent"]
         verdicts = [claim["verdict"] for claim in result["claims"]]
-        for verdict in () if experiment.again else verdicts:
+        for verdict in () if experiment.repeats_claims else verdicts:
             counts[verdict] += 1
         counts_text = ", ".join(_counted(verdicts.count(v), v) for v in counts if v in verdicts)
         rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {counts_text} |")

@@ -204,8 +204,8 @@ def gelsight360(size: GelSight360Dimensions) -> SensorDesign:
         _solids(shape, (size.gel_thickness, size.shell_thickness), dome, size.tessellation),
         boards=boards.mesh(),
     )
-    said = ("light_colours", "tip_design", "resin_design")
-    size.describe(design, said)
+    mentioned = ("light_colours", "tip_design", "resin_design")
+    size.describe(design, mentioned)
     return design
 
 

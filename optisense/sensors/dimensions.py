@@ -52,16 +52,16 @@ class Dimensions(BaseModel):
 
     sensor: ClassVar[str]
 
-    def describe(self, design: SensorDesign, said: tuple[str, ...] = ()) -> None:
+    def describe(self, design: SensorDesign, mentioned: tuple[str, ...] = ()) -> None:
         """Add to a design's description which dimensions differ from their defaults.
 
         Args:
             design: design that was built.
-            said: names of dimensions that the description mentions already.
+            mentioned: names of dimensions that the description mentions already.
         """
         defaults = {name: field.default for name, field in type(self).model_fields.items()}
         given = {name: getattr(self, name) for name in self.model_fields_set}
-        describe_changes(design, given, defaults, said)
+        describe_changes(design, given, defaults, mentioned)
 
 
 D = TypeVar("D", bound=Dimensions)
@@ -159,7 +159,7 @@ def describe_changes(
     design: SensorDesign,
     given: Mapping[str, Any],
     defaults: Mapping[str, Any],
-    said: tuple[str, ...] = (),
+    mentioned: tuple[str, ...] = (),
 ) -> None:
     """Add to a design's description which dimensions differ from their defaults.
 
@@ -169,12 +169,12 @@ def describe_changes(
         design: design that was built.
         given: dimensions by name; those without a default are left out.
         defaults: default dimensions by name.
-        said: names of dimensions that the description mentions already.
+        mentioned: names of dimensions that the description mentions already.
     """
     changed = [
         f"{name} {given[name]:g}" if isinstance(given[name], float) else f"{name} {given[name]}"
         for name in defaults
-        if name in given and name not in said and given[name] != defaults[name]
+        if name in given and name not in mentioned and given[name] != defaults[name]
     ]
     if changed:
         design.description += f"; chosen: {', '.join(changed)}"
