@@ -125,8 +125,9 @@ def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
             f"'{path}' does not exist: {here} is a single value",
             hint=f"End the path at {here}",
         )
+    missing = f"{here} has no '{step}'"
     raise DesignError(
-        f"'{path}' does not exist: {here} has no '{step}'",
+        missing if path == step else f"'{path}' does not exist: {missing}",
         hint=suggestion(str(step), known, limit=20),
     )
 
