@@ -11,7 +11,7 @@ from optisense.geometry.objects import OBJECTS
 from optisense.report._files import page
 from optisense.report.drawing import AMBER, BLUE, GREY, RED, figure_uri, legend_above, new_figure
 from optisense.report.pictures import data_uri, normal_colours
-from optisense.tasks.paired_bootstrap import BETTER, UNKNOWN, WORSE, ErrorChange
+from optisense.tasks.paired_bootstrap import BETTER, INCONCLUSIVE, WORSE, ErrorChange
 from optisense.tasks.press_readings import PressPictures
 from optisense.tasks.verification import Verification
 
@@ -46,7 +46,7 @@ def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]
         first=found.names[0],
         second=found.names[1],
         verdict=found.verdict,
-        kind={BETTER: "good", WORSE: "bad", UNKNOWN: "open"}[found.verdict],
+        kind={BETTER: "good", WORSE: "bad", INCONCLUSIVE: "open"}[found.verdict],
         in_words=found.in_words(),
         notes=found.notes(),
         headline=[
@@ -81,7 +81,7 @@ def change_figure(found: Verification) -> Figure:
         axes.plot(values, np.full(len(values), row), "o", ms=4, color=BLUE, alpha=0.45)
     axes.plot(change.mean(axis=1), range(len(names)), "D", ms=6, color=BLUE, label="object")
     mean = found.normal_change
-    colour = {BETTER: "#2e8b57", WORSE: RED, UNKNOWN: AMBER}[mean.verdict]
+    colour = {BETTER: "#2e8b57", WORSE: RED, INCONCLUSIVE: AMBER}[mean.verdict]
     axes.plot([mean.low, mean.high], [len(names)] * 2, color=colour, lw=3)
     axes.plot(mean.change, len(names), "D", ms=8, color=colour, label="mean and 95 % interval")
     axes.axvline(0.0, color=GREY, lw=1.2, ls="--")

@@ -20,7 +20,7 @@ LEAST_OBJECTS = 6
 have the same sign once in 16 times, and of 6 objects once in 32, which is below the 5 per cent of
 the interval."""
 
-BETTER, WORSE, UNKNOWN = "better", "worse", "cannot be told"
+BETTER, WORSE, INCONCLUSIVE = "better", "worse", "inconclusive"
 
 
 @dataclass(frozen=True)
@@ -48,12 +48,12 @@ class ErrorChange:
 
     @property
     def verdict(self) -> str:
-        """The verdict on the second sensor: BETTER, WORSE or UNKNOWN."""
+        """The verdict on the second sensor: BETTER, WORSE or INCONCLUSIVE."""
         if self.objects < LEAST_OBJECTS:
-            return UNKNOWN
+            return INCONCLUSIVE
         if self.high < 0.0:
             return BETTER
-        return WORSE if self.low > 0.0 else UNKNOWN
+        return WORSE if self.low > 0.0 else INCONCLUSIVE
 
     def to_dict(self) -> dict[str, float | str | int]:
         """Return all values, ready for JSON."""

@@ -23,8 +23,8 @@ from optisense.tasks._draws import PLACES_SEEN
 from optisense.tasks._unseen_presses import UnseenPress, choose_presses
 from optisense.tasks.paired_bootstrap import (
     BETTER,
+    INCONCLUSIVE,
     LEAST_OBJECTS,
-    UNKNOWN,
     WORSE,
     ErrorChange,
     error_change,
@@ -143,13 +143,13 @@ class Verification:
 
     @property
     def verdict(self) -> str:
-        """The verdict BETTER, WORSE or UNKNOWN: that of the normals, unless depth has the opposite
-        one.
+        """The verdict: BETTER, WORSE or INCONCLUSIVE.
 
-        Normals are measured by a camera-based sensor directly; depth is integrated from them.
+        It is that of the normals, unless depth has the opposite one. A camera-based sensor measures
+        normals directly; depth is integrated from them.
         """
         normals, depth = self.normal_change.verdict, self.depth_change.verdict
-        return UNKNOWN if {normals, depth} == {BETTER, WORSE} else normals
+        return INCONCLUSIVE if {normals, depth} == {BETTER, WORSE} else normals
 
     def in_words(self) -> str:
         """The verdict as a sentence with its numbers."""
@@ -160,18 +160,18 @@ class Verification:
             f"{normals.before:.1f} (95 % interval of the change {normals.low:+.1f} to "
             f"{normals.high:+.1f})"
         )
-        if self.verdict != UNKNOWN:
+        if self.verdict != INCONCLUSIVE:
             beside = {
-                UNKNOWN: "the errors of depth do not differ measurably",
+                INCONCLUSIVE: "the errors of depth do not differ measurably",
                 self.verdict: f"that of depth {depth.after:.3f} mm instead of {depth.before:.3f}",
             }[depth.verdict]
             return f"{second} reads {self.verdict}: {numbers}, {beside}"
-        if normals.verdict != UNKNOWN:
+        if normals.verdict != INCONCLUSIVE:
             return (
-                f"Whether {second} reads better cannot be told: {numbers}, but that of depth "
+                f"It is inconclusive whether {second} reads better: {numbers}, but that of depth "
                 f"{depth.after:.3f} mm instead of {depth.before:.3f}"
             )
-        return f"Whether {second} reads better cannot be told: {numbers}"
+        return f"It is inconclusive whether {second} reads better: {numbers}"
 
     def notes(self) -> list[str]:
         """Remarks on the procedure for the user, as sentences without a full stop."""

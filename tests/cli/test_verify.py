@@ -43,12 +43,12 @@ def test_a_study_is_compared_with_its_start(study: Path, tmp_path: Path) -> None
     assert "error of normals" in text
     assert "the start" in text
     assert "a verdict needs 6 or more objects, and there were 1" in told
-    assert "cannot be told" in told
+    assert "inconclusive" in told
     page = (tmp_path / "proof" / "verify.html").read_text()
-    assert "Cannot be told" in page
+    assert "Inconclusive" in page
     assert OBJECTS["nut"].help in page
     values = json.loads((tmp_path / "proof" / "verify.json").read_text())
-    assert values["verdict"] == "cannot be told"
+    assert values["verdict"] == "inconclusive"
     assert values["before"]["name"] == "the start"
     assert values["after"]["name"].startswith("trial ")
     assert values["normals"]["before"] > 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.tasks.paired_bootstrap import BETTER, UNKNOWN, WORSE, error_change
+from optisense.tasks.paired_bootstrap import BETTER, INCONCLUSIVE, WORSE, error_change
 
 
 def test_a_constant_difference_is_told_exactly() -> None:
@@ -21,19 +21,19 @@ def test_equal_errors_tell_nothing() -> None:
     errors = np.random.default_rng(1).uniform(5.0, 20.0, (8, 3, 2))
     found = error_change(errors, errors)
     assert found.low < 0.0 < found.high
-    assert found.verdict == UNKNOWN
+    assert found.verdict == INCONCLUSIVE
 
 
 def test_few_objects_tell_nothing_however_different() -> None:
     before = np.full((5, 9, 1), 20.0)
-    assert error_change(before, before / 2).verdict == UNKNOWN
+    assert error_change(before, before / 2).verdict == INCONCLUSIVE
 
 
 def test_the_luck_of_readers_widens_the_interval() -> None:
     errors = np.tile(np.linspace(5.0, 20.0, 8)[:, None, None], (1, 3, 3))
     lucky = errors + np.array([-1.0, 0.0, 1.0])
     assert error_change(errors, errors - 0.3).verdict == BETTER
-    assert error_change(lucky, lucky - 0.3).verdict == UNKNOWN
+    assert error_change(lucky, lucky - 0.3).verdict == INCONCLUSIVE
 
 
 def test_it_is_seldom_wrong_where_nothing_differs() -> None:
@@ -42,7 +42,7 @@ def test_it_is_seldom_wrong_where_nothing_differs() -> None:
     for number in range(200):
         objects, places = rng.normal(0.0, 1.0, (10, 1, 1)), rng.normal(0.0, 1.0, (10, 3, 1))
         difference = objects + places
-        wrong += error_change(np.zeros((10, 3, 1)), difference, seed=number).verdict != UNKNOWN
+        wrong += error_change(np.zeros((10, 3, 1)), difference, seed=number).verdict != INCONCLUSIVE
     # 5 per cent by construction; percentile intervals of 10 objects are a little too narrow.
     assert wrong <= 26
 
