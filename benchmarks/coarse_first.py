@@ -133,7 +133,7 @@ def searched(name: str, coarse: bool) -> dict[str, Any]:
     seconds += time.process_time() - before
     spent.write_text(json.dumps(seconds))
     if result.interrupted:
-        sys.exit(f"{folder.name} is paused: give the same command again")
+        sys.exit(f"{folder.name} is paused: run the same command to continue")
     full, best = study.evaluator(), result.best
     again = [full(best.vector, seed).scores[study.objective] for seed in NEW_SEEDS]
     return {
