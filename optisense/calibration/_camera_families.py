@@ -122,7 +122,7 @@ def shading(design: SensorDesign) -> list[FitQuantity]:
         blue = green if own.blue_falloff is None else own.blue_falloff
     found = [
         FitQuantity(
-            f"camera.shading.{name}", f"dimming of {letter} in the picture's corners", "", start,
+            f"camera.shading.{name}", f"lens shading of {letter} in the image corners", "", start,
             0.0, 0.95, FALLOFF_RANGE, home="camera.shading",
         )
         for channel, name, letter, start in (
@@ -131,7 +131,7 @@ def shading(design: SensorDesign) -> list[FitQuantity]:
         if channel in lit
     ]  # fmt: skip
     outwards = FitQuantity(
-        "camera.shading.power", "exponent of the dimming by the distance from the middle", "",
+        "camera.shading.power", "exponent of the lens shading by the distance from the middle", "",
         power, 1.0, 8.0, SHADING_RANGE, True, home="camera.shading",
     )  # fmt: skip
     return [*found, outwards]

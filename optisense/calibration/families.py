@@ -252,7 +252,7 @@ FAMILIES = {
     "black": Family(
         "level of each channel in the dark: black level and stray light", _camera_families.black
     ),
-    "shading": Family("dimming of the picture's corners", _camera_families.shading),
+    "shading": Family("strength and exponent of the lens shading", _camera_families.shading),
     "view": Family("field of view", _camera_families.view),
     "place": Family("place of the camera across its axis", _camera_families.place),
     "pose": Family(

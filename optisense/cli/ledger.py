@@ -131,12 +131,14 @@ def _print_place(place: PlaceLight) -> None:
         shares = [each.ways[words] for each in groups]
         if max(shares) >= LEAST_SHOWN:
             table.add_row(f"{words} (%)", *(f"{100 * share:.1f}" for share in shares))
-    table.add_row("off the normal (degrees)", *(f"{each.mean_angle:.0f}" for each in groups))
-    table.add_row("mostly from (degrees)", *(f"{each.main_azimuth:.0f}" for each in groups))
+    table.add_row(
+        "mean angle to the normal (degrees)", *(f"{each.mean_angle:.0f}" for each in groups)
+    )
+    table.add_row("main azimuth (degrees)", *(f"{each.main_azimuth:.0f}" for each in groups))
     output.print(table)
     worst = max(each.noise for each in groups)
     output.print(
-        f"noise of the irradiance: at most {100 * worst:.2g} %; directions from 0 = right of the "
-        "picture, 90 = top",
+        f"noise of the irradiance: at most {100 * worst:.2g} %; azimuths are 0 at the right of the "
+        "image and 90 at its top",
         style="dim",
     )

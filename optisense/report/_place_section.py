@@ -104,7 +104,7 @@ def _sky(sky: NDArray[np.float64]) -> list[dict[str, str]]:
                 f"L{dx:.1f} {dy:.1f}A{inner:.1f} {inner:.1f} 0 0 1 {ax:.1f} {ay:.1f}Z",
                 "opacity": f"{np.sqrt(density[tilt, turn] / most):.2f}",
                 "title": f"{100 * sky[tilt, turn]:.1f} % from {10 * tilt} to {10 * (tilt + 1)}° "
-                f"off the normal, {30 * turn} to {30 * (turn + 1)}° from the picture's right",
+                f"to the normal, azimuth {30 * turn} to {30 * (turn + 1)}°",
             }
         )
     return found
