@@ -46,6 +46,16 @@ GelSight Mini."""
     needs=f"{LEAST_PIXELS} pixels that see the surface",
     rays_only=True,
     usual=USUAL,
+    numbers=(
+        "coverage",
+        "coverage_by_area",
+        "mean_cosine",
+        "mean_cosine_of_rays_that_arrive",
+        "pixels_that_see_the_surface",
+        "pixels",
+        "triangles_seen",
+        "triangles",
+    ),
 )
 def aoap(
     evaluation: Evaluation, *, coverage_weight: float = COVERAGE_WEIGHT

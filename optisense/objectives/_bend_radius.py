@@ -34,7 +34,14 @@ SHARE = 0.01
 triangles at the border of a mesh would determine it."""
 
 
-@objective("bend_radius", title="Bend radius", range=(0.0, MOST_RADIUS), unit="mm", rays_only=True)
+@objective(
+    "bend_radius",
+    title="Bend radius",
+    range=(0.0, MOST_RADIUS),
+    unit="mm",
+    rays_only=True,
+    numbers=("sharpest",),
+)
 def bend_radius(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """The smallest radius of curvature of the parts that cages bend, in mm.
 

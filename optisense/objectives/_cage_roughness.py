@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     unit="mm",
     lower_is_better=True,
     rays_only=True,
+    numbers=("largest",),
 )
 def cage_roughness(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """The unevenness of the displacements of the control points of cages, in mm.

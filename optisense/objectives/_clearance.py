@@ -43,7 +43,14 @@ MOST_CLEARANCE = 1e4
 """Value (mm) if no two parts are apart: ten metres, larger than any sensor."""
 
 
-@objective("clearance", title="Clearance", range=(0.0, MOST_CLEARANCE), unit="mm", rays_only=True)
+@objective(
+    "clearance",
+    title="Clearance",
+    range=(0.0, MOST_CLEARANCE),
+    unit="mm",
+    rays_only=True,
+    numbers=(),
+)
 def clearance(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """The smallest distance between two parts that do not touch, in mm.
 

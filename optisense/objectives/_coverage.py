@@ -26,6 +26,7 @@ USUAL = (0.46, 0.83)
     range=(0.0, 1.0),
     rays_only=True,
     usual=USUAL,
+    numbers=("by_area", "area", "triangles_seen", "triangles", "pixels_that_see_the_surface"),
 )
 def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """The share of the sensing surface that the camera sees.

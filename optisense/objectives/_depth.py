@@ -17,6 +17,7 @@ from optisense.objectives._reader import (
     CAMERA_NOISE,
     LEAST_PIXELS,
     LEAST_PRESSES,
+    NUMBERS,
     ReadPress,
     pixels_to_read,
     read_presses,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     needs=f"{LEAST_PRESSES} presses or more, each seen, with {LEAST_PIXELS} pixels",
     unit="mm",
     lower_is_better=True,
+    numbers=NUMBERS,
 )
 def depth(
     evaluation: Evaluation, *, camera_noise: float = CAMERA_NOISE

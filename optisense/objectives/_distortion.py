@@ -50,6 +50,14 @@ USUAL = (1.24, 1.01)
     lower_is_better=True,
     rays_only=True,
     usual=USUAL,
+    numbers=(
+        "area_variation",
+        "of_one_pixel_in_20",
+        "mean_length",
+        "mean_width",
+        "footprints",
+        "pixels_that_see_the_surface",
+    ),
 )
 def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """The ratio of length to width of a pixel's footprint on the sensing surface.

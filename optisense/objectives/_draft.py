@@ -16,7 +16,14 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 
-@objective("draft", title="Draft", range=(-90.0, 90.0), unit="degrees", rays_only=True)
+@objective(
+    "draft",
+    title="Draft",
+    range=(-90.0, 90.0),
+    unit="degrees",
+    rays_only=True,
+    numbers=(),
+)
 def draft(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """The smallest draft angle of the sheets that cages bend, in degrees.
 

@@ -23,6 +23,7 @@ USUAL = (66.0, 4.5)
     lower_is_better=True,
     rays_only=True,
     usual=USUAL,
+    numbers=("lights",),
 )
 def power(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """The radiant flux, in mW, of all LEDs of the sensor.

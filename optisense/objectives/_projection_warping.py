@@ -65,6 +65,14 @@ USUAL = (1.2, 60.0)
     needs=f"{LEAST_TRIANGLES} triangles between pixels on the surface",
     rays_only=True,
     usual=USUAL,
+    numbers=(
+        "mean_area",
+        "standard_deviation",
+        "triangles",
+        "triangles_that_miss_the_surface",
+        "triangles_that_leap",
+        "pixels_that_see_the_surface",
+    ),
 )
 def projection_warping(
     evaluation: Evaluation, *, jump: float = JUMP

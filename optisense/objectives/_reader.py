@@ -44,6 +44,9 @@ LEAST_PRESSES = 4
 """Smallest number of presses: a fourth is read from three others, the fewest that determine the
 change of colours along two directions."""
 
+NUMBERS = ("reading_nothing", "worst_place", "mean_of_places")
+"""Names of the numbers of a summary of places."""
+
 _CAMERA = 11
 """Number that is hashed with the seed of the camera's noise, so that it is independent of other
 random draws. It is unique among the modules that use the same seed."""

@@ -11,6 +11,7 @@ from optisense.objectives._reader import (
     CAMERA_NOISE,
     LEAST_PIXELS,
     LEAST_PRESSES,
+    NUMBERS,
     pixels_to_read,
     read_presses,
     summarise_places,
@@ -37,6 +38,7 @@ USUAL = (23.0, 2.8)
     unit="degrees",
     lower_is_better=True,
     usual=USUAL,
+    numbers=(*NUMBERS, "level_skin"),
 )
 def reading(
     evaluation: Evaluation, *, camera_noise: float = CAMERA_NOISE

@@ -33,6 +33,7 @@ and several times the noise of an image's light."""
     range=(0.0, 1.0),
     needs="light on the skin beside the contacts",
     lower_is_better=True,
+    numbers=COLOURS,
 )
 def shadow(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """The share of the skin around a pressed ball that loses a colour.

@@ -39,6 +39,7 @@ USUAL = (0.27, 0.059)
     lower_is_better=True,
     rays_only=True,
     usual=USUAL,
+    numbers=("pixel", "blur", "finest", "coarsest", "footprints"),
 )
 def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """The width in mm of the finest lines on the skin that the camera resolves.

@@ -31,6 +31,7 @@ COLOURS = ("red", "green", "blue")
     reads=no_pixels,
     range=(0.0, 1.0),
     needs="light on the skin",
+    numbers=COLOURS,
 )
 def uniformity(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """The evenness of the light on the untouched skin: dim over bright, for the least even colour.

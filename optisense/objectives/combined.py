@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from optisense.objectives import _figures
 from optisense.objectives.expressions import Expression, ScoreTerm
 from optisense.objectives.named import is_plain
 from optisense.objectives.registry import Objective, find
+from optisense.objectives.score import numbers_of
 from optisense.objectives.scoring import run_objective
 
 if TYPE_CHECKING:
@@ -55,8 +56,13 @@ def combined(
 
     Raises:
         ObjectiveError: the expression names an unknown objective.
+        UnknownPartError: an objective has no such number among its parts.
     """
     terms = {name: (known or {}).get(name) or find(name) for name in expression.objectives}
+    for quantity in expression.quantities:
+        numbers = terms[quantity.objective].numbers
+        if numbers is not None:
+            _refuse_unknown_part(quantity, numbers)
     single = expression.single
 
     def function(evaluation: Evaluation, **settings: Any) -> tuple[float, dict[str, Any]]:
@@ -101,18 +107,25 @@ def _measured(
         score = scores[quantity.objective]
         values[quantity] = score.value
         if quantity.part:
-            numbers = {
-                key: float(value)
-                for key, value in score.parts.items()
-                if isinstance(value, int | float) and not isinstance(value, bool)
-            }
-            if quantity.part not in numbers:
-                raise UnknownPartError(
-                    f"{quantity.objective} has no part '{quantity.part}'",
-                    hint=suggestion(quantity.part, numbers, limit=30),
-                )
+            numbers = numbers_of(score.parts)
+            _refuse_unknown_part(quantity, numbers)
             values[quantity] = numbers[quantity.part]
     return values, {name: dict(score.parts) for name, score in scores.items()}
+
+
+def _refuse_unknown_part(quantity: ScoreTerm, numbers: Collection[str]) -> None:
+    """Refuse the name of a part that is not among the numbers of its objective.
+
+    Raises:
+        UnknownPartError: there is no such number.
+    """
+    if quantity.part and quantity.part not in numbers:
+        raise UnknownPartError(
+            f"{quantity.objective} has no part '{quantity.part}'",
+            hint=suggestion(quantity.part, numbers, limit=30)
+            if numbers
+            else "It has no parts that are numbers",
+        )
 
 
 def _reads(terms: Mapping[str, Objective]) -> Any:

@@ -117,6 +117,7 @@ designs in docs/experiments.md."""
     range=bounds,
     needs=f"each press seen, with {LEAST_PIXELS} indented pixels",
     usual=USUAL,
+    numbers=("theta_range", "phi_range"),
 )
 def normdiff(
     evaluation: Evaluation,

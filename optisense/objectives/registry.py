@@ -79,6 +79,8 @@ class Objective:
         rays_only: whether it traces chief rays only and needs no light.
         usual: the values of the poorest and of the best built-in sensor, for comparison; None if
             they are not known.
+        numbers: names of all its parts that are numbers, which an expression can use, such as
+            "coverage" in ``aoap.coverage``; None if they are known only after a sensor was scored.
     """
 
     name: str
@@ -93,6 +95,7 @@ class Objective:
     lower_is_better: bool = False
     rays_only: bool = False
     usual: tuple[float, float] | None = None
+    numbers: tuple[str, ...] | None = None
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of its result."""
@@ -195,6 +198,7 @@ def objective(
     lower_is_better: bool = False,
     rays_only: bool = False,
     usual: tuple[float, float] | None = None,
+    numbers: tuple[str, ...] | None = None,
 ) -> Callable[[_F], _F]:
     """Register a function as an objective.
 
@@ -211,6 +215,8 @@ def objective(
         lower_is_better: whether a lower value is better.
         rays_only: whether it traces chief rays only and needs no light.
         usual: a poor and a good value, for comparison.
+        numbers: names of all its parts that are numbers, if they are the same for all sensors; an
+            expression with any other name is then refused before a sensor is scored.
 
     Raises:
         ObjectiveError: the name is taken or malformed, or the function takes no evaluation.
@@ -230,6 +236,7 @@ def objective(
             lower_is_better,
             rays_only,
             usual,
+            numbers,
         )
         OBJECTIVES.register(name, given)
         return function

@@ -86,6 +86,7 @@ docs/experiments.md, and DIGIT."""
     range=(0.0, 1.0),
     needs=f"each press seen, with {LEAST_PIXELS} pixels on each line",
     usual=USUAL,
+    numbers=("worst_line",),
 )
 def rgb2normal(
     evaluation: Evaluation,

@@ -129,6 +129,15 @@ def deviation_of(values: Sequence[float]) -> float:
     return float(np.std(values, ddof=1))
 
 
+def numbers_of(parts: Mapping[str, Any]) -> dict[str, float]:
+    """Return the parts of a score that are numbers."""
+    return {
+        name: float(value)
+        for name, value in parts.items()
+        if isinstance(value, int | float) and not isinstance(value, bool)
+    }
+
+
 def json_ready(value: Any) -> Any:
     """Convert a value to plain dicts, lists, strings and finite numbers; NaN becomes None.
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.registry import Objective, find
 from optisense.objectives.run import evaluate
-from optisense.objectives.score import Score
+from optisense.objectives.score import Score, numbers_of
 from optisense.objectives.settings import Settings
 
 if TYPE_CHECKING:
@@ -146,6 +146,12 @@ class ObjectiveContract:
         score = self.kept_score()
         text = json.dumps(score.to_dict(), allow_nan=False)
         assert json.loads(text)["value"] == score.value
+
+    def test_its_numbers_are_those_of_its_parts(self) -> None:
+        """The names of its numbers, if it states them, are those of its parts."""
+        numbers = self.found().numbers
+        found = set(numbers_of(self.kept_score().parts))
+        assert numbers is None or set(numbers) == found
 
     def test_it_can_be_drawn_and_shown(self) -> None:
         """It has a figure, and a table for notebooks."""

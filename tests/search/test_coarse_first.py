@@ -17,6 +17,7 @@ from optisense.search.study._promotion import LEAST_PROMOTED
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchProgress
 from optisense.search.study.stages import FRESH
+from optisense.search.study.study import beside
 
 FULL = {"resolution": [640, 480], "photons": 1_000_000}
 SPACE = {"coating.specularity": (0.0, 1.0, 41)}
@@ -32,6 +33,9 @@ def biased(evaluation):
     words = [evaluation.settings.seed, round(1e6 * shine)]
     luck = np.random.default_rng(words).normal(0.0, 0.002 if is_full else 0.01)
     return float(1.0 - (shine - (0.3 if is_full else 0.4)) ** 2 + luck)
+
+def quality(evaluation):
+    return evaluation.settings.photons
 """
 """File with an objective that is noisy, the more so in coarse scores, which are also biased."""
 
@@ -60,6 +64,17 @@ def test_the_best_by_full_scores_is_found_although_coarse_ones_are_biased(
     least = min(trial.score for trial in promoted)
     left = [trial.score for trial in result.trials if not trial.fresh]
     assert sum(score > least for score in left) <= 2  # only those nearly equal to a promoted one
+
+
+def test_nothing_coarse_is_shown_beside_a_full_score(mini: SensorDesign, biased: str) -> None:
+    space = {"camera.fov": (50.0, 60.0, 2)}
+    goals = [biased, biased.replace(":biased", ":quality"), "coverage + 0*power"]
+    found = search(mini, space, goals, method="grid", settings=FULL, coarse_first=True)
+    best = found.best
+    shown = beside(found.study, best)
+    assert best.fresh
+    assert best.scores["quality"] < shown["quality"] == 1_000_000
+    assert shown["coverage"] == best.parts["coverage + 0*power"]["coverage"]  # by rays only
 
 
 def test_a_search_that_was_stopped_amid_full_scores_ends_alike(

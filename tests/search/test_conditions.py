@@ -333,10 +333,27 @@ def test_the_start_may_break_a_condition(mini: SensorDesign) -> None:
     assert any("which is allowed" in note for note in result.notes)
 
 
-def test_a_part_that_does_not_exist_ends_a_search_before_its_trials(svelte: SensorDesign) -> None:
-    with pytest.raises(UnknownPartError, match="aoap has no part 'nothing'") as told:
-        search(svelte, {"cages.M1.blend": (0.0, 1.0)}, "aoap", require="aoap.nothing >= 0.1")
-    assert "coverage" in str(told.value.hint)
+def test_a_part_that_does_not_exist_is_found_without_a_sensor() -> None:
+    with pytest.raises(SearchError, match="coverage has no part 'by_aera'") as told:
+        requirements_of(["coverage.by_aera >= 0.5"])
+    assert told.value.hint == "Did you mean 'by_area'?"
+    with pytest.raises(SearchError, match="draft has no part 'least'") as told:
+        requirements_of(["draft.least >= 3"])
+    assert told.value.hint == "It has no parts that are numbers"
+
+
+def test_an_unknown_part_of_a_users_objective_ends_a_search_before_its_trials(
+    mini: SensorDesign,
+) -> None:
+    with forgetting():
+
+        @objective("own_parts", rays_only=True)
+        def own_parts(evaluation: Evaluation) -> tuple[float, dict[str, float]]:
+            return 1.0, {"first": 2.0}
+
+        with pytest.raises(UnknownPartError, match="own_parts has no part 'firts'") as told:
+            search(mini, FOV, "aoap", settings=RAYS, require="own_parts.firts >= 0.1")
+    assert told.value.hint == "Did you mean 'first'?"
 
 
 @pytest.mark.parametrize(

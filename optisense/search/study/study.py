@@ -355,19 +355,28 @@ class Study:
 def beside(study: Study, trial: Trial) -> dict[str, float]:
     """Return the numbers that are shown beside a trial's score: its other scores, and the parts
     that an objective lists to be shown, such as the coverage with AOAP.
+
+    Where a trial with a coarse score also has full ones, its other scores are the means of these,
+    and parts that were computed from coarse images are left out.
     """
     found: dict[str, float] = {}
+    is_promoted = study.settings.coarse_first and bool(trial.fresh)
     for number, name in enumerate(study.settings.names):
         if number:
-            found[name] = trial.scores[name]
+            found[name] = trial.fresh_score(name) if is_promoted else trial.scores[name]
         parts = trial.parts.get(name, {})
-        found |= {part: float(parts[part]) for part in _shown(name) if part in parts}
+        shown = _shown(name, rays_only=is_promoted)
+        found |= {part: float(parts[part]) for part in shown if part in parts}
     return found
 
 
-def _shown(name: str) -> tuple[str, ...]:
+def _shown(name: str, *, rays_only: bool) -> tuple[str, ...]:
     """Return the parts that an objective lists to be shown with its value; none for a user's
     objective, whose file is not run to look at a study.
+
+    Args:
+        name: name of the objective.
+        rays_only: whether objectives that need images have none.
     """
     from optisense.objectives.combined import objective_of
     from optisense.objectives.named import is_plain
@@ -375,7 +384,8 @@ def _shown(name: str) -> tuple[str, ...]:
 
     try:
         known = name in (*BUILT_IN, *FURTHER) or not is_plain(name)
-        return objective_of(name).beside if known else ()
+        measured = objective_of(name) if known else None
+        return measured.beside if measured and (measured.rays_only or not rays_only) else ()
     except ObjectiveError:  # an expression with an objective that is not installed
         return ()
 
