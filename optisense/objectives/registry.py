@@ -174,7 +174,7 @@ OBJECTIVES: Registry[Objective] = Registry(
         "normdiff": "optisense.objectives.normdiff:normdiff",
         "aoap": "optisense.objectives._aoap:aoap",
         "2to3pw": "optisense.objectives._projection_warping:projection_warping",
-        **{name: f"optisense.objectives.{name}:{name}" for name in FURTHER},
+        **{name: f"optisense.objectives._{name}:{name}" for name in FURTHER},
     },
     _check,
     _from_package,
