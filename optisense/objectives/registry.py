@@ -39,8 +39,8 @@ FURTHER = (
     "clearance",
     "cage_roughness",
 )
-"""Objectives of this package in addition to the paper's; each is a function of its name in a module
-of its name."""
+"""Objectives of this package in addition to the paper's; each is a function of its name in a
+private module of its name."""
 
 CONDITIONS, WATCHED = "conditions", "watched"
 """Names under which the store of a study keeps the conditions of its trials and other watched
