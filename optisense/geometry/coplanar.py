@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.patches import inner_edges
 
 SAME_DIRECTION = 1e-10
 """Largest difference from 1 of the cosine between the normals of coplanar faces. It corresponds to
@@ -47,12 +48,7 @@ def _patches(mesh: TriangleMesh) -> NDArray[np.int64]:
     faces = np.asarray(mesh.faces, dtype=np.int64)
     normals = mesh.face_normals
     offsets = np.einsum("ij,ij->i", normals, mesh.vertices[faces[:, 0]])
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    owner = np.repeat(np.arange(len(faces)), 3)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    edges, owner = edges[order], owner[order]
-    twin = (edges[1:] == edges[:-1]).all(axis=1)
-    one, other = owner[:-1][twin], owner[1:][twin]
+    one, other = inner_edges(mesh)[1].T
     flat = (np.einsum("ij,ij->i", normals[one], normals[other]) > 1 - SAME_DIRECTION) & (
         np.abs(offsets[one] - offsets[other]) < SAME_PLANE
     )

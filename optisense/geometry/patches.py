@@ -41,7 +41,7 @@ def smoothly_joined(mesh: TriangleMesh, start: Faces, sharp: float = SHARP) -> F
         start: some of its faces.
         sharp: smallest angle (degrees) between the normals of neighbours across a sharp edge.
     """
-    one, other = neighbours(mesh)
+    one, other = inner_edges(mesh)[1].T
     cosine = np.einsum("ij,ij->i", mesh.face_normals[one], mesh.face_normals[other])
     smooth = cosine >= np.cos(np.radians(sharp)) - 1e-12
     label = connected_components(len(mesh.faces), one[smooth], other[smooth])
@@ -53,7 +53,7 @@ def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
 
     Patches of equal area are ordered by position, so that their order is reproducible.
     """
-    one, other = neighbours(mesh)
+    one, other = inner_edges(mesh)[1].T
     chosen = np.zeros(len(mesh.faces), dtype=bool)
     chosen[faces] = True
     both = chosen[one] & chosen[other]
@@ -67,14 +67,14 @@ def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
     return sorted(groups, key=order)
 
 
-def neighbours(mesh: TriangleMesh) -> tuple[Faces, Faces]:
-    """Return the pairs of faces that share an edge: two (k,) int64."""
+def inner_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], Faces]:
+    """Return the vertices (k, 2) of the edges between two faces, and these faces (k, 2)."""
     edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
     owner = np.repeat(np.arange(len(mesh.faces)), 3)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     edges, owner = edges[order], owner[order]
     twin = (edges[1:] == edges[:-1]).all(axis=1)
-    return owner[:-1][twin], owner[1:][twin]
+    return edges[:-1][twin], np.column_stack([owner[:-1][twin], owner[1:][twin]])
 
 
 def middle(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.patches import inner_edges
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -76,7 +77,7 @@ def edge_curvatures(
         flat: the undeformed mesh, which determines the sharp edges.
         bent: the same mesh, bent.
     """
-    edges, pairs = _inner_edges(flat.faces)
+    edges, pairs = inner_edges(flat)
     smooth = _angles(flat, pairs) < np.radians(SHARP)
     edges, pairs = edges[smooth], pairs[smooth]
     ends = bent.vertices[edges]
@@ -102,18 +103,6 @@ def radius_of(curvature: NDArray[np.float64], area: NDArray[np.float64]) -> floa
     above = np.cumsum(area[order])
     place = int(np.searchsorted(above, SHARE * above[-1]))
     return float(1.0 / max(curvature[order[place]], 1.0 / MOST_RADIUS))
-
-
-def _inner_edges(faces: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the vertices (e, 2) of the edges between two triangles, and these triangles (e, 2)."""
-    corners = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1), axis=-1)
-    edges = corners.reshape(-1, 2).astype(np.int64)
-    owner = np.repeat(np.arange(len(faces)), 3)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    edges, owner = edges[order], owner[order]
-    same = (edges[1:] == edges[:-1]).all(axis=1)
-    first = np.flatnonzero(same)
-    return edges[first], np.stack([owner[first], owner[first + 1]], axis=1)
 
 
 def _angles(mesh: TriangleMesh, pairs: NDArray[np.int64]) -> NDArray[np.float64]:
