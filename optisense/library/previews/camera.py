@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.camera import Camera
+from optisense.design.projection import directions
 from optisense.library._entries import CameraModel
 
 if TYPE_CHECKING:
@@ -32,23 +34,21 @@ def border_directions(camera: CameraModel) -> FloatArray:
     """Return unit directions (n, 3) of n = 4 `SIDE_POINTS` points of the image's border: x right, y
     up, z ahead.
 
-    An equidistant camera's angle from the axis is proportional to the distance from the picture's
-    middle; both projections see `fov` across the width.
+    The lens is ideal: its distortion is left out.
     """
-    width, height = camera.resolution
-    t = np.linspace(-1.0, 1.0, SIDE_POINTS, endpoint=False)
-    one = np.ones(SIDE_POINTS)
-    u = np.concatenate([t, one, -t, -one])
-    v = np.concatenate([-one, t, one, -t]) * height / width
-    half = np.radians(camera.fov / 2.0)
-    if camera.projection == "equidistant":
-        radius = np.hypot(u, v)
-        angle = radius * half
-        scale = np.sin(angle) / np.maximum(radius, 1e-12)
-        return np.column_stack([u * scale, v * scale, np.cos(angle)])
-    tangent = np.tan(half)
-    directions = np.column_stack([u * tangent, v * tangent, np.ones(len(u))])
-    return np.asarray(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    ideal = Camera(
+        model="ideal",
+        position=(0.0, 0.0, 0.0),
+        direction=(0.0, 0.0, 1.0),
+        up=(0.0, -1.0, 0.0),  # image right is direction x up, which is then +x
+        fov=camera.fov,
+        resolution=camera.resolution,
+        projection=camera.projection,
+    )
+    t = np.linspace(0.0, 1.0, SIDE_POINTS, endpoint=False)
+    low, high = np.zeros(SIDE_POINTS), np.ones(SIDE_POINTS)
+    across = np.concatenate([t, high, 1.0 - t, low])
+    return directions(ideal, across, np.concatenate([low, t, high, 1.0 - t]))
 
 
 def footprint(camera: CameraModel, distance: float) -> FloatArray:
@@ -57,10 +57,10 @@ def footprint(camera: CameraModel, distance: float) -> FloatArray:
 
     Beyond `STEEPEST` degrees from the axis the border is cut, as it extends to infinity.
     """
-    directions = border_directions(camera)
-    side = np.hypot(directions[:, 0], directions[:, 1])
-    angle = np.minimum(np.arctan2(side, directions[:, 2]), np.radians(STEEPEST))
-    return directions[:, :2] / side[:, None] * (distance * np.tan(angle))[:, None]
+    border = border_directions(camera)
+    side = np.hypot(border[:, 0], border[:, 1])
+    angle = np.minimum(np.arctan2(side, border[:, 2]), np.radians(STEEPEST))
+    return border[:, :2] / side[:, None] * (distance * np.tan(angle))[:, None]
 
 
 def footprint_size(camera: CameraModel, distance: float) -> tuple[float, float]:
