@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.ndimage import binary_erosion
 from scipy.sparse.linalg import factorized
 
 from optisense.reading.tilts import STEEPEST
@@ -95,6 +96,7 @@ class NormalIntegrator:
     def __init__(self, untouched: UntouchedSurface) -> None:
         """Prepare the integration for a sensor's surface and rays at the image's resolution."""
         self._untouched = untouched
+        self._border = untouched.seen & ~binary_erosion(untouched.seen)
         self._grid = GridIntegrator(untouched.seen)
 
     def depths(self, normals: NDArray[np.floating]) -> FloatArray:
@@ -110,7 +112,7 @@ class NormalIntegrator:
         for _ in range(ROUNDS):
             across, down = (each.of(back) for each in steps)
             back = self._grid.from_steps(across, down)
-            back = np.nan_to_num(back - np.median(back[_border(untouched.seen)]))
+            back = np.nan_to_num(back - np.median(back[self._border]))
         surface = untouched.points - back[..., None] * untouched.directions
         surface[~untouched.seen] = np.nan
         return untouched.depth(surface)
@@ -156,12 +158,3 @@ def _middle(values: FloatArray, axis: int) -> FloatArray:
 def _neighbours(values: FloatArray, axis: int) -> tuple[FloatArray, FloatArray]:
     """Return the values before and after each step along an axis."""
     return (values[:, :-1], values[:, 1:]) if axis else (values[:-1], values[1:])
-
-
-def _border(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Return the pixels of a mask that are adjacent to pixels outside it, or to the image's
-    edge.
-    """
-    padded = np.pad(mask, 1)
-    whole = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
-    return mask & ~whole
