@@ -217,6 +217,7 @@ class Evaluation(CachedValues):
         before = self.model.chief_rays(self.resolution).normals
         dark = np.broadcast_to(np.float32(0.0), before.shape)
         frames = [frame_of(contact, surface) for contact in contacts]
+        centres = [frame["centre"] for frame in frames]
         together = self.settings.together and are_apart(
             [each["place"] for each in frames], self.settings.radius, self.settings.depth
         )
@@ -226,7 +227,7 @@ class Evaluation(CachedValues):
         def press_of(number: int, seen: ChiefRays | TactileImage) -> Press:
             mask = seen.contact_mask
             if together:
-                mask = mask & (nearest_press(seen.points, mask, frames) == number)
+                mask = mask & (nearest_press(seen.points, mask, centres) == number)
             return Press(
                 number=number + 1,
                 mask=mask,

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from optisense.geometry import Contact, SensingSurface, Sphere, locate
 
@@ -29,15 +28,12 @@ def frame_of(contact: Contact, surface: SensingSurface) -> dict[str, Any]:
 
 
 def nearest_press(
-    points: NDArray[np.float32],
-    mask: NDArray[np.bool_],
-    frames: Sequence[dict[str, Any]],
+    points: NDArray[np.float32], mask: NDArray[np.bool_], centres: ArrayLike
 ) -> NDArray[np.int64]:
-    """Return the number (h, w) of the press whose centre is nearest to the point that a pixel of
-    the mask sees; -1 elsewhere.
+    """Return the number (h, w) of the press whose centre (of n, (n, 3) mm) is nearest to the point
+    that a pixel of the mask sees; -1 elsewhere.
     """
-    centres = np.array([frame["centre"] for frame in frames])
     owner = np.full(mask.shape, -1, dtype=np.int64)
     seen = points[mask].astype(np.float64)
-    owner[mask] = np.linalg.norm(seen[:, None] - centres, axis=2).argmin(axis=1)
+    owner[mask] = np.linalg.norm(seen[:, None] - np.asarray(centres), axis=2).argmin(axis=1)
     return owner

@@ -9,6 +9,8 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from optisense.objectives.frames import nearest_press
+
 FloatArray = NDArray[np.float64]
 
 LEAST_PIXELS = 12
@@ -60,10 +62,7 @@ def find_balls(
     """
     from scipy.ndimage import label
 
-    owner = np.full(mask.shape, -1)
-    if mask.any():
-        seen = points[mask].astype(np.float64)
-        owner[mask] = np.linalg.norm(seen[:, None] - places, axis=2).argmin(axis=1)
+    owner = nearest_press(points, mask, places)
     balls = []
     for number in range(len(places)):
         own = owner == number
