@@ -30,6 +30,7 @@ from optisense.optics.imaging.sampling import PixelImportance, SamplingPlan
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CacheStore
+from optisense.optics.radiance_cache.tracing_limits import TracingLimits
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
@@ -210,9 +211,8 @@ class OpticalModel(RayModel):
             if number is None and noise is None and seconds is None:
                 wanted = PICTURE_PHOTONS
             store = self._store
-            light = store.radiance_cache(
-                seed, wanted, target, seconds, MAX_PHOTONS, began, on_stage, partial
-            )
+            limits = TracingLimits(wanted, target, seconds, MAX_PHOTONS, began)
+            light = store.radiance_cache(seed, limits, on_stage, partial)
             lit = time.perf_counter()
             on_stage(Stage.SHADING, 1.0, light[0].photons, light[0].noise)
             layers = render_cached(

@@ -23,6 +23,7 @@ from optisense.objectives.normdiff import SAMPLE_SHARE, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
 from optisense.optics.radiance_cache import store
+from optisense.optics.radiance_cache.tracing_limits import MAX_SINGLE_PASS
 from optisense.optics.transport.photons import trace_photons
 
 SMALL: dict[str, Any] = {
@@ -260,7 +261,7 @@ def test_light_cut_short_by_ctrl_c_gives_no_score(
 
     monkeypatch.setattr(store, "trace_photons", cut_short)
     with pytest.raises(KeyboardInterrupt):  # after the first of several passes
-        evaluate(model, "rgb2normal", **{**SMALL, "photons": 2 * store.MAX_SINGLE_PASS, "seed": 77})
+        evaluate(model, "rgb2normal", **{**SMALL, "photons": 2 * MAX_SINGLE_PASS, "seed": 77})
     assert traced == 1
 
 

@@ -18,6 +18,7 @@ from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CacheStore
+from optisense.optics.radiance_cache.tracing_limits import TracingLimits
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import (
     Emitter,
@@ -101,7 +102,7 @@ class ReferenceScene:
         )
         store = CacheStore(lit, rays.points[rays.hit])
         light = store.radiance_cache(
-            seed, photons, None, None, 2 * photons, 0.0, lambda stage, part, traced, noise: None
+            seed, TracingLimits(photons), lambda stage, part, traced, noise: None
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
         scenes = ContactScenes(scene, fixed, None, mi.Float())

@@ -13,6 +13,7 @@ from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CacheStore
+from optisense.optics.radiance_cache.tracing_limits import TracingLimits
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import Emitter, EmitterShape, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
@@ -83,7 +84,7 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
     scenes = ContactScenes(full, fixed, pressed, around, convex=True)
     rays = trace_chief_rays(full, CAMERA)
     light = store(fixed, LAMP, rays.points[rays.hit])
-    cache = light.radiance_cache(0, PHOTONS, None, None, PHOTONS, 0.0, lambda *told: None)
+    cache = light.radiance_cache(0, TracingLimits(PHOTONS), lambda *told: None)
     image = render_cached(cache, scenes, CAMERA, rays, [LAMP], 0).radiance[0, ..., 0]
 
     normals, points = rays.normals.astype(float), rays.points.astype(float)
@@ -97,5 +98,5 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open() -> None:
 @pytest.mark.parametrize(("lamp", "grazes"), [(LAMP, True), (OVERHEAD, False)])
 def test_only_light_that_grazes_is_followed_above_the_surface(lamp: Emitter, grazes: bool) -> None:
     light = store(RayScene([skin()]), lamp, np.zeros((1, 3)))
-    cache, _ = light.radiance_cache(0, 50_000, None, None, 50_000, 0.0, lambda *told: None)
+    cache, _ = light.radiance_cache(0, TracingLimits(50_000), lambda *told: None)
     assert (cache.binned.above is not None) == grazes

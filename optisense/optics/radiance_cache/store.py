@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -21,6 +21,7 @@ from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.radiance_cache.tally import DENSE, CacheTally
+from optisense.optics.radiance_cache.tracing_limits import Passes, TracingLimits
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.transport.emission_guide import EmissionGuide, learn_guide, uniform_guide
@@ -32,12 +33,6 @@ from optisense.optics.transport.photons import (
 )
 from optisense.optics.transport.volume_flux import FluxLayer, flux_layer_above
 
-PASS_PHOTONS = 500_000
-"""Number of photons of one pass. A pass of this size keeps the photon map near 30 MB; progress is
-reported and Ctrl-C obeyed between passes."""
-MAX_SINGLE_PASS = 2.5 * PASS_PHOTONS
-"""Number of photons below which all are traced in one pass, as each pass has a fixed cost: fewer
-than three passes save more by it than their photon map costs in memory (75 MB)."""
 PILOT_PHOTONS = 300_000
 """Number of photons of the pilot pass, from which the emission guide is learned: enough for the
 cells of the guide (see `GUIDE_CELLS`), and half of a pass."""
@@ -53,6 +48,13 @@ that a process takes less than the `MOST_RESIDENT` memory of `backend.memory`.""
 MAX_FINE_TALLY_BYTES = 750e6
 """Memory (bytes) that the tally of one seed may take with the fine direction bins of narrow lobes,
 of which there are two to four times as many."""
+BYTES_OF_GREY, BYTES_OF_COLOUR = 20, 36
+"""Memory (bytes) of a direction bin of one group in a cell: the five numbers of `Tables` in single
+precision, or nine where surfaces are coloured."""
+CUT_CELLS = 1.3
+"""Ratio of the number of cells of a surface to its area divided by that of a cell, from which the
+memory is estimated. Edges and borders cut cells; on the built-in sensors, the ratio is 1.0 to
+1.2."""
 VIEW_MARGIN = 2.0
 """Margin (mm) around the camera's view to which photons are sent as well: light that lands there
 would meet the flank of an indenter, which stands off the surface by 1 to 2 mm."""
@@ -74,12 +76,6 @@ class _Traced(NamedTuple):
 
     groups: frozenset[int] | None
     seed: int
-    per_light: int
-
-
-@dataclass
-class _Running:
-    tally: CacheTally
     per_light: int
 
 
@@ -113,7 +109,7 @@ class CacheStore:
         self._above: FluxLayer | None = None
         self._cells: SurfaceCells | None = None
         self._kernels: Kernels | None = None
-        self._running: dict[_Traced, _Running] = {}
+        self._running: dict[_Traced, CacheTally] = {}
         self._done: dict[tuple[_Traced, int], RadianceCache] = {}
 
     def coated(self, lit: LitScene) -> Self:
@@ -259,7 +255,8 @@ class CacheStore:
         a, b, c = (points[triangles[:, k]] for k in range(3))
         area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
         entry = directions.count * self._lit.table.groups
-        return 1.3 * area / size**2 * entry * (36 if self._lit.coloured else 20)
+        entry *= BYTES_OF_COLOUR if self._lit.coloured else BYTES_OF_GREY
+        return CUT_CELLS * area / size**2 * entry
 
     @property
     def kernels(self) -> Kernels:
@@ -290,25 +287,13 @@ class CacheStore:
         return np.asarray(nearest - half[which])
 
     def radiance_cache(
-        self,
-        seed: int,
-        photons: int | None,
-        noise: float | None,
-        seconds: float | None,
-        most: int,
-        began: float,
-        on_stage: StageCallback,
-        partial: bool = True,
+        self, seed: int, limits: TracingLimits, on_stage: StageCallback, partial: bool = True
     ) -> tuple[RadianceCache, bool]:
-        """Return the cache after ``photons``, or once ``noise`` or ``seconds`` are reached.
+        """Return the cache once a limit is reached.
 
         Args:
             seed: seed of the photons.
-            photons: number of photons to emit; None for no such limit.
-            noise: relative RMS noise to reach; None for no such limit.
-            seconds: time since ``began``; None for no such limit.
-            most: number of photons at which tracing ends in any case.
-            began: start of the render (`time.perf_counter`).
+            limits: when tracing ends.
             on_stage: function that is called when a stage begins and after each pass; see
                 `StageCallback`.
             partial: whether Ctrl-C after the first pass ends the tracing; otherwise
@@ -317,79 +302,19 @@ class CacheStore:
         Returns:
             The cache, and whether Ctrl-C ended the tracing early.
         """
-        lights = self._lit.table.count
-        # Each pass has a fixed cost, so that few photons are traced in a single pass.
-        size = photons if photons is not None and photons < MAX_SINGLE_PASS else PASS_PHOTONS
-        per_light = max(1, size // lights)
-        wanted = None if photons is None else max(1, round(photons / (per_light * lights)))
-        cap = max(1, most // (per_light * lights))
-        key = _Traced(self.groups, seed, per_light)
-        if wanted is not None and noise is None and seconds is None:
-            done = self._done.get((key, wanted))
+        passes = limits.passes(self._lit.table.count)
+        key = _Traced(self.groups, seed, passes.per_light)
+        if limits.counts_only:
+            done = self._done.get((key, passes.most))
             if done is not None:
                 return done, False
         if self._guide is None:
             on_stage(Stage.PILOT, 0.0, 0, None)
-        limit = cap if wanted is None else wanted
-        planes = self._planes(limit * per_light * lights)
-        running = self._running.get(key)
-        # Tracing can continue from the photons of an earlier call only if the number of photons is
-        # the one limit.
-        timed = noise is not None or seconds is not None
-        if running is not None and running.tally.planes != planes:
-            running = None
-        if running is None or wanted is None or timed or running.tally.passes > wanted:
-            running = _Running(
-                CacheTally(
-                    self.kernels,
-                    self._lit.table.groups,
-                    self._lit.coloured,
-                    self._lit.roughness,
-                    self._flux_layer,
-                    self._directions,
-                    planes,
-                    self._curved,
-                ),
-                per_light,
-            )
-            self._running = {key: running}
-        tally = running.tally
-        check, reached, interrupted = 1, None, False
-        if tally.passes < limit:
-            self.guide  # noqa: B018  learned before photons are counted
-            on_stage(Stage.PHOTONS, 0.0, tally.photons, None)
+        tally = self._tally(key, passes, limits.counts_only)
+        noise, interrupted = None, False
         try:
-            while tally.passes < limit:
-                started = time.perf_counter()
-                tally.add(
-                    trace_photons(
-                        self._lit.scene,
-                        Emission(
-                            self._lit.table,
-                            self.guide,
-                            per_light,
-                            seed_of(seed, 2),
-                            first=tally.passes * per_light,
-                            groups=self.groups,
-                        ),
-                        coloured=self._lit.coloured,
-                        flux_layer=self._flux_layer,
-                    )
-                )
-                now = time.perf_counter()
-                fraction = tally.passes / limit if wanted is not None else 0.0
-                if noise is not None and tally.passes >= check:
-                    reached = tally.noise()
-                    if reached <= noise:
-                        break
-                    check = tally.passes * 2
-                if noise is not None and reached:
-                    fraction = max(fraction, min(0.95, (noise / reached) ** 2))
-                if seconds is not None:
-                    fraction = max(fraction, min(0.95, (now - began) / seconds))
-                    if now - began + (now - started) > 0.8 * seconds:
-                        break
-                on_stage(Stage.PHOTONS, fraction, tally.photons, reached)
+            for noise in self._trace(tally, key, passes, limits, on_stage):  # noqa: B007
+                pass
         except KeyboardInterrupt:
             self._running.clear()  # the tally may hold a part of the last pass
             if tally.passes < 1 or not partial:
@@ -397,7 +322,7 @@ class CacheStore:
             interrupted = True
         name = (key, tally.passes)
         if interrupted or name not in self._done:
-            on_stage(Stage.SMOOTHING, 1.0, tally.photons, reached)
+            on_stage(Stage.SMOOTHING, 1.0, tally.photons, noise)
             light = tally.smoothed()
             if interrupted:
                 return light, True
@@ -405,3 +330,67 @@ class CacheStore:
             while len(self._done) > MAX_CACHES:
                 del self._done[next(iter(self._done))]
         return self._done[name], False
+
+    def _tally(self, key: _Traced, passes: Passes, continues: bool) -> CacheTally:
+        """Return the tally to which photons are added: that of an earlier call if it ``continues``
+        and has no more than the wanted passes, else an empty one.
+        """
+        planes = self._planes(passes.most * passes.photons)
+        tally = self._running.get(key)
+        if tally is None or not continues or tally.planes != planes or tally.passes > passes.most:
+            tally = CacheTally(
+                self.kernels,
+                self._lit.table.groups,
+                self._lit.coloured,
+                self._lit.roughness,
+                self._flux_layer,
+                self._directions,
+                planes,
+                self._curved,
+            )
+            self._running = {key: tally}
+        return tally
+
+    def _trace(
+        self,
+        tally: CacheTally,
+        key: _Traced,
+        passes: Passes,
+        limits: TracingLimits,
+        on_stage: StageCallback,
+    ) -> Iterator[float | None]:
+        """Trace passes until a limit is reached; yield the relative noise after each, if it is
+        known.
+        """
+        noise, next_check = None, 1
+        if tally.passes < passes.most:
+            self.guide  # noqa: B018  learned before photons are counted
+            on_stage(Stage.PHOTONS, 0.0, tally.photons, None)
+        while tally.passes < passes.most:
+            started = time.perf_counter()
+            tally.add(
+                trace_photons(
+                    self._lit.scene,
+                    Emission(
+                        self._lit.table,
+                        self.guide,
+                        passes.per_light,
+                        seed_of(key.seed, 2),
+                        first=tally.passes * passes.per_light,
+                        groups=self.groups,
+                    ),
+                    coloured=self._lit.coloured,
+                    flux_layer=self._flux_layer,
+                )
+            )
+            took = time.perf_counter() - started
+            if limits.noise is not None and tally.passes >= next_check:
+                noise = tally.noise()
+                next_check = 2 * tally.passes
+            yield noise
+            if limits.noise is not None and noise is not None and noise <= limits.noise:
+                return
+            if limits.ends_before(took):
+                return
+            fraction = limits.fraction(tally.passes / passes.most, noise)
+            on_stage(Stage.PHOTONS, fraction, tally.photons, noise)
