@@ -186,6 +186,16 @@ def test_a_skin_that_bends_on_compiles_nothing(draft: DraftModel, mini: SensorDe
         assert misses(0.32) == misses(0.33) == 0
 
 
+def test_the_flat_side_of_a_bent_gel_has_few_triangles(mini: SensorDesign) -> None:
+    bent = DraftModel(ots.set_value(mini, "cages.skin.points[14].z", 0.5))
+    foot = next(each for each in bent.scenes.pieces if each.name == "gel/tray|acrylic")
+    assert len(foot.faces) == 2 and foot.normals is None
+    sides = np.ptp(foot.vertices, axis=0)
+    a, b, c = (foot.vertices[foot.faces[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    assert area == pytest.approx(sides[0] * sides[1])
+
+
 def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
     draft: DraftModel, mini: SensorDesign
 ) -> None:

@@ -64,6 +64,16 @@ def test_bending_on_and_back_leaves_no_trace(flat: Media) -> None:
     ] == guide  # the very same
 
 
+def test_a_face_whose_solid_bends_elsewhere_is_the_very_same(flat: Media) -> None:
+    bent = flat.bend(*parts(1.0))
+    assert bent is not None
+    foot, still = (
+        next(face.mesh for face in media.interfaces if face.names == ("gel", "guide"))
+        for media in (bent, flat)
+    )
+    assert foot is still
+
+
 def test_what_comes_apart_is_resolved_anew(flat: Media) -> None:
     assert flat.bend(*parts(0.2, foot=0.1)) is None
     assert flat.bend(*parts(0.2, skin=0.3)) is None

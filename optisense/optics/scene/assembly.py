@@ -93,12 +93,25 @@ class AssemblyCache:
         return self.merged[-1][1]
 
     def piece(
-        self, name: str, mesh: TriangleMesh, surface: Surface, before: AssemblyCache
+        self,
+        name: str,
+        mesh: TriangleMesh,
+        surface: Surface,
+        before: AssemblyCache,
+        merge: bool = False,
     ) -> Piece:
-        """Return the piece of a mesh and its surface, reused if it is known."""
+        """Return the piece of a mesh and its surface, reused if it is known.
+
+        Args:
+            name: name of the piece.
+            mesh: its mesh.
+            surface: its surface.
+            before: the cache of the assembly before.
+            merge: whether flat faces are merged, as on a flat side of a curved solid.
+        """
         known = next((piece for old, piece in before.pieces if old is mesh), None)
         if known is None or (known.name, known.surface) != (name, surface):
-            known = _piece(name, mesh, surface)
+            known = _piece(name, _merged(mesh) if merge else mesh, surface)
         self.pieces.append((mesh, known))
         return known
 
@@ -159,7 +172,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     for whole in media.interfaces:
         for frost, face in frosted(whole, frosts, solids, kept.finishes, old.finishes):
             name = "/".join(face.names) + "|" + face.outside + (frost and f":{frost}")
-            pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old))
+            pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old, merge=True))
     for sheet in sheets:
         before_it = _solid_before(sheet.mesh, solids)
         ior = 1.0 if before_it is None else before_it.ior

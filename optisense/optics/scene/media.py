@@ -44,6 +44,10 @@ BENT_TOLERANCE = 0.02
 """Largest distance (mm) by which touching surfaces may separate while they bend. Triangles of two
 tessellations of one shape differ by less, and the thinnest film that a design holds is as thick."""
 
+UNMOVED_TOLERANCE = 1e-6
+"""Largest displacement (mm) of a vertex that counts as unmoved: rounding of coordinates in single
+precision (some 2e-6 mm at 30 mm), which rays do not resolve either."""
+
 
 class Bending:
     """The positions of interfaces and sheets relative to the solids that they lie on."""
@@ -88,7 +92,7 @@ class Bending:
                 places.append(anchors.on(new[name].mesh.vertices))
             if np.abs(places[0] - places[-1]).max(initial=0.0) > BENT_TOLERANCE:
                 return None
-            if all(new[name].mesh is self._solids[name].mesh for name in face.names):
+            if np.abs(places[0] - face.mesh.vertices).max(initial=0.0) <= UNMOVED_TOLERANCE:
                 result.append(face)  # the same mesh, with its cached properties
             else:
                 result.append(replace(face, mesh=face.mesh.with_vertices(places[0])))
