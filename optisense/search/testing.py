@@ -265,7 +265,7 @@ class MethodContract:
             return 1.0 if (share == start).all() else math.nan
 
         for name, space in self.spaces().items():
-            bound = SearchSpace(space).bind(self.design())
+            bound = SearchSpace(space).bind(self.design(), tried=False)
             start = (bound.start - bound.lower) / (bound.upper - bound.lower)
             if self.objectives == 1:
                 assert self.run(space, only_start).best.is_start, name
@@ -288,7 +288,7 @@ class MethodContract:
         """Return a goal for a landscape; the second goal is highest where the first one is
         lowest.
         """
-        bound = SearchSpace(space).bind(self.design())
+        bound = SearchSpace(space).bind(self.design(), tried=False)  # a study tries the bounds
 
         def score(design: SensorDesign) -> float:
             share = (self.coordinates(bound, design) - bound.lower) / (bound.upper - bound.lower)

@@ -328,7 +328,9 @@ class BoundSpace:
 
     def _try(self, point: FloatArray, where: str) -> None:
         try:
-            checked(self.apply(point))
+            design = self.apply(point)
+            if self._sure:  # else `apply` has checked it
+                checked(design)
         except OptiSenseError as error:
             raise type(error)(error.message, where=where, hint=error.hint) from None
 

@@ -180,10 +180,12 @@ def _fields() -> list[str]:
 
 def package_versions() -> dict[str, str]:
     """Return the installed versions of the packages on which the numbers of a study depend."""
-    found = {}
-    for name in LIBRARIES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "unknown"
-    return found
+    return {name: _version_of(name) for name in LIBRARIES}
+
+
+@cache
+def _version_of(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"

@@ -26,7 +26,7 @@ from optisense.library import with_own_lights
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.methods.dominance import front as front_of
 from optisense.search.space.constraints import Constraint
-from optisense.search.space.search_space import SearchSpace
+from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.search.study.best import best_of, nearest
 from optisense.search.study.folder import (
     STORE_FILE,
@@ -58,9 +58,8 @@ class Study:
         self,
         folder: Path | None,
         settings: StudySettings,
-        design: SensorDesign,
+        space: BoundSpace,
         goals: Sequence[Goal],
-        rules: Sequence[Constraint],
         store: Store,
         lock: FolderLock | None = None,
     ) -> None:
@@ -68,7 +67,7 @@ class Study:
         self.folder = folder
         self.settings = settings
         self.goals = list(goals)
-        self.space = SearchSpace.from_plain(settings.space, rules).bind(design)
+        self.space = space
         self.store = store
         self._lock = lock
         self._trusted = folder is None
@@ -96,7 +95,8 @@ class Study:
         if place is None:
             settings = plan.settings_for(design)
             in_memory = Store.create(None, settings.names)
-            return Study(None, settings, design, plan.goals, rules, in_memory)
+            space = SearchSpace.from_plain(settings.space, rules).bind(design, tried=False)
+            return Study(None, settings, space, plan.goals, in_memory)
         lock = lock_new_folder(place, design)
         store: Store | None = None
         try:
@@ -107,7 +107,8 @@ class Study:
             store.set_fact("settings", settings.fingerprint_of_all())
             store.set_fact("study", settings.comparable())
             store.set_fact("design", notes(design))
-            study = Study(place, settings, design, plan.goals, rules, store, lock)
+            space = SearchSpace.from_plain(settings.space, rules).bind(design, tried=False)
+            study = Study(place, settings, space, plan.goals, store, lock)
             settings.save(place)  # last: from here on it is a study
             study.trust()
         except BaseException:
@@ -156,7 +157,8 @@ class Study:
             store.close()
             raise
         known = known_goals(settings, goals)
-        study = Study(place, settings, own, known, known_rules(settings, rules), store)
+        space = SearchSpace.from_plain(settings.space, known_rules(settings, rules)).bind(own)
+        study = Study(place, settings, space, known, store)
         store.check_points(study.space.size)
         return study
 
