@@ -8,10 +8,10 @@ until one comes to its end.
 from __future__ import annotations
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from warm_python import programs
 
 SCRIPT = '''
 import os
@@ -97,7 +97,7 @@ print("killed", killed)
 @pytest.mark.parametrize("command", ["new", "search"])
 def test_it_is_given_again_and_ends_well(command: str, tmp_path: Path) -> None:
     found = subprocess.run(
-        [sys.executable, "-c", SCRIPT, command, str(tmp_path)],
+        [programs() / "python", "-c", SCRIPT, command, str(tmp_path)],
         capture_output=True,
         text=True,
     )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from comparing import same_pictures
 from typer.testing import CliRunner
+from warm_python import programs
 
 from optisense.cli import app
 from optisense.tasks import Dataset
@@ -112,7 +112,7 @@ def test_stopped_amid_a_sample_it_continues_to_the_same(
     command = (*COMMAND, "--out", str(stopped), "--count", "4")
     rows = stopped / "metadata.csv"
     child = subprocess.run(
-        [sys.executable, "-c", STRUCK, str(int(number)), str(rows), *command],
+        [programs() / "python", "-c", STRUCK, str(int(number)), str(rows), *command],
         stderr=subprocess.PIPE,
         text=True,
     )

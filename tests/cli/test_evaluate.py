@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
+from warm_python import programs
 
 from optisense.cli import app
 
@@ -172,7 +173,9 @@ app(["evaluate", "gelsight-mini-ideal", "-b", "aoap", "-b", "pressed", "-b", "2t
 
 def test_ctrl_c_shows_what_is_finished_and_exits_with_130(tmp_path: Path) -> None:
     child = subprocess.run(
-        [sys.executable, "-c", PRESSED, str(tmp_path / "out")], capture_output=True, text=True
+        [programs() / "python", "-c", PRESSED, str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
     )
     assert child.returncode == 130, child.stderr
     assert "Traceback" not in child.stderr

@@ -6,13 +6,13 @@ import json
 import os
 import re
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 from typer.testing import CliRunner
+from warm_python import programs
 
 from optisense.cli import app
 
@@ -41,7 +41,7 @@ def render(*arguments: str, design: str = "gelsight-mini-ideal") -> tuple[int, s
 def child(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Run a script in a process of its own, with the output folder as its argument."""
     return subprocess.run(
-        [sys.executable, "-c", script, str(folder)], capture_output=True, text=True
+        [programs() / "python", "-c", script, str(folder)], capture_output=True, text=True
     )
 
 

@@ -6,11 +6,11 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
+from warm_python import programs
 
 import optisense as ots
 from optisense.cli import app
@@ -231,7 +231,7 @@ def test_ctrl_c_keeps_what_is_finished(mine: Path, tmp_path: Path) -> None:
     command = ["search", "gelsight-mini-ideal", "--vary", "coating.specularity=0.1:1", "-b",
                f"{mine}:near", "--out", str(tmp_path / "study"), "--budget", "30"]  # fmt: skip
     child = subprocess.run(
-        [sys.executable, "-m", "optisense.cli", *command],
+        [programs() / "optisense", *command],
         env={**os.environ, "PRESS_CTRL_C": "1"},
         capture_output=True,
         text=True,

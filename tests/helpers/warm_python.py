@@ -8,6 +8,7 @@ signals and gives it its exit code. What a process does before its first line is
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import json
 import os
@@ -18,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -83,6 +85,21 @@ def warm_python(
         finally:
             server.stdin.close()  # which ends it
             server.wait()
+
+
+_shared = contextlib.ExitStack()
+atexit.register(_shared.close)
+
+
+@cache
+def programs() -> Path:
+    """Return a folder with the programs `python` and `optisense`, which all tests of a run share.
+
+    They are the real ones where a process cannot fork.
+    """
+    if not can_fork():
+        return Path(sys.executable).parent
+    return _shared.enter_context(warm_python(dict(os.environ)))
 
 
 def import_all() -> None:
@@ -163,7 +180,6 @@ def run(
     streams: list[int], name: str, arguments: list[str], folder: str, environment: dict[str, str]
 ) -> NoReturn:
     """Do what `python` or `optisense` does with these arguments, and end."""
-    import atexit
     import runpy
 
     atexit._clear()  # of the renderer, whose other threads are not here

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from warm_python import programs
 
 from optisense.errors import ObjectiveError, SetupError
 from paper import Bench, Found, Unit
@@ -136,7 +137,7 @@ Bench(Path(sys.argv[1])).run([rays(width) for width in range(8, 208)])
 @pytest.mark.slow
 def test_what_a_killed_process_had_finished_is_not_done_again(tmp_path: Path) -> None:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    child = subprocess.Popen([sys.executable, "-c", KILLED, str(tmp_path)], env=environment)
+    child = subprocess.Popen([programs() / "python", "-c", KILLED, str(tmp_path)], env=environment)
     home = tmp_path / UNITS
     whole = "[!.]*.json"  # not the one being written, whose name begins with a dot
     while len(list(home.glob(whole))) < 3:
