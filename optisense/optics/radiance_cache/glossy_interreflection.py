@@ -17,7 +17,11 @@ from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_rando
 from optisense.optics.radiance_cache.angular_variance import occluder_horizon
 from optisense.optics.radiance_cache.bin_sums import sum_bins
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.shading_points import ShadingPoints, interpolating_cell
+from optisense.optics.radiance_cache.shading_points import (
+    ShadingPoints,
+    interpolating_cell,
+    may_be_cached,
+)
 from optisense.optics.scene.bsdf import coating_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
@@ -97,7 +101,7 @@ def glossy_interreflection(
     looking.seen.weight = mi.Color3f(1 / directions)
     least = NEGLIGIBLE_SHARE * lanes * directions
     for _ in range(MAX_BOUNCES):
-        seen = _secondary_hits(scenes, looking)
+        seen = _secondary_hits(cache, scenes, looking)
         if seen is None or dr.width(seen.near) < least:
             break
         looking = shading_points(cache, scenes, seen)
@@ -114,8 +118,13 @@ def glossy_interreflection(
     ]
 
 
-def _secondary_hits(scenes: ContactScenes, at: ShadingPoints) -> SecondaryHits | None:
-    """Return the places that one ray from each point meets, drawn from its coating's lobes."""
+def _secondary_hits(
+    cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints
+) -> SecondaryHits | None:
+    """Return the places that one ray from each point meets, drawn from its coating's lobes.
+
+    Rays that meet the skin are left out where the cache holds its light.
+    """
     assert scenes.indenters is not None
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
     u = unit_float(points.series + points.number * STEPS_2D[0])
@@ -133,7 +142,8 @@ def _secondary_hits(scenes: ContactScenes, at: ShadingPoints) -> SecondaryHits |
     skin = fixed.intersect(Ray(start, way, looks & at.raised))
     raised = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
     # The cache already holds the light along a line that comes from the skin behind.
-    behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=skin.valid)
+    cached = may_be_cached(cache.binned, at.cell, way, skin.valid)
+    behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=cached)
     valid = raised | (skin.valid & ~behind)
     facing = dr.select(raised, pressed.normal, skin.normal)
     shading = dr.select(raised, pressed.shading_normal, skin.shading_normal)

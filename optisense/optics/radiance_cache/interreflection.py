@@ -15,12 +15,12 @@ import mitsuba as mi
 
 from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache._irradiance import irradiance
-from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.shading_points import ShadingPoints
+from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
+from optisense.optics.radiance_cache.shading_points import ShadingPoints, may_be_cached
 from optisense.optics.scene.bsdf import albedo_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
-from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
+from optisense.optics.scene.surface_cells import cell_at
 
 DIRECTIONS = 8
 """Number of rays per camera sample that sample interreflected light: a pixel of twelve samples then
@@ -33,16 +33,13 @@ MAX_BOUNCES = 8
 
 @dr.syntax
 def _sample(
-    cells: SurfaceCells,
-    table: mi.Float,
-    groups: int,
+    light: BinnedLight,
     scenes: ContactScenes,
     at: ShadingPoints,
     directions: mi.UInt32,
 ) -> list[mi.Color3f]:
-    """Return the radiance (3, n) of interreflected light for each light group; ``table`` is the
-    result of `irradiance_table`.
-    """
+    """Return the radiance (3, n) of interreflected light for each light group."""
+    cells, table, groups = light.cells, light.irradiance, light.groups
     assert scenes.indenters is not None
     indenters, fixed, points = scenes.indenters, scenes.fixed, at.seen
     series, first = points.series, points.number * directions
@@ -63,13 +60,14 @@ def _sample(
         above = mi.Bool(at.raised)
         start = leave(points.point, points.face_normal, way)
         walking = (dr.dot(way, points.face_normal) > 0) & (dr.max(weight) > 0)
-        places = mi.UInt32(0)
+        places, home = mi.UInt32(0), mi.UInt32(at.cell)
         while walking:
             pressed = indenters.intersect(Ray(start, way, mi.Bool(True)))
             skin = fixed.intersect(Ray(start, way, above))
             on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
             # The cache already holds the light along a line that comes from the skin behind.
-            behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=above)
+            cached = may_be_cached(light, home, way, above)
+            behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=cached)
             walking = on_indenter | (skin.valid & ~behind)
             if walking:
                 seen = dr.select(on_indenter, pressed.point, skin.point)
@@ -80,13 +78,13 @@ def _sample(
                 there = dr.select(exists, there, at.cell)
                 lift = leave(seen, facing, facing)
                 for g in range(groups):
-                    light, _mean, towards = irradiance(table, there * groups + g, facing)
-                    lit = light > 0
+                    falling, _mean, towards = irradiance(table, there * groups + g, facing)
+                    lit = falling > 0
                     towards = dr.select(lit, dr.normalize(towards), facing)
                     hidden = indenters.scene.ray_test(
                         mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
                     )
-                    totals[g] += dr.select(lit & ~hidden, light, 0) * dr.inv_pi * weight
+                    totals[g] += dr.select(lit & ~hidden, falling, 0) * dr.inv_pi * weight
                 # The path continues in a direction of the diffuse lobe.
                 state = next_random(state)
                 places += 1
@@ -97,7 +95,7 @@ def _sample(
                 way = mi.Frame3f(facing).to_world(
                     mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v))
                 )
-                start = lift
+                start, home = lift, mi.UInt32(there)
                 above = mi.Bool(on_indenter)
         k += 1
     return [total / mi.Float(directions) for total in totals]
@@ -115,7 +113,4 @@ def interreflected(
         at: the points.
         directions: number of rays from each point.
     """
-    count = dr.opaque(mi.UInt32, directions)
-    return _sample(
-        cache.binned.cells, cache.binned.irradiance, cache.binned.groups, scenes, at, count
-    )
+    return _sample(cache.binned, scenes, at, dr.opaque(mi.UInt32, directions))

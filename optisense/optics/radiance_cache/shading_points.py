@@ -8,6 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import richtmyer
+from optisense.optics.radiance_cache.cache import BinnedLight
 from optisense.optics.scene.bsdf import CoatingBsdf
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.transport.camera_paths import VisiblePoints
@@ -56,3 +57,21 @@ def interpolating_cell(
     shift -= upright * dr.dot(upright, shift)
     beside, exists = cell_at(cells, base + shift, found)
     return dr.select(exists, beside, home), shift, found
+
+
+def may_be_cached(
+    light: BinnedLight, cell: mi.UInt32, way: mi.Vector3f, active: mi.Bool
+) -> mi.Bool:
+    """Return whether the cache may hold the light that arrives straight from other opaque places.
+
+    The flux layer holds such light only where it falls towards the surface (`sample_segment`).
+
+    Args:
+        light: the binned light.
+        cell: the cell below each point that the light arrives at.
+        way: unit directions from the points to the places that the light comes from.
+        active: mask of the points that count.
+    """
+    if light.above is None:
+        return active
+    return active & (dr.dot(plane_of(light.cells, cell, active)[0], way) > 0)

@@ -198,7 +198,7 @@ def _fly(
             piece = mi.UInt32(0)
             while passes & (piece < SAMPLES_PER_SEGMENT):
                 spot, share, crosses = sample_segment(
-                    recording.flux_layer, ray, hit, chance, piece, step.opaque
+                    recording.flux_layer, ray, hit, chance, piece, step.opaque, scattered
                 )
                 if crosses:
                     power = mi.Color3f(throughput)

@@ -79,6 +79,7 @@ def sample_segment(
     chance: mi.Float,
     piece: mi.UInt32,
     landing: mi.Bool,
+    scattered: mi.Bool,
 ) -> tuple[mi.Point3f, mi.Float, mi.Bool]:
     """Return a random place (3, n) on one of the `SAMPLES_PER_SEGMENT` pieces of a path segment.
 
@@ -92,6 +93,8 @@ def sample_segment(
         chance: uniform random number from 0 to 1, the same for all pieces of a segment.
         piece: the number of the piece.
         landing: whether the segment ends on an opaque surface.
+        scattered: whether it begins on an opaque surface. Near its start, such light is not in the
+            layer: indenters get it by interreflection, as it does not vary with height there.
 
     Returns:
         The place (mm); the layer's height over the length of the piece, which replaces the cosine
@@ -107,5 +110,7 @@ def sample_segment(
     first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (SAMPLES_PER_SEGMENT // 2))
     place = chance + mi.Float(piece) * GOLDEN_RATIO_FRACTION
     spot = ray.origin + ray.direction * (first + length * (place - dr.floor(place)))
-    _, _, inside = layer_cell_at(flux_layer, mi.Point3f(spot), mi.Bool(True))
+    cell, _, inside = layer_cell_at(flux_layer, mi.Point3f(spot), mi.Bool(True))
+    upright, _ = plane_of(flux_layer.cells, cell, inside)
+    inside &= ~scattered | (dr.dot(upright, ray.direction) < 0)
     return mi.Point3f(spot), LAYER_HEIGHT / length, inside
