@@ -52,11 +52,6 @@ BESIDE_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which the skin is shaded with
 light that the contact reflects to it: 2 mm on GelSight Mini. This is half a per cent of a diffuse
 coating's light there; with narrow lobes, single rays would be bright blotches."""
-INTERREFLECTION_WIDTH = 1.0 / 107.0
-"""Width over which interreflected light is averaged in contacts of coatings with broad metallic
-lobes, as a fraction of the image width: 3 pixels of 320. In a contact of GelSight Mini of
-specularity 0.6, where interreflection is a tenth of the light, this reduces the noise of the
-picture's rays from 3.7 to 1 % of the mean and adds a blur of 1 %."""
 
 
 def render_cached(
@@ -165,7 +160,7 @@ class _Shading:
         """Return the layers of the light that skin and contacts reflect to contacts."""
         reach = 1
         if self.cache.metallic and not self.cache.binned.narrow_lobes:
-            reach = round(INTERREFLECTION_WIDTH * self.regions.width) | 1
+            reach = self.plan.interreflection_width(self.regions)
         return self.between.averaged_layers(*self.size, [(self.regions.contacts, reach)])
 
     def sample(

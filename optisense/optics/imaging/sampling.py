@@ -35,6 +35,13 @@ a sixth of the usual number or less."""
 RIM_WIDTH = 8.0 / 320.0
 """Width of the rim around a contact that gets `RIM_SAMPLES`, as a fraction of the image width: 0.5
 mm on GelSight Mini, about the depth of a contact."""
+INTERREFLECTION_WIDTH = 1.0 / 107.0
+"""Width over which interreflected light is averaged in contacts of coatings with broad metallic
+lobes, as a fraction of the image width: 3 pixels of 320. In a contact of GelSight Mini of
+specularity 0.6, where interreflection is a tenth of the light, this reduces the noise of the
+picture's rays from 3.7 to 1 % of the mean and adds a blur of 1 %. Pixels of small contacts have
+more samples, so that averages over a smaller width have about as many. In contacts of a ball on
+GelSight Svelte, 14 pixels wide, the error is 1.1 % instead of the 2.3 % of the full width."""
 
 PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
 """A function of the chief rays that gives the importance (h, w) of each contact pixel to a score,
@@ -76,10 +83,26 @@ class SamplingPlan:
         """Return the numbers of samples per pixel in contacts and around them."""
         if self.draft:
             return DRAFT_SAMPLES
-        share = min(1.0, REFERENCE_WIDTH / regions.width)
-        inner, outer = (max(2, round(n * share)) for n in (CONTACT_SAMPLES, RIM_SAMPLES))
+        inner, outer = _samples_of_large_contacts(regions.width)
         pixels = max(1, int(regions.contacts.sum()))
         return max(inner, min(MAX_PIXEL_SAMPLES, MIN_CONTACT_SAMPLES // pixels)), outer
+
+    def interreflection_width(self, regions: PixelRegions) -> int:
+        """Return the width (pixels, odd) over which interreflected light is averaged in contacts of
+        coatings with broad metallic lobes.
+        """
+        usual, _ = _samples_of_large_contacts(regions.width)
+        samples, _ = self.contact_samples(regions)
+        narrowing = min(1.0, (usual / samples) ** 0.5)
+        return round(INTERREFLECTION_WIDTH * regions.width * narrowing) | 1
+
+
+def _samples_of_large_contacts(width: int) -> tuple[int, int]:
+    """Return the numbers of samples per pixel in and around contacts of many pixels, in an image
+    ``width`` pixels wide.
+    """
+    share = min(1.0, REFERENCE_WIDTH / width)
+    return max(2, round(CONTACT_SAMPLES * share)), max(2, round(RIM_SAMPLES * share))
 
 
 FULL_SAMPLING = SamplingPlan()
