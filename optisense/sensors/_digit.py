@@ -342,9 +342,7 @@ def _coated(gel: TriangleMesh) -> TriangleMesh:
     """
     bottom = gel.bounds[0, 2]
     coated = ~(gel.triangles[:, :, 2] == bottom).all(axis=1)
-    used, faces = np.unique(gel.faces[coated], return_inverse=True)
-    inward = faces.astype(np.int32).reshape(-1, 3)[:, ::-1]
-    return TriangleMesh(gel.vertices[used], inward)
+    return gel.with_faces(gel.faces[coated]).compacted().flipped()
 
 
 def _housing(

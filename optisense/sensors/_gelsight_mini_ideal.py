@@ -11,8 +11,6 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-import numpy as np
-
 from optisense import library
 from optisense.design import (
     Cage,
@@ -326,9 +324,7 @@ def _gel(size: tuple[float, float], thickness: float, tessellation: float) -> Tr
 def _top(gel: TriangleMesh) -> TriangleMesh:
     """Return the top faces of the gel, on the same vertices, turned into the gel."""
     on_top = (gel.triangles[:, :, 2] == 0.0).all(axis=1)
-    used, faces = np.unique(gel.faces[on_top], return_inverse=True)
-    inward = faces.astype(np.int32).reshape(-1, 3)[:, ::-1]
-    return TriangleMesh(gel.vertices[used], inward)
+    return gel.with_faces(gel.faces[on_top]).compacted().flipped()
 
 
 def _plate(size: tuple[float, float], bottom: float, top: float) -> TriangleMesh:
