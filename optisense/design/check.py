@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -216,11 +216,7 @@ def _check_sensing_surfaces(
     if not solids:
         return problems
     for name in design.parts_of(Role.SENSING_SURFACE):
-        mesh = meshes[name]
-        chosen = np.linspace(0, len(mesh.faces) - 1, min(PROBES, len(mesh.faces))).astype(int)
-        centres, normals = mesh.triangles[chosen].mean(axis=1), mesh.face_normals[chosen]
-        front = _inside_any(centres + PROBE * normals, solids)
-        back = _inside_any(centres - PROBE * normals, solids)
+        chosen, front, back = solids_beside(meshes[name], solids)
         place = design.where("parts", name, "mesh")
         if np.count_nonzero(back & ~front) > len(chosen) / 2:
             problems.append(
@@ -260,8 +256,16 @@ def _check_provenance(design: SensorDesign) -> list[Diagnostic]:
     return problems
 
 
-def _inside_any(points: NDArray[np.float64], solids: list[TriangleMesh]) -> NDArray[np.bool_]:
-    result = np.zeros(len(points), dtype=bool)
-    for mesh in solids:
-        result |= inside(points, mesh)
-    return result
+def solids_beside(
+    skin: TriangleMesh, solids: Iterable[TriangleMesh]
+) -> tuple[NDArray[np.intp], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Return the numbers (k,) of up to `PROBES` faces spread over a sensing surface, and whether a
+    solid lies in front (k,) and behind (k,) each of them, at a distance of `PROBE`.
+    """
+    chosen = np.linspace(0, len(skin.faces) - 1, min(PROBES, len(skin.faces))).astype(int)
+    centres, normals = skin.triangles[chosen].mean(axis=1), skin.face_normals[chosen]
+    front, back = np.zeros(len(chosen), dtype=bool), np.zeros(len(chosen), dtype=bool)
+    for solid in solids:
+        front |= inside(centres + PROBE * normals, solid)
+        back |= inside(centres - PROBE * normals, solid)
+    return chosen, front, back

@@ -11,7 +11,7 @@ from optisense.design.limits import refuse_far
 from optisense.errors import ContactError, DesignError
 from optisense.geometry import SensingSurface, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle
-from optisense.sensors.from_meshes.directions import Direction, axis_of, vector
+from optisense.sensors.from_meshes.directions import Direction, axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
 
 FloatArray = NDArray[np.float64]
@@ -87,9 +87,7 @@ def ring(choice: Ring, bounds: FloatArray) -> list[Light]:
     for number in range(choice.count):
         angle = np.radians(choice.start + number * step)
         outward = np.cos(angle) * first + np.sin(angle) * second
-        ways = {"inward": -outward, "outward": outward}
-        given = choice.direction
-        way = ways[given] if isinstance(given, str) and given in ways else vector(given)
+        way = radial_vector(choice.direction, outward)
         tangent = -np.sin(angle) * first + np.cos(angle) * second
         upright = tangent if abs(way @ np.eye(3)[axis]) > 0.9 else np.eye(3)[axis]
         lights.append(light(centre + radius * outward, way, upright))

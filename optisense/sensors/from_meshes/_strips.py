@@ -14,7 +14,7 @@ from optisense.geometry import TriangleMesh
 from optisense.near import suggestion
 from optisense.sensors.from_meshes._lights import evenly, light
 from optisense.sensors.from_meshes._pick_and_place import BoardPart
-from optisense.sensors.from_meshes.directions import axis_of, vector
+from optisense.sensors.from_meshes.directions import axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
 
 FloatArray = NDArray[np.float64]
@@ -62,9 +62,7 @@ def along(choice: LightsAlong, mesh: TriangleMesh) -> list[Light]:
     for offset in evenly(choice.count, choice.pitch, line.length):
         place, out = _on_outline(corners, (zero + offset) % line.length)
         outward = out[0] * first + out[1] * second
-        ways = {"inward": -outward, "outward": outward}
-        given = choice.direction
-        looks = ways[given] if isinstance(given, str) and given in ways else vector(given)
+        looks = radial_vector(choice.direction, outward)
         spot = place[0] * first + place[1] * second + choice.gap * outward
         spot[axis] = height
         lights.append(light(spot, looks, np.eye(3)[axis]))

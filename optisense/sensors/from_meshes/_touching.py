@@ -10,10 +10,10 @@ from itertools import combinations
 import numpy as np
 
 from optisense.design import Role
+from optisense.design.check import solids_beside
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import cut, find_coincident
-from optisense.geometry.containment import inside
 from optisense.geometry.joining import EXACT, join, touching_area
 from optisense.geometry.overlaps import find_overlap
 from optisense.sensors.from_meshes.recipe import Recipe
@@ -28,13 +28,6 @@ MOSTLY = 0.95
 """Share of a sensing surface's area that must lie on an elastomer for the surface to count as on
 it.
 """
-
-PROBE = 0.05
-"""Distance beside the skin at which the part there is looked up, mm; gels are thicker and rounding
-errors are smaller.
-"""
-PROBES = 64
-"""Number of faces, spread over the skin, beside which the part is looked up."""
 
 
 @dataclass
@@ -181,15 +174,11 @@ def look_inward(
 
     If it lies on none, or between two, they point to the camera (`eye`, (3,) mm).
     """
-    chosen = np.linspace(0, len(skin.faces) - 1, min(PROBES, len(skin.faces))).astype(int)
-    centres, normals = skin.triangles[chosen].mean(axis=1), skin.face_normals[chosen]
-    front, back = np.zeros(len(chosen), dtype=bool), np.zeros(len(chosen), dtype=bool)
-    for solid in solids.values():
-        front |= inside(centres + PROBE * normals, solid)
-        back |= inside(centres - PROBE * normals, solid)
+    chosen, front, back = solids_beside(skin, solids.values())
     ahead, behind = int((front & ~back).sum()), int((back & ~front).sum())
     if ahead == behind and eye is not None:
-        toward = np.einsum("ij,ij->i", eye - centres, normals)
+        centres = skin.triangles[chosen].mean(axis=1)
+        toward = np.einsum("ij,ij->i", eye - centres, skin.face_normals[chosen])
         ahead, behind = int((toward > 0).sum()), int((toward <= 0).sum())
     if behind > ahead:
         return skin.flipped(), [f"the normals of {name} pointed outward and were reversed"]

@@ -71,6 +71,14 @@ def vector(way: Direction) -> FloatArray:
     return np.asarray(given / np.linalg.norm(given))
 
 
+def radial_vector(way: Direction, outward: FloatArray) -> FloatArray:
+    """Return the unit vector (3,) of a direction, which may also be "inward" or "outward": against
+    or along the unit vector `outward` (3,).
+    """
+    ways = {"inward": -outward, "outward": outward}
+    return ways[way] if isinstance(way, str) and way in ways else vector(way)
+
+
 def axis_of(side: str) -> tuple[int, float]:
     """Return 0, 1 or 2 for x, y or z, and the sign 1.0 or -1.0."""
     return "xyz".index(side[-1]), -1.0 if side.startswith("-") else 1.0
