@@ -40,7 +40,7 @@ def sample_steps(
     work: float,
     after: float,
     *,
-    again: bool = False,
+    is_cached: bool = False,
     times: UsualTimes | None = None,
 ) -> list[TimedStep]:
     """Return the steps of samples: their light and the first one, the others, and the work after
@@ -52,11 +52,11 @@ def sample_steps(
         count: number of samples.
         work: processor time of a sample on GelSight Mini, s.
         after: time of the work after the last sample, s.
-        again: whether the light is cached already, since other samples have used it.
+        is_cached: whether the light is cached already, since other samples have used it.
         times: usual durations for the sensor; those of a GelSight Mini on an idle machine if None.
     """
     usual = times or UsualTimes.here()
-    light = 0.0 if again else usual.first_light(photons) + usual.compiling()
+    light = 0.0 if is_cached else usual.first_light(photons) + usual.compiling()
     sample = work * usual.shading * usual.pace
     return [
         TimedStep(_light(name), 1, light + sample),

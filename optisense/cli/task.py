@@ -268,9 +268,9 @@ def _perceive(
     def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:
         found: list[TimedStep] = []
         for name in wanted:
-            photons, count, again = options.photons, options.samples, bool(found)
+            photons, count, is_cached = options.photons, options.samples, bool(found)
             found += sample_steps(
-                name, photons, count, SAMPLE_WORK, READING_TIME, again=again, times=times
+                name, photons, count, SAMPLE_WORK, READING_TIME, is_cached=is_cached, times=times
             )
         return found
 
