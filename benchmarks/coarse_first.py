@@ -61,7 +61,7 @@ class Case(NamedTuple):
     requirements: tuple[str, ...] = ()
 
     def design(self) -> SensorDesign:
-        """The design that the search starts from."""
+        """Return the design from which the search starts."""
         if isinstance(self.sensor, Path):
             return design_from_meshes(self.sensor).design
         return optisense.load(self.sensor)

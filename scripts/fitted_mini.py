@@ -33,7 +33,7 @@ from optisense.library.own_parts import HEADS
 from optisense.sensors._gelsight_mini import FITTED_CAMERA, FITTED_NUMBERS, unfitted_design
 
 UNIT = "one GelSight Mini, calibration pictures of GelSLAM (commit e0ea7de, MIT)"
-"""Whose photographs they are, for the source of each number."""
+"""Origin of the photographs, for the source of each number."""
 
 SHOWN = "d6p31_01.png", "d9p50_01.png"
 """Presses that are drawn: one of each ball; the fit has not seen the second."""
@@ -42,18 +42,18 @@ PHOTONS = 1_000_000
 """Photons of the drawn pictures, whose noise is then far below that of the photographs."""
 
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "gelsight-mini-fitted.png"
-"""Where the pictures are drawn."""
+"""File of the drawn pictures."""
 
 FILE = Path(ots.__file__).parent / "sensors" / FITTED_NUMBERS
-"""Where the fitted numbers are written, except those of the camera's processing."""
+"""File of the fitted numbers, except those of the camera's processing."""
 
 CAMERA_FILE = Path(ots.__file__).parent / "library" / "cameras" / f"{FITTED_CAMERA}.yaml"
-"""Where those of the camera's processing are written."""
+"""File of the numbers of the camera's processing."""
 
 
 def fitted_to(photographs: str) -> SensorDesign:
-    """The design after a fit with the usual settings, every third press held out; the field of view
-    is known."""
+    """Return the design after a fit with the usual settings, with every third press held out and
+    a known field of view."""
     found = calibrate(
         unfitted_design(),
         read_photographs(photographs),
@@ -67,7 +67,7 @@ def fitted_to(photographs: str) -> SensorDesign:
 
 
 def plain(value: object) -> object:
-    """A value as JSON has it, numbers to six digits: far more than is known of them."""
+    """Return a value as plain data with numbers of six digits, more than is known of them."""
     if hasattr(value, "model_dump"):
         value = value.model_dump(mode="json", exclude_none=True)
     if isinstance(value, dict):

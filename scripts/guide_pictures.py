@@ -28,7 +28,7 @@ MOVED, STILL, INK = "#c2410c", "#475569", "#1c232b"
 
 
 def cages() -> None:
-    """A cage at rest, one that bends, and the range of a mirror between its two ends."""
+    """Draw a cage at rest, one that bends, and the range of a mirror between its two ends."""
     figure = Figure(figsize=(13.0, 3.4), facecolor="white")
     rest = ots.load("gelsight-mini")
     bent = move_points(rest, "skin", {"1,*,2": (0.0, 0.0, 6.0)})
@@ -78,7 +78,7 @@ def _draw_cage(axes: Any, design: ots.SensorDesign, rest: ots.SensorDesign) -> N
 
 
 def _draw_range(axes: Any) -> None:
-    """Mirror M1 of GelSight Svelte in the plane y = 0."""
+    """Draw mirror M1 of GelSight Svelte in the plane y = 0."""
     design = ots.load("gelsight-svelte")
     rest = design.meshes["M1"].vertices
     middle = np.abs(rest[:, 1]) < 1e-6
@@ -101,7 +101,7 @@ def _draw_range(axes: Any) -> None:
 
 
 def pad() -> None:
-    """The example of the guide to one's own CAD files: a section, and what its camera sees."""
+    """Draw the example of the guide to one's own CAD files: a section, and the camera's picture."""
     design = design_from_meshes(EXAMPLE / "sensor.yaml").design
     (OUT / "pad-sensor-section.svg").write_text(section_svg(design), encoding="utf-8")
     print(OUT / "pad-sensor-section.svg")

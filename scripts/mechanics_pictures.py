@@ -21,7 +21,7 @@ ENLARGED = 8
 
 
 def skins() -> None:
-    """A screw, a coin and nine balls on a GelSight Mini, with either skin."""
+    """Draw a screw, a coin and nine balls on a GelSight Mini, with either skin."""
     model = ots.OpticalModel(ots.load("gelsight-mini-ideal"))
     pressed = {
         "screw, 0.5 mm deep": [parse_contact("object:screw-thread@0,0:0.5")],
@@ -42,7 +42,7 @@ def skins() -> None:
 
 
 def markers() -> None:
-    """Dots on a GelSight Mini under a ball, and arrows of their motion."""
+    """Draw dots on a GelSight Mini under a ball, and arrows of their motion."""
     design = ots.load("gelsight-mini-ideal")
     design.markers = Markers(grid=(11, 9), pitch=1.5, radius=0.3)
     ball = ots.Contact(ots.Sphere(4.0), at=(0.0, 0.0), depth=1.2)

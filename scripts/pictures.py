@@ -20,7 +20,7 @@ VARIANTS = {
 
 
 def render_variants() -> None:
-    """Nine balls pressed into each variant of GelSight Mini."""
+    """Draw nine balls pressed into each variant of GelSight Mini."""
     for name in VARIANTS:
         model = ots.OpticalModel(ots.load(name))
         image = model.render(model.nine_contacts(), resolution=(640, 480), photons=8_000_000)
@@ -29,7 +29,7 @@ def render_variants() -> None:
 
 
 def show_side_by_side() -> None:
-    """All variants in one picture."""
+    """Draw all variants in one picture."""
     figure, axes = plt.subplots(1, 3, figsize=(12, 3.4), facecolor="white")
     for axis, (name, label) in zip(axes, VARIANTS.items(), strict=True):
         axis.imshow(plt.imread(OUT / f"{name}.png"))

@@ -23,12 +23,12 @@ SEARCH = (
 PHOTONS = "3000000"
 WIDTH, HEIGHT, SCALE = 1280, 2036, 0.64
 """Width and height (pixels) of the browser's window, which shows the upper part of the page, and
-pixels of the picture for each of its own."""
+scale of the picture."""
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 
 
 def main() -> None:
-    """Search, report, picture."""
+    """Search, write the report and take the picture."""
     browser = next(filter(None, map(shutil.which, BROWSERS)), None)
     if browser is None:
         sys.exit("Chromium is needed to take the picture: none of " + ", ".join(BROWSERS))

@@ -20,7 +20,7 @@ DOTS_PER_INCH = 80
 
 
 def straight_and_bent(evaluation: Evaluation) -> None:
-    """Two lines through pressed balls: where they lie, the colours on them, and the fits."""
+    """Draw two lines through pressed balls: their place, the colours on them, and the fits."""
     figure = Figure(figsize=(12.0, 6.4), facecolor="white", layout="constrained")
     for row, (place, angle) in zip(figure.subplots(2, 3), LINES, strict=True):
         press = evaluation.presses[place - 1]
@@ -69,7 +69,7 @@ def _save(figure: Figure, name: str) -> None:
 
 
 def main() -> None:
-    """All of them."""
+    """Make all pictures."""
     OUT.mkdir(parents=True, exist_ok=True)
     evaluation = Evaluation(ots.OpticalModel(ots.load("gelsight-mini-ideal")))
     straight_and_bent(evaluation)

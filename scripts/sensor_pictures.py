@@ -30,7 +30,7 @@ SPECULARITY = 0.6
 
 
 def sections() -> None:
-    """A labelled section through each sensor."""
+    """Draw a labelled section through each sensor."""
     for name in DRAWN:
         path = OUT / f"{name}-section.svg"
         path.write_text(section_svg(sensors.build(name)), encoding="utf-8")
@@ -38,14 +38,14 @@ def sections() -> None:
 
 
 def tactile(design: SensorDesign, resolution: tuple[int, int] = (320, 240)) -> np.ndarray:
-    """(h, w, 3) uint8: nine balls pressed in, as the camera sees them."""
+    """Return the camera's picture (h, w, 3), uint8, of nine pressed balls."""
     model = OpticalModel(design)
     image = model.render(model.nine_contacts(), resolution=resolution, photons=PHOTONS)
     return image.picture()
 
 
 def side_by_side(name: str, panels: dict[str, np.ndarray], width: float = 4.0) -> None:
-    """Write pictures by their titles, each so many inches wide."""
+    """Write pictures, which are given by their titles, each `width` inches wide."""
     figure = Figure(figsize=(width * len(panels), 0.85 * width), facecolor="white")
     axes = np.atleast_1d(figure.subplots(1, len(panels)))
     for axis, (title, picture) in zip(axes, panels.items(), strict=True):
@@ -58,7 +58,7 @@ def side_by_side(name: str, panels: dict[str, np.ndarray], width: float = 4.0) -
 
 
 def digit() -> None:
-    """By the height of its LEDs and the finish of the edge that they shine into."""
+    """Draw DIGIT with LEDs of different heights and edges of different finishes."""
     usual = sensors.digit()
     panels: dict[str, np.ndarray] = {}
     for height, title, picture in (
@@ -81,12 +81,12 @@ def digit() -> None:
 
 
 def untouched(design: SensorDesign) -> np.ndarray:
-    """(h, w, 3) uint8: what the camera of a DIGIT sees with nothing pressed in."""
+    """Return the picture (h, w, 3), uint8, of a DIGIT that nothing touches."""
     return OpticalModel(design).render([], resolution=TALL, photons=PHOTONS).picture()
 
 
 def gelbelt() -> None:
-    """Its three light designs."""
+    """Draw GelBelt's three light designs."""
     panels = {
         f"light design {number}": tactile(sensors.gelbelt(light_design=number))
         for number in (1, 2, 3)
@@ -100,7 +100,7 @@ def gelsight360() -> None:
 
 
 def svelte() -> None:
-    """The whole of what M2 shows, and the palm only."""
+    """Draw GelSight Svelte's whole view in mirror M2, and that of the palm only."""
     panels = {
         "view='m2' (default)": tactile(sensors.gelsight_svelte()),
         "view='palm'": tactile(sensors.gelsight_svelte(view="palm")),
@@ -109,7 +109,7 @@ def svelte() -> None:
 
 
 def coatings() -> None:
-    """One contact of GelSight Mini under each reading of a specularity."""
+    """Draw one contact of GelSight Mini with each meaning of a specularity."""
     model = OpticalModel(
         set_value(sensors.gelsight_mini_ideal(), "coating.specularity", SPECULARITY)
     )

@@ -30,7 +30,7 @@ PHOTONS = 1_000_000
 
 
 def hex_nut(path: Path) -> None:
-    """A nut of 3 mm across corners' radius with a hole, lying flat, as STL."""
+    """Write a flat-lying nut with a hole and corners at 3 mm from its axis as STL."""
     turns = np.radians(np.arange(6) * 60)
     outline = Polygon(3.0 * np.column_stack([np.cos(turns), np.sin(turns)]))
     solid = trimesh.creation.extrude_polygon(outline - Point(0, 0).buffer(1.5), 2.0)
@@ -38,7 +38,7 @@ def hex_nut(path: Path) -> None:
 
 
 def dataset(model: ots.OpticalModel) -> None:
-    """Four samples: what the camera sees, depth and normals."""
+    """Draw pictures, depth and normals of four samples."""
     with TemporaryDirectory() as folder:
         nut = Path(folder) / "nut.stl"
         hex_nut(nut)
@@ -65,13 +65,13 @@ def dataset(model: ots.OpticalModel) -> None:
 
 
 def misalignment(model: ots.OpticalModel) -> None:
-    """Read against true angles."""
+    """Draw estimated against true angles."""
     settings = SampleSettings(count=80, resolution=(32, 24), photons=PHOTONS)
     _save(draw_perception(perceive(Misalignment(), model, settings)), "task-misalignment")
 
 
 def reconstruction(model: ots.OpticalModel) -> None:
-    """Three shapes that the network was not fitted to."""
+    """Draw three shapes to which the network was not fitted."""
     settings = ReconstructionSettings(resolution=(160, 120), photons=PHOTONS)
     result = reconstruct(model, settings)
     _save(draw_reconstruction(result, model.design.camera.axes()), "task-reconstruction")

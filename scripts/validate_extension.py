@@ -12,7 +12,7 @@ from pathlib import Path
 
 
 def main() -> int:
-    """Validate the file named on the command line; the tool's exit code."""
+    """Validate the file named on the command line, and return the tool's exit code."""
     spec = find_spec("bpy")
     if spec is None or spec.origin is None:
         sys.exit("this Python has no Blender: make setup-blender")

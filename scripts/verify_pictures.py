@@ -27,7 +27,7 @@ PHOTONS = 2_000_000
 
 
 def objects() -> None:
-    """The twelve objects, lit from the side, and below each what a GelSight Mini sees of it."""
+    """Draw the twelve objects, lit from the side, and below each the picture of a GelSight Mini."""
     model = ots.OpticalModel(ots.load("gelsight-mini-ideal"))
     figure = Figure(figsize=(12, 8.6), layout="constrained")
     grid = figure.subplots(4, 6)
@@ -62,7 +62,7 @@ SHOWN = {"svelte": ("aoap", "coverage"), "pad": ("reading.mean_of_places", "cove
 
 
 def side_by_side(case: str, start: str, better: str) -> None:
-    """Two designs with nine balls pressed into each."""
+    """Draw two designs with nine balls pressed into each."""
     figure = Figure(figsize=(12, 4.9), layout="constrained")
     for axes, title, name in zip(
         figure.subplots(1, 2), ("start", "best"), (start, better), strict=True

@@ -73,7 +73,7 @@ class CalibrateOptions(PhotographOptions):
 
 
 def read_range(text: str) -> tuple[str, float, float]:
-    """The path, the lowest and the highest value of a PATH=LO:HI.
+    """Return the path, the lowest and the highest value of a PATH=LO:HI.
 
     Raises:
         ValueError: the text is something else.

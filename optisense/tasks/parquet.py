@@ -143,7 +143,7 @@ def _write(
 
 
 def features_of(height: int, width: int) -> dict[str, Any]:
-    """The types of the columns, as Hugging Face's `datasets` writes them.
+    """Return the types of the columns, as Hugging Face's `datasets` writes them.
 
     Args:
         height, width: size of the pictures, pixels.

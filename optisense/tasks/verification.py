@@ -152,7 +152,7 @@ class Verification:
         return INCONCLUSIVE if {normals, depth} == {BETTER, WORSE} else normals
 
     def in_words(self) -> str:
-        """The verdict as a sentence with its numbers."""
+        """Return the verdict as a sentence with its numbers."""
         normals, depth = self.normal_change, self.depth_change
         second = self.names[1]
         numbers = (
