@@ -72,7 +72,7 @@ AS_STRONG = 0.3
 that was pressed in for the background gives a response of the same order."""
 
 LEAST_RADIUS = 2.0
-"""Smallest radius of a contact, in pixels; smaller spots are dust."""
+"""Smallest radius of a contact, in pixels; dust on the gel or the lens makes smaller spots."""
 
 
 @dataclass(frozen=True)

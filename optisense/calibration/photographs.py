@@ -41,7 +41,8 @@ JPEG files of grey pictures differ by less, and those of coloured light by tens.
 """
 
 BRIGHTEST = 95.0
-"""Percentile of the brightest channel that is compared with `DARK_LEVEL`."""
+"""Percentile of the brightest channel that is compared with `DARK_LEVEL`, so that hot
+pixels and small reflections do not decide."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ distance between labels; a drawing of this size fits a page of text.
 TALLEST = 520.0
 """Largest height of the drawing in pixels, so that it fits a screen below the page's heading."""
 DOT = 3.2
-"""Radius of the dot that stands for a light, in pixels."""
+"""Radius of the dot that stands for a light, in pixels: large enough to show the light's colour."""
 
 INK = "#1c232b"
 RAY, LOST_RAY = "#7a3fb8", "#8d97a3"

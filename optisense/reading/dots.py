@@ -13,7 +13,8 @@ REACH = 0.5
 """Search radius around a dot's place at rest, over the distance to its nearest neighbour; with a
 half, the search areas of two dots do not overlap."""
 LEAST_REACH = 1.5
-"""Smallest search radius of a dot, pixels."""
+"""Smallest search radius of a dot, pixels; it includes the pixels beside the dot's place at rest
+(at most the root of 2 away), from which its middle is computed."""
 FAINTEST = 0.3
 """Darkness from which on pixels belong to a dot, over the greatest darkness near it; shading by
 lights is fainter than ink."""

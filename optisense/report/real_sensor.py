@@ -44,7 +44,8 @@ no shadow of the ball falls there.
 """
 
 DARK, BRIGHT = 5.0, 95.0
-"""Percentiles of the background between which its evenness is measured."""
+"""Percentiles of the background between which its evenness is measured; single bright or dark
+pixels do not change them."""
 
 
 @dataclass(frozen=True)

@@ -44,10 +44,11 @@ LED = "everlight-19-337"
 CAMERA = "ovm7692"
 
 CORNERS = (1.3, 0.5)
-"""Radius of the corners at the straight end of gel and acrylic, mm."""
+"""Radius of the corners at the straight end of gel and acrylic, mm, from the published CAD of DIGIT
+(`_digit_sources`)."""
 
 HALF_OVERHANG = 0.05
-"""Distance by which the gel is wider than the acrylic on each side, mm."""
+"""Distance by which the gel is wider than the acrylic on each side, mm, from the published CAD."""
 
 OPENING_GAP = 0.09
 """Distance between the gel and the opening of the housing, mm: 18.58 mm for a gel of 18.4."""
@@ -58,10 +59,11 @@ straight end (a cavity of 20.8 x 30 mm).
 """
 
 HOUSING_WALL = 1.5
-"""Thickness of wall and floor of the housing, mm."""
+"""Thickness of wall and floor of the housing, mm, an assumption; no light passes the walls."""
 
 BEHIND_PUPIL = 2.0
-"""Distance from the camera's pupil to the floor of the housing, mm."""
+"""Distance from the camera's pupil to the floor of the housing, mm, an assumption; the floor is
+behind the camera and out of its sight."""
 
 SMOOTHER = 16
 """Sides of the outline that the rings of the dome are cut from, for each side of a ring: their

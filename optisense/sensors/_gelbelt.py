@@ -80,15 +80,18 @@ ROLLER_CLEARANCE = 1.0
 WHEEL_GAP = 0.02
 """Smallest air gap between belt and wheels, mm, so that they are not in optical contact."""
 BESIDE_WINDOW = 0.5
-"""Distance from the edge of the window to the target of green light in light design 2, mm."""
+"""Distance from the edge of the window to the target of green light in light design 2, mm, an
+assumption: the light is aimed just past the window."""
 BEHIND_ROLLER = 2.0
-"""Distance from the roller to the target of green light in light design 3, mm."""
+"""Distance from the roller to the target of green light in light design 3, mm, an assumption: the
+light is aimed just past the roller."""
 GREEN_LEAD = 3.0
 """Ratio of green's power to that of red and blue, because green has a longer path from one end
 only.
 """
 WRAP = 90.0
-"""Angle by which the belt is turned at the end of the modelled part, degrees."""
+"""Angle by which the belt is turned at the end of the modelled part, degrees: light that gets past
+a quarter turn does not come back (`_gelbelt_sources`)."""
 
 
 class GelBeltDimensions(Dimensions):

@@ -14,7 +14,7 @@ SENSOR = "gelbelt"
 LED_WINDOW = 2.4
 """Diameter of the emitting window of an SMD 3528 LED, as in the library, mm."""
 LED_LENGTH = 3.5
-"""Length of the body of an LED along its row, mm."""
+"""Length of the body of an SMD 3528 LED along its row, as in the library, mm."""
 CAMERA_DEPTH = 9.0
 """Length of the camera module behind its pupil, which must not reach into a part, mm."""
 LEAST_FILM = 0.005

@@ -15,17 +15,19 @@ from optisense.sensors._led_flux import package
 COLOURS = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
 """Shares of red, green and blue in the light of each colour."""
 BOARDS = 4
-"""Number of LED boards around the sensor's axis."""
+"""Number of LED boards around the sensor's axis: eight light groups, two on each board."""
 
 LED_MODEL = "smd-0805"
 LED = (1.25, 2.0)
-"""Width (along the radius) and length of an LED's emitting window, mm."""
+"""Width (along the radius) and length of an LED's emitting window, mm: the size of the
+package 0805."""
 WINDOW_GAP = 0.01
 """Distance between an LED's body and its window, mm: wide enough not to count as contact."""
 WALL_MARGIN = 0.15
-"""Thickness of the wall that remains on both sides of a board, mm."""
+"""Thickness of the wall that remains on both sides of a board, mm, an assumption."""
 RING_HEIGHT = 0.3
-"""z of the windows of a ring of LEDs at the foot of the wall, mm."""
+"""z of the windows of a ring of LEDs at the foot of the wall, mm, an assumption: just inside
+the wall."""
 
 FloatArray = NDArray[np.float64]
 

@@ -18,10 +18,10 @@ LED = "smd-3528"
 """Light of the library beside the gel."""
 
 BEHIND_M2 = 1.0
-"""Distance between mirror M2 and the body behind it, mm; no light passes there."""
+"""Distance between mirror M2 and the body behind it, mm, an assumption; no light passes there."""
 
 BESIDE_MIRROR = 0.5
-"""Distance between the edges of the mirrors and the side walls, mm."""
+"""Distance between the edges of the mirrors and the side walls, mm, an assumption."""
 
 
 def check_mirrors(

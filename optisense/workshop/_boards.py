@@ -19,7 +19,8 @@ face in one direction.
 """
 
 SAME_DIRECTION = 1e-3
-"""Largest angle between directions that count as equal, radians."""
+"""Largest angle between directions that count as equal, radians: 0.06 degrees, the rounding of
+directions that are written with three decimals."""
 
 FARTHEST = 15.0
 """Largest distance between neighbouring LEDs of one board, mm; rows of LEDs in such sensors have a

@@ -27,13 +27,14 @@ BORDER = 8.0
 """Margin around the drawing, mm; printers leave 4 to 6 mm of a sheet blank."""
 
 OFF = 7.0
-"""Distance between a view and the line of its dimension, mm."""
+"""Distance between a view and the line of its dimension, mm: nearly half of `GAP`, so that the
+number stands clear of both views."""
 
 TEXT = 2.5
 """Height of letters, mm: the smallest of ISO 3098 that is read easily."""
 
 ARROW = 2.0
-"""Length of an arrow of a dimension, mm."""
+"""Length of an arrow of a dimension, mm, a little less than the height of the letters beside it."""
 
 STEPS_OF_CURVE = 4
 """Number of points for each corner of a curve in a DXF file, whose release 12 has no splines."""

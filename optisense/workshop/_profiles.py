@@ -23,7 +23,8 @@ ARC_CORNERS = 5
 """Smallest number of corners on one circle that make an arc; three always lie on a circle."""
 
 SMOOTH = 20.0
-"""Largest angle between neighbouring sides of a smooth curve, degrees."""
+"""Largest angle between neighbouring sides of a smooth curve, degrees: polygons of 18 sides and
+more count as circles."""
 
 SMOOTH_SAGITTA = 0.05
 """Largest distance of a smooth curve from the sides of its polygon, mm; five times the tolerance of
@@ -36,7 +37,8 @@ steady steps; a longer side beside them is a straight one, such as that of a mit
 """
 
 CURVE_CORNERS = 6
-"""Smallest number of corners in a smooth run that make a curve."""
+"""Smallest number of corners in a smooth run that make a curve: one more than for an arc, whose
+circle is a stronger sign than a smooth run."""
 
 
 class OutlinePiece(NamedTuple):

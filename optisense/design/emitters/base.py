@@ -27,7 +27,7 @@ narrower than this, and for narrower ones the axis is kept.
 """
 
 DARK = 1e-6
-"""Smallest share of the peak that counts as light; less is dark."""
+"""Smallest share of the peak intensity that counts as light, far below the noise of any picture."""
 
 POLAR_ANGLES = 1025
 """Number of polar angles of a table over the beam; a beam of 90 degrees gets one every 0.09
