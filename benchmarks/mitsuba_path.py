@@ -9,8 +9,8 @@ import mitsuba as mi
 import numpy as np
 
 from benchmarks.case import RESOLUTION, Case, ball
+from benchmarks.mitsuba_export import mitsuba_scene
 from benchmarks.snapshots import Snapshot, due_times
-from optisense.optics.mitsuba_export import mitsuba_scene
 from optisense.optics.scene import assembly
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import Region

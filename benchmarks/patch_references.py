@@ -20,13 +20,13 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.mitsuba_export import mitsuba_scene
 from benchmarks.reference import WindowCamera, box_around
 from optisense import OpticalModel
 from optisense.design import SensorDesign
 from optisense.geometry import Contact
 from optisense.optics import TactileImage
 from optisense.optics.imaging.sppm import render_sppm
-from optisense.optics.mitsuba_export import mitsuba_scene
 from optisense.optics.scene import assembly
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.photons import Emission

@@ -11,11 +11,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
 from optisense.design.emitters import Intensity
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.sppm import render_sppm
-from optisense.optics.mitsuba_export import PATH_DEPTH, Colour, mitsuba_scene
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.radiance_cache.tracing_limits import TracingLimits

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from optisense.optics.mitsuba_export import surface_bsdf
+from benchmarks.mitsuba_export import surface_bsdf
 from optisense.optics.scene.bsdf import (
     CoatingBsdf,
     evaluate_coating,

@@ -9,11 +9,11 @@ import pytest
 from reference_scenes import ReferenceScene, box, diffuse_coating, emitting_face, quad
 
 import optisense as ots
+from benchmarks.mitsuba_export import mitsuba_scene
 from optisense.design.emitters import Intensity
 from optisense.design.materials import Dielectric
 from optisense.optics import OpticalModel
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.mitsuba_export import mitsuba_scene
 from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import RGB, Surface, SurfaceKind
