@@ -90,6 +90,27 @@ def test_responses_grow_with_the_skin_that_a_pixel_sees(mini: OpticalModel) -> N
     assert found[1] == pytest.approx(np.full_like(ground, 0.5 * (wider - 1.0)), rel=0.1)
 
 
+def test_a_displacement_does_not_average_the_noise_of_layers(mini: OpticalModel) -> None:
+    """Otherwise a fit prefers a view that is off by half a pixel, because its noise is smaller."""
+    pixel = np.ptp(mini.chief_rays(SIZE).points[60, :, 0]) / (SIZE[0] - 1)
+    before, after = (
+        CoveredView.of(each, SIZE) for each in (mini, seen_from((0.0, 0.5 * pixel, 0.0)))
+    )
+    slope = 3.0 * np.tile(np.arange(SIZE[0], dtype=np.float32), (SIZE[1], 1))
+    noise = np.random.default_rng(5).standard_normal(slope.shape).astype(np.float32)
+    chain = mini.picture_chain
+    changes = []
+    for picture in (slope, slope + noise):
+        ground = np.repeat(picture[None, ..., None], 3, axis=-1)
+        changes += view_changes(
+            LayeredPictures(("white",), ground, (), chain, ()), [], before, after
+        )
+    clean, noisy = (change[0, ..., 0] for change in changes)
+    assert clean[:, 20:-20].mean() == pytest.approx(1.5, rel=0.1)
+    # A displacement by half a pixel would halve the variance.
+    assert np.var(noise + noisy - clean) == pytest.approx(np.var(noise), rel=0.02)
+
+
 def test_a_hidden_view_is_found() -> None:
     real = seen_from(HIDDEN)
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
