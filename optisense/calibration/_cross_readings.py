@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.calibration._far_field import without_drift
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import CrossReading, Realism, distances, realism
@@ -144,11 +145,12 @@ def cross_readings(
     def noisy(picture: FloatArray) -> FloatArray:
         return picture + noise * random.standard_normal(picture.shape)
 
-    real = _pixels_of(
-        [press.picture.astype(np.float64) for press in photographs.presses],
-        photographs.background.astype(np.float64),
-        balls,
-    )
+    ground = photographs.background.astype(np.float64)
+    steady = [
+        ground + without_drift(press.picture - ground, distances(ground.shape[:2], place))
+        for press, place in zip(photographs.presses, seen, strict=True)
+    ]
+    real = _pixels_of(steady, ground, balls)
     shown = _pixels_of(
         [noisy(picture) for picture in pictures.presses], noisy(pictures.background), balls
     )

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from optisense.calibration._correlated_errors import ErrorScale, error_scale
+from optisense.calibration._far_field import without_drift
 from optisense.calibration._layered_pictures import LayeredPictures, contact_slopes
 from optisense.calibration._solution import Solution
 from optisense.calibration.model_pictures import levels_of
@@ -132,11 +133,13 @@ class LayeredFit:
         limits = np.array([each.limits() for each in chosen]).reshape(-1, 2)
         self._low, self._high = limits[:, 0], limits[:, 1]
         self._real = self._compared(photographs.background)
-        self._responses = [
-            self._compared(press.picture) - self._real for press in photographs.presses
-        ]
         shape = self._real.shape[:2]
-        self._masks = [distances(shape, place) <= NEAR for place in seen]
+        away = [distances(shape, place) for place in seen]
+        self._responses = [
+            without_drift(self._compared(press.picture) - self._real, distance)
+            for press, distance in zip(photographs.presses, away, strict=True)
+        ]
+        self._masks = [distance <= NEAR for distance in away]
         scale = shape[1] / 320.0
         self._contact_spread = np.array(CONTACT_SPREAD) * (scale, scale, 1.0)
         self._contact_slopes = [

@@ -1,9 +1,10 @@
 """Differences between a model's pictures and photographs of the real sensor.
 
-A *response* is a picture with something pressed in minus the picture with nothing. All figures of
-presses compare responses, in two regions: the *contact*, a disc, and the *ring* around it, from 1.1
-to 1.6 radii, where an elastic skin is pulled in. The similarity of whole pictures says little: the
-bare background reaches 0.975 there.
+A *response* is a picture with something pressed in minus the picture with nothing; that of
+photographs is also without the drift between both (`optisense.calibration._far_field`). All figures
+of presses compare responses, in two regions: the *contact*, a disc, and the *ring* around it, from
+1.1 to 1.6 radii, where an elastic skin is pulled in. The similarity of whole pictures says little:
+the bare background reaches 0.975 there.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from optisense.calibration._far_field import FAR, drift, without_noise
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact
@@ -32,10 +34,6 @@ PATCH = 1.35
 """Radius of the patch over which the unexplained energy and the similarity are measured, in radii
 of the contact: it contains the contact and the steepest part of the skin around it.
 """
-
-FAR = 3.0
-"""Distance beyond which a press should change nothing, in radii of the contact: well outside the
-ring, where the skin is pulled in."""
 
 SIMILARITY_WINDOW = 0.2
 """Standard deviation of the similarity's window, in radii of the contact: about six pixels of a
@@ -83,6 +81,10 @@ class PressRealism:
         far: root mean square of the error beyond three radii, levels.
         far_real: root mean square of the real response beyond three radii, which is mostly noise,
             levels.
+        far_smooth: root mean square of the part of the error beyond three radii that is not noise,
+            levels; it contains the drift.
+        drift: mean of the difference between photograph and background beyond three radii, for R, G
+            and B, levels. It is subtracted before all other figures are computed.
         similarity: structural similarity (SSIM) of the responses, mean over the patch.
         turn: angles between the directions in which the model and the sensor brighten over the
             contact, for R, G and B, degrees.
@@ -98,6 +100,8 @@ class PressRealism:
     strength: float
     far: float
     far_real: float
+    far_smooth: float
+    drift: tuple[float, float, float]
     similarity: float
     turn: tuple[float, float, float]
     gain: tuple[float, float, float]
@@ -207,8 +211,13 @@ def realism(
 
 
 def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) -> PressRealism:
-    """Return the figures of one press, from both responses (h, w, 3)."""
+    """Return the figures of one press, from the differences (h, w, 3) between pictures with and
+    without it.
+    """
     distance = distances(real.shape[:2], seen)
+    drifted = drift(real, distance)
+    far_smooth = without_noise(model - real, distance > FAR)
+    real = real - drifted
     contact = distance <= 1.0
     ring = (distance >= RING[0]) & (distance <= RING[1])
     patch = distance <= PATCH
@@ -225,6 +234,8 @@ def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) ->
         strength=math.sqrt(_square(real[contact])),
         far=math.sqrt(_square(error[far])),
         far_real=math.sqrt(_square(real[far])),
+        far_smooth=far_smooth,
+        drift=_each(drifted.tolist()),
         similarity=float(similarity(real, model, SIMILARITY_WINDOW * seen.radius)[patch].mean()),
         turn=turns,
         gain=gains,
@@ -307,15 +318,12 @@ def similarity(one: FloatArray, other: FloatArray, window: float) -> FloatArray:
 
 
 def _background(real: FloatArray, model: FloatArray) -> BackgroundRealism:
-    def each(values: list[float]) -> tuple[float, float, float]:
-        return values[0], values[1], values[2]
-
     error = _square(model - real)
     return BackgroundRealism(
-        correlation=each([_correlation(real[..., c], model[..., c]) for c in range(3)]),
-        real=each([float(real[..., c].mean()) for c in range(3)]),
-        model=each([float(model[..., c].mean()) for c in range(3)]),
-        error=each([math.sqrt(_square(model[..., c] - real[..., c])) for c in range(3)]),
+        correlation=_each([_correlation(real[..., c], model[..., c]) for c in range(3)]),
+        real=_each([float(real[..., c].mean()) for c in range(3)]),
+        model=_each([float(model[..., c].mean()) for c in range(3)]),
+        error=_each([math.sqrt(_square(model[..., c] - real[..., c])) for c in range(3)]),
         ratio=10.0 * math.log10(LEVELS**2 / max(error, 1e-6)),
     )
 
@@ -329,3 +337,7 @@ def _correlation(one: FloatArray, other: FloatArray) -> float:
 
 def _square(values: FloatArray) -> float:
     return float((values**2).mean()) if values.size else 0.0
+
+
+def _each(values: list[float]) -> tuple[float, float, float]:
+    return values[0], values[1], values[2]

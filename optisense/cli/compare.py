@@ -112,22 +112,22 @@ def reading_lines(found: Realism) -> list[str]:
 
 def print_comparison(found: Comparison) -> None:
     """Print a table of the presses, and one of the background."""
-    table = table_of("press", "unexplained", "contact", "ring", "far field", "similarity")
+    table = table_of("press", "unexplained", "contact", "ring", "similarity", "far field")
     for press in found.realism.presses:
         table.add_row(
             press.name,
             f"{press.unexplained:.2f}",
             f"{press.contact:.2f}",
             f"{press.ring:.2f}",
-            f"{press.far:.1f} of {press.far_real:.1f}",
             f"{press.similarity:.2f}",
+            f"{press.far_smooth:.1f}",
         )
     table.add_row(
         "noise alone",
         *(f"{found.realism.median_of_noise(name):.2f}" for name in ("unexplained", "contact")),
         f"{found.realism.median_of_noise('ring'):.2f}",
-        f"{found.realism.median('far_real'):.1f}",
         f"{found.realism.median_of_noise('similarity'):.2f}",
+        "",
     )
     output.print(table)
     ground = found.realism.background

@@ -22,6 +22,7 @@ FIGURES = {
     "ring": "error over response, ring",
     "similarity": "similarity of the responses",
     "far": "far field, levels",
+    "far_smooth": "far field without noise, levels",
 }
 """Figures of presses whose medians the page shows, with their labels."""
 
@@ -109,9 +110,9 @@ def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
     after = found.after.realism
     rows: list[tuple[str, ...]] = []
     for name, words in FIGURES.items():
-        noise = after.median("far_real") if name == "far" else after.median_of_noise(name)
+        noise = _noise(after, name)
         medians = ("" if each is None else f"{each.median(name):.3f}" for each in columns)
-        rows.append((words, *medians, f"{noise:.3f}"))
+        rows.append((words, *medians, "" if noise is None else f"{noise:.3f}"))
     for name, words in READINGS.items():
         values = [math.nan if each is None else each.median_reading(name) for each in columns]
         if not all(map(math.isnan, values)):  # else there are too few presses for these readers
@@ -120,3 +121,10 @@ def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
     ratios = [side.realism.background.ratio for side in (found.before, found.after)]
     rows.append(("background, dB", *(f"{ratio:.1f}" for ratio in ratios), "", "", ""))
     return rows
+
+
+def _noise(found: Realism, name: str) -> float | None:
+    """Return the median of one of the figures of a model without errors, or None if it is 0."""
+    if name == "far":
+        return found.median("far_real")
+    return None if name == "far_smooth" else found.median_of_noise(name)

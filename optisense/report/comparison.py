@@ -115,6 +115,7 @@ def press_row(press: PressRealism) -> tuple[str, ...]:
         f"{press.ring:.2f}",
         f"{press.similarity:.2f}",
         f"{press.far:.1f} / {press.far_real:.1f}",
+        f"{press.far_smooth:.1f}",
         " / ".join(f"{turn:.0f}" for turn in press.turn),
         " / ".join(f"{gain:.2f}" for gain in press.gain),
     )
@@ -129,6 +130,7 @@ def noise_row(found: Realism) -> tuple[str, ...]:
         f"{found.median_of_noise('ring'):.2f}",
         f"{found.median_of_noise('similarity'):.2f}",
         f"{found.median('far_real'):.1f}",
+        "",
         "",
         "",
     )

@@ -21,6 +21,7 @@ from optisense.calibration import (
     save_photographs,
 )
 from optisense.calibration._cross_readings import cross_readings
+from optisense.calibration._far_field import without_noise
 from optisense.calibration.contact_finding import find_contact
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.realism import realism, similarity
@@ -87,6 +88,34 @@ def test_a_model_without_errors_has_the_figures_of_noise_alone() -> None:
         assert getattr(found.noise, name) == pytest.approx(getattr(found, name), rel=0.1)
     assert found.noise.similarity == pytest.approx(found.similarity, abs=0.01)
     assert found.similarity < 0.99
+
+
+def test_a_drift_between_background_and_press_is_no_error_of_the_model() -> None:
+    """Only the figures of the far field and of the drift contain it."""
+    plain, response = np.full((120, 160, 3), 120.0), cone((70.0, 60.0), 12.0)
+    pictures = ModelPictures(1.0, plain, (plain + response,), ())
+    found = []
+    for drift in (0.0, 3.0):
+        noise = 2.0 * np.random.default_rng(8).standard_normal(plain.shape)
+        taken = np.round(plain + response + noise + (drift, 0.0, 0.0)).astype(np.uint8)
+        press = PhotographedPress("a.png", taken, 6.0)
+        photographs = Photographs(plain.astype(np.uint8), (press,))
+        found += realism(photographs, [SeenContact((70.0, 60.0), 12.0)], pictures).presses
+    steady, drifted = found
+    assert drifted.unexplained == pytest.approx(steady.unexplained, rel=0.01)
+    assert drifted.similarity == pytest.approx(steady.similarity, abs=0.002)
+    assert np.array(drifted.drift) - steady.drift == pytest.approx([3.0, 0.0, 0.0], abs=0.01)
+    # beyond three radii, there is the slope of the response
+    assert steady.far_smooth < 0.5
+    assert drifted.far_smooth**2 - steady.far_smooth**2 == pytest.approx(3.0, rel=0.2)
+
+
+def test_the_part_of_an_error_without_noise_is_that_of_a_smooth_error() -> None:
+    columns = np.tile(np.arange(160), (120, 1))
+    smooth = np.repeat(np.sin(columns / 20.0)[..., None], 3, axis=2)
+    noise = 5.0 * np.random.default_rng(4).standard_normal(smooth.shape)
+    everywhere = np.ones((120, 160), dtype=bool)
+    assert without_noise(smooth + noise, everywhere) == pytest.approx(np.sqrt(0.5), rel=0.2)
 
 
 def test_no_contact_is_found_in_noise() -> None:
