@@ -7,16 +7,19 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+from warm_python import programs
 
 import optisense as ots
+from optisense.cli import app
 from optisense.errors import OptiSenseError
 from optisense.folders import FolderLock
 from optisense.search import SearchSpace, Study, search
+from optisense.search.executors import remote
 
 OWN_FILE = '''
 import os
@@ -28,7 +31,7 @@ def meet(name):
     """Tell the test that this place is reached, and wait until it says go."""
     if (HERE / name).exists():
         with (HERE / name).open("w") as place:
-            place.write("here")
+            place.write(str(os.getpid()))
         with (HERE / f"{name}-go").open() as place:
             place.read()
 
@@ -51,10 +54,10 @@ class Meeting:
         os.mkfifo(self._here)
         os.mkfifo(self._go)
 
-    def wait(self) -> None:
-        """Wait until a process has reached the barrier."""
+    def wait(self) -> int:
+        """Wait until a process has reached the barrier, and return its number."""
         with self._here.open() as place:
-            place.read()
+            return int(place.read())
 
     def go(self) -> None:
         """Release the process, and let all others pass."""
@@ -85,7 +88,7 @@ def _none_stays() -> Iterator[None]:
 
 def started(*words: object) -> subprocess.Popen[str]:
     process = subprocess.Popen(
-        [sys.executable, "-m", "optisense.cli", *map(str, words)],
+        [programs() / "optisense", *map(str, words)],
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -104,6 +107,12 @@ def ran(*words: object) -> tuple[int, str]:
     return ended(started(*words))
 
 
+def ran_here(*words: object) -> tuple[int, str]:
+    """The same in this process."""
+    result = CliRunner().invoke(app, list(map(str, words)))
+    return result.exit_code, result.output
+
+
 def search_words(mine: Path, out: Path, *more: object) -> list[object]:
     return ["search", "gelsight-mini-ideal", "--vary", "coating.specularity=0:1",
             "-b", f"{mine}:score", "--rule", f"{mine}:fine", "--budget", 3, "--method", "random",
@@ -116,12 +125,12 @@ def test_a_study_that_runs_is_not_touched_by_others(mine: Path, tmp_path: Path) 
     asked = Meeting(tmp_path, "asked")
     out = tmp_path / "study"
     first = started(*search_words(mine, out))
-    asked.wait()
+    running = asked.wait()
     (out / "notes.txt").write_text("mine")
     for words in (["search", "--resume", "--trust", "--out", out], search_words(mine, out)):
         code, said = ran(*words)
         assert code == 1, said
-        assert f"process {first.pid} on" in said
+        assert f"process {running} on" in said
         assert "Wait for it" in said
     code, said = ran("apply", out, "--out", tmp_path / "early")
     assert code == 2 and "No trial is finished yet" in said
@@ -204,11 +213,16 @@ def test_every_command_asks_for_the_lock(words: list[object], tmp_path: Path) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("cause", ["cluster", "rule", "all fail"])
-def test_a_failed_search_removes_nothing_of_others(cause: str, mine: Path, tmp_path: Path) -> None:
+def test_a_failed_search_removes_nothing_of_others(
+    cause: str, mine: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What it made itself is removed where it holds no trial; a study that was there stays."""
     out = tmp_path / "study"
+    run = ran
     if cause == "cluster":
-        code, said = ran(*search_words(mine, out, "--cluster", "tcp://127.0.0.1:9"))
+        run = ran_here  # which need not wait long for a scheduler
+        monkeypatch.setattr(remote, "CONNECT_SECONDS", 0.5)
+        code, said = run(*search_words(mine, out, "--cluster", "tcp://127.0.0.1:9"))
         assert code == 1 and "no Dask scheduler answers" in said
         assert "the study was removed" in said
         assert not out.exists()
@@ -231,7 +245,7 @@ def test_a_failed_search_removes_nothing_of_others(cause: str, mine: Path, tmp_p
         more = ["--cluster", "tcp://127.0.0.1:9"]
     else:
         mine.write_text(mine.read_text() + "\n# edited\n")
-    code, said = ran("search", "--resume", "--trust", "--out", out, *more)
+    code, said = run("search", "--resume", "--trust", "--out", out, *more)
     assert code != 0
     assert (out / "notes.txt").read_text() == "mine"
     assert (out / "study.json").read_text() == before

@@ -24,11 +24,11 @@ HOLD = Path(__file__).with_name("hold")
 def shine(evaluation):
     '''Best at a specularity of 0.5, and at a camera further up; renders nothing.
 
-    It takes a second while the file `hold` is there, so that a search lasts.
+    It takes longer while the file `hold` is there, so that a search lasts.
     '''
     design = evaluation.design
     if HOLD.exists():
-        time.sleep(1.0)
+        time.sleep(0.2)
     return -abs(design.coating.specularity - 0.5) + 0.01 * design.camera.position[2]
 """
 
@@ -42,7 +42,7 @@ def goal(tmp_path: Path) -> str:
 
 @pytest.fixture
 def hold(tmp_path: Path) -> Path:
-    """While this file is there, each trial takes a second."""
+    """While this file is there, each trial takes longer."""
     file = tmp_path / "hold"
     file.touch()
     return file

@@ -15,7 +15,7 @@ from studio.optimise import search_progress, unfinished_studies
 from studio.optimise.operator import TITLE
 from studio.scene.collections import objects_of
 
-TRIALS = 30
+TRIALS = 60
 """Number of trials of a search that is stopped during its first trials."""
 
 GOAL = """
@@ -25,9 +25,9 @@ from pathlib import Path
 HOLD = Path(__file__).with_name("hold")
 
 def height(evaluation):
-    '''How high the gel is; takes a second while the file `hold` is there, so that it lasts.'''
+    '''How high the gel is; takes longer while the file `hold` is there, so that it lasts.'''
     if HOLD.exists():
-        time.sleep(1.0)
+        time.sleep(0.2)
     return float(evaluation.design.deformed_meshes()["gel"].vertices[:, 2].mean())
 """
 
