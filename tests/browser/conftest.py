@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from shutil import which
 
@@ -43,6 +44,13 @@ def pages(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> dict[st
 @pytest.fixture
 def visit(browser: Browser) -> Iterator[Open]:
     """Opener of pages in new windows; none of them may report an error."""
+    with opening(browser) as open_page:
+        yield open_page
+
+
+@contextmanager
+def opening(browser: Browser) -> Iterator[Open]:
+    """The same, for as many tests as one window serves."""
     visits: list[Visit] = []
 
     def open_page(page: Path | str, size: tuple[int, int] = DESKTOP, **context: object) -> Visit:

@@ -5,13 +5,15 @@ That no page complains or asks for anything is looked at after each of these tes
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from playwright.sync_api import Browser
 
-from .conftest import Open
+from .conftest import Open, opening
 from .pages import EVIL
-from .visit import DESKTOP, TELEPHONE
+from .visit import DESKTOP, TELEPHONE, Visit
 
 KINDS = [
     "render", "ledger", "scores", "study", "errors", "verify", "comparison", "calibration",
@@ -31,41 +33,34 @@ NOT_VISITED = """() => [...document.querySelectorAll(
 MOST_CONTROLS = 300
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("size", [DESKTOP, TELEPHONE], ids=["desktop", "telephone"])
-def test_no_page_scrolls_sideways(
-    visit: Open, pages: dict[str, Path], kind: str, size: tuple[int, int]
-) -> None:
-    window = visit(pages[kind], size)
-    window.drawn()
-    assert not window.is_scrolled_sideways()
-    for folded in window.page.locator("details").all():
-        folded.evaluate("(each) => { each.open = true; }")
-    assert not window.is_scrolled_sideways()
+@pytest.fixture(scope="module", params=KINDS)
+def opened(
+    request: pytest.FixtureRequest, browser: Browser, pages: dict[str, Path]
+) -> Iterator[tuple[str, Visit]]:
+    """A kind of page in a window that tests share, and its kind."""
+    with opening(browser) as open_page:
+        yield request.param, open_page(pages[request.param], DESKTOP)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_texts_stay_texts(visit: Open, pages: dict[str, Path], kind: str) -> None:
-    page = visit(pages[kind]).page
+def test_texts_stay_texts(opened: tuple[str, Visit]) -> None:
+    page = opened[1].page
     assert page.locator("h1").inner_text().startswith(EVIL)
     assert EVIL in page.title()
     assert page.evaluate("() => window.ran") is None
     assert page.locator("img[src=x]").count() == 0
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_control_has_a_name(visit: Open, pages: dict[str, Path], kind: str) -> None:
+def test_every_control_has_a_name(opened: tuple[str, Visit]) -> None:
     """The names are those that the browser tells a screen reader."""
-    page = visit(pages[kind]).page
+    page = opened[1].page
     tree = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")
     for node in tree["nodes"]:
         if not node["ignored"] and node["role"]["value"] in CONTROLS | {"image", "Canvas"}:
             assert node["name"]["value"].strip(), node
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_focus_is_seen_on_every_control(visit: Open, pages: dict[str, Path], kind: str) -> None:
-    page = visit(pages[kind]).page
+def test_the_focus_is_seen_on_every_control(opened: tuple[str, Visit]) -> None:
+    page = opened[1].page
     for _ in range(MOST_CONTROLS):
         page.keyboard.press("Tab")
         found = page.evaluate(FOCUSED)
@@ -73,3 +68,15 @@ def test_the_focus_is_seen_on_every_control(visit: Open, pages: dict[str, Path],
             break
         assert found["seen"], found
     assert page.evaluate(NOT_VISITED) == []
+
+
+def test_no_page_scrolls_sideways(
+    opened: tuple[str, Visit], visit: Open, pages: dict[str, Path]
+) -> None:
+    kind, desktop = opened
+    for window in (desktop, visit(pages[kind], TELEPHONE)):
+        window.drawn()
+        assert not window.is_scrolled_sideways()
+        for folded in window.page.locator("details").all():
+            folded.evaluate("(each) => { each.open = true; }")
+        assert not window.is_scrolled_sideways()
