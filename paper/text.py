@@ -177,7 +177,7 @@ hold, the text says so and gives the likely cause. Verdicts are computed from th
 
 The experiments are a part of the source and not of the installed package. Type their commands in
 the folder of the clone. Without a name, the command lists the experiments. A quick run makes fewer
-evaluations at lower quality; this one takes about twenty seconds:
+evaluations at lower quality; this one takes less than half a minute:
 
 ```console
 $ python -m paper
