@@ -20,11 +20,9 @@ SEED = 7
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["export", "cma-es, 2 workers"])
-def test_it_leaves_nothing_half_and_ends_as_if_it_had_not_been_killed(
-    name: str, tmp_path: Path
-) -> None:
-    report = kill_repeatedly(name, 1, SEED, tmp_path)
+def test_it_leaves_nothing_half_and_ends_as_if_it_had_not_been_killed(tmp_path: Path) -> None:
+    """An export; `tests/search/test_killed.py` kills searches, and `make kill-tests` kills all."""
+    report = kill_repeatedly("export", 1, SEED, tmp_path)
     assert report.wrong == []
     assert report.killed + report.late == 1
 
