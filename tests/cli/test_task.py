@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from optisense.cli import app
 
-SMALL = ("--resolution", "32x24", "--photons", "60000", "--seed", "5", "--skin", "conforming")
+SMALL = ("--resolution", "32x24", "--photons", "20000", "--seed", "5", "--skin", "conforming")
 
 
 def run(*arguments: str) -> tuple[int, str]:
@@ -47,7 +47,7 @@ def test_misalignment_prints_writes_and_continues(tmp_path: Path) -> None:
 
 
 def test_snr_runs_both_tasks(tmp_path: Path) -> None:
-    options = ("--samples", "10", "--photons", "60000", "--neighbours", "3")
+    options = ("--samples", "10", "--photons", "20000", "--neighbours", "3")
     options += ("--skin", "conforming", "--resolution")
     code, text = run(
         "snr", "gelsight-mini-ideal", *options, "48x36", "--out", str(tmp_path), "--json"
@@ -64,7 +64,7 @@ def test_snr_runs_both_tasks(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_reconstruction_of_given_objects(tmp_path: Path) -> None:
     ball = "sphere:3@0,0:0.5"
-    options = ("--presses", "4", "--resolution", "64x48", "--photons", "60000", "--method", "table")
+    options = ("--presses", "4", "--resolution", "64x48", "--photons", "20000", "--method", "table")
     arguments = ("--object", ball, *options, "--out", str(tmp_path))
     code, text = run("reconstruction", "gelsight-mini-ideal", *arguments)
     assert code == 0, text

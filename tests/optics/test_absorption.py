@@ -188,7 +188,7 @@ def test_a_contact_in_an_absorbing_gel_is_lit_as_by_photons_that_land_on_it() ->
     contact = parse_contact("sphere:1.5@0,0:0.8")
     images = [
         model.render([contact], (80, 60), photons=count, estimator=estimator)
-        for count, estimator in ((1_000_000, "radiance-cache"), (4_000_000, "sppm"))
+        for count, estimator in ((500_000, "radiance-cache"), (1_500_000, "sppm"))
     ]
     inside = images[0].contact_mask
     cached, traced = (image.radiance[inside].mean() for image in images)

@@ -23,7 +23,7 @@ def test_merged_beams_give_the_picture_of_all_bins(
 ) -> None:
     """GelBelt's coating is part metal, which tells directions apart; the Mini's is diffuse."""
     model = OpticalModel(build(name), "llvm")
-    size = {"resolution": (120, 90), "photons": 200_000}
+    size = {"resolution": (80, 60), "photons": 100_000}
     merged = model.render(**size)
     count = len(field_of(model).beams.ways)
     monkeypatch.setattr(beams, "STRONG_SHARE", -1.0)

@@ -12,7 +12,7 @@ from optisense.optics import OpticalModel
 from optisense.optics.drafts import DraftModel
 
 SIZE = (64, 48)
-PHOTONS = 400_000
+PHOTONS = 150_000
 PRESS = [ots.Contact(ots.Sphere(radius=1.5), at=(0, 0), depth=0.6)]
 
 SAME = 0.1

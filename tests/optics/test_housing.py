@@ -99,7 +99,7 @@ def test_the_skin_in_a_white_sphere_is_evenly_bright(estimator: str) -> None:
     """Irradiance F r / (A (1 - r (1 - f) - c f)) for a coating of reflectance c."""
     wall, coating = 0.8, 0.5
     image = OpticalModel(sphere(wall, coating)).render(
-        resolution=(64, 48), photons=1_000_000, estimator=estimator
+        resolution=(64, 48), photons=300_000, estimator=estimator
     )
     area = 4 * np.pi * RADIUS**2
     irradiance = 1.0 * wall / (area * (1 - wall * (1 - SHARE) - coating * SHARE))

@@ -26,7 +26,7 @@ from optisense.optics.ledger import (
 from optisense.optics.light_at_camera import projected_solid_angles
 from optisense.sensors import SENSORS as BUILT_IN
 
-PHOTONS = 200_000
+PHOTONS = 60_000
 
 CLOSES = 1e-5
 """The sum of a group is 1 up to the rounding of single precision."""

@@ -45,7 +45,7 @@ def design_of(name: str) -> ots.SensorDesign:
 )
 def test_photons_end_as_the_ledger_says(name: str) -> None:
     model = OpticalModel(design_of(name))
-    ledger = light_ledger(model, 300_000)
+    ledger = light_ledger(model, 60_000)
     found = photon_paths(model, PHOTONS)
     noise = {(entry.group, entry.where): entry.noise for entry in ledger.entries}
     assert list(found) == list(ledger.emitted)

@@ -12,7 +12,7 @@ from benchmarks.patches import RESOLUTION, PatchCase, Patches, means
 from optisense import OpticalModel
 
 PATH = json.loads((Path(__file__).parents[1] / "assets" / "metal-patches.json").read_text())
-PHOTONS = 3_000_000
+PHOTONS = 1_000_000
 CONTACT = {0.6: 0.03, 1.0: 0.12}
 """RMS error over patches and channels, relative to each channel's mean; it is 1.1 and 1.5 % with
 many photons. It is 5 and 40 % if metal reflects metal like paint."""

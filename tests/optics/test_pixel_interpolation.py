@@ -62,7 +62,7 @@ def test_edges_of_what_is_seen_and_of_shadows_are_not_filled() -> None:
 def test_a_sensor_of_many_lights_looks_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     model = OpticalModel(build("gelsight360"), "llvm")
     ball = [Contact(Sphere(radius=2.0), at=(0.0, 0.0), depth=1.0)]
-    size = {"resolution": (160, 120), "photons": 300_000, "skin": "conforming"}
+    size = {"resolution": (160, 120), "photons": 100_000, "skin": "conforming"}
 
     def skip_pixels_above(beams: float) -> None:
         for name in ("SPARSE_SHADING_BEAMS", "SPARSE_METALLIC_BEAMS"):

@@ -43,7 +43,7 @@ BLEND = metal_coating(0.3, *ALUMINIUM, specularity=0.5)
 # measured as 0.05 % of the mean for each 0.01 mm.
 RADIUS = 0.05
 PASSES, PER_LIGHT = 3, 250_000
-POOLED_PHOTONS = 2_000_000
+POOLED_PHOTONS = 800_000
 
 
 def scene(coating: Surface, slab: bool = True, lights: str = "area") -> ReferenceScene:

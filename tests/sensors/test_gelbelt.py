@@ -133,7 +133,7 @@ def image_of(
     belt = sensors.gelbelt(light_design=light_design, film_thickness=film_thickness)
     acrylic = belt.materials["acrylic"].model_copy(update={"ior": window_index})
     belt.materials["acrylic"] = acrylic
-    return OpticalModel(belt).render([], resolution=(80, 60), photons=400_000)
+    return OpticalModel(belt).render([], resolution=(64, 48), photons=100_000)
 
 
 def red_on_the_belt(image: TactileImage) -> float:

@@ -132,7 +132,7 @@ def test_what_cannot_work_is_told_before_any_picture(lambertian: Any) -> None:
 
 @pytest.mark.slow
 def test_a_real_sensor_gives_a_ball_back(mini: OpticalModel) -> None:
-    settings = ReconstructionSettings(presses=8, resolution=(96, 72), photons=200_000)
+    settings = ReconstructionSettings(presses=8, resolution=(96, 72), photons=60_000)
     ball = {"ball of 3 mm": Contact(Sphere(3.0), at=(-2.0, 1.5), depth=0.6)}
     result = reconstruct(mini, settings, ball)
     values = result.objects["ball of 3 mm"].to_dict()
