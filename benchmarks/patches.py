@@ -173,9 +173,10 @@ def compare(
 
     Returns:
         rms: RMS error of the mean of the images over all patches and channels, with the noise of
-        both subtracted in quadrature. worst: error of the worst patch. noise: RMS noise of the
-        reference. image_noise: RMS noise of the mean of the images. red, green, blue: relative
-        error of the mean over all patches.
+        both subtracted in quadrature. limit: upper limit of this error, two standard errors of its
+        square above it. worst: error of the worst patch. noise: RMS noise of the reference.
+        image_noise: RMS noise of the mean of the images. red, green, blue: relative error of the
+        mean over all patches.
     """
     (whole, noise), (mean, image_noise) = (
         _mean_and_variance(np.array([means(picture, patch) for picture in pictures]) / scale)
@@ -186,19 +187,27 @@ def compare(
     ratio = images.mean(axis=0)[patch >= 0].mean(axis=0)
     # Some sensors have no light of a colour.
     ratio = np.where(everywhere > 0, ratio / np.where(everywhere > 0, everywhere, 1.0) - 1, 0.0)
+    noises = noise + image_noise
+    square = max(float((off**2).mean() - noises.mean()), 0.0)
+    # The square of a normally distributed value of mean x and variance v has the variance
+    # 2 v^2 + 4 v x^2.
+    spread = np.sqrt((2 * noises**2 + 4 * noises * square).mean() / off.size)
     found = {
-        "rms": float(np.sqrt(max((off**2).mean() - noise - image_noise, 0.0))),
+        "rms": float(np.sqrt(square)),
+        "limit": float(np.sqrt(square + 2 * spread)),
         "worst": float(off.ravel()[np.abs(off).argmax()]),
-        "noise": float(np.sqrt(noise)),
-        "image_noise": float(np.sqrt(image_noise)),
+        "noise": float(np.sqrt(noise.mean())),
+        "image_noise": float(np.sqrt(image_noise.mean())),
         **dict(zip(("red", "green", "blue"), ratio.tolist(), strict=True)),
     }
     return {key: round(value, 5) for key, value in found.items()}
 
 
-def _mean_and_variance(each: FloatArray) -> tuple[FloatArray, float]:
-    """Return the mean of independent values (n, ...), and the mean variance of that mean."""
-    return each.mean(axis=0), float(each.var(axis=0, ddof=1).mean() / len(each))
+def _mean_and_variance(each: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the mean (patches, 3) of independent values (n, patches, 3), and the variance (3,) of
+    that mean in each channel, averaged over patches.
+    """
+    return each.mean(axis=0), each.var(axis=0, ddof=1).mean(axis=0) / len(each)
 
 
 def measure(case: PatchCase, photons: int = PHOTONS) -> dict[str, Any]:
@@ -242,19 +251,21 @@ def table(found: dict[str, Any]) -> str:
         "with progressive photon mapping with "
         f"{BATCHES * SPPM_PASSES * SPPM_PHOTONS / 1e6:g} million photons (`sppm`), in absolute "
         "units. All values are in per cent. *RMS* is the error over patches and three channels, "
-        "relative to the mean of each channel there, after subtraction of all noise. The patches "
+        "relative to the mean of each channel there, after subtraction of all noise. The noise "
+        "leaves an uncertainty, and the *limit* is two standard errors above the RMS. The patches "
         f"are {TILTS} bands of tilt times {QUARTERS} quarters of azimuth in the contact, and "
         "quarters of the skin around it and of the row of pixels between both. The noise of the "
         "images is that of their mean; where it is not given, it is not subtracted. The last three "
         "columns are the errors of the means of the channels.", "",
-        "| sensor, specularity, place, depth | region | RMS | noise of the reference | noise of "
-        "the images | red | green | blue |", "|---|---|---|---|---|---|---|---|",
+        "| sensor, specularity, place, depth | region | RMS | limit | noise of the reference | "
+        "noise of the images | red | green | blue |", "|---|---|---|---|---|---|---|---|---|",
     ]  # fmt: skip
     for name, row in found.items():
         for where in ("contact", "skin", "rim"):
             of = row[where]
-            numbers = [f"{100 * of[key]:.1f}" for key in ("rms", "noise")]
-            # Earlier measurements did not tell it, and left it in the RMS.
+            # Earlier measurements have no limit, or no noise of the images, which is in their RMS.
+            limit = f"{100 * of['limit']:.1f}" if "limit" in of else ""
+            numbers = [f"{100 * of['rms']:.1f}", limit, f"{100 * of['noise']:.1f}"]
             numbers.append(f"{100 * of['image_noise']:.1f}" if "image_noise" in of else "")
             numbers += [f"{100 * of[key]:+.1f}" for key in ("red", "green", "blue")]
             lines.append(f"| {name} | {where} | " + " | ".join(numbers) + " |")

@@ -1,0 +1,34 @@
+"""The errors that the benchmark of patches finds in images whose true errors are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.patch_references import Reference
+from benchmarks.patches import compare
+
+PATCHES = 20
+TRIALS = 100
+NOISE = np.array([0.02, 0.02, 0.1])
+"""Standard deviation of each channel of one image, as where one colour is weak."""
+
+LEFT = 0.02
+"""Difference between found and true error. The RMS noise is 0.047; squares below 0, which noise
+also causes, are taken as 0."""
+
+
+@pytest.mark.parametrize("error", [0.0, 0.02, 0.05])
+def test_noise_is_no_error_and_the_limit_contains_the_true_error(error: float) -> None:
+    random = np.random.default_rng(1)
+    patch = np.arange(PATCHES)[None]
+    squares, limits = [], []
+    for _ in range(TRIALS):
+        off = random.normal(size=(1, PATCHES, 3))
+        off *= error / np.sqrt((off**2).mean())
+        truth, images = (1 + NOISE * random.normal(size=(n, 1, PATCHES, 3)) for n in (8, 2))
+        found = compare(images + off, Reference(truth, 0.0), patch, np.ones(3))
+        squares.append(found["rms"] ** 2)
+        limits.append(found["limit"])
+    assert np.mean(np.array(limits) >= error) > 0.95
+    assert np.sqrt(np.mean(squares)) == pytest.approx(error, abs=LEFT)
