@@ -18,6 +18,9 @@ from . import gallery
 KEEPING = "Keeping the material"
 """Title under which messages are shown beside the button that was pressed."""
 
+_active = ""
+"""Name of the active part whose selection was followed last; empty for none."""
+
 
 def _materials(values: Any, context: bpy.types.Context | None) -> catalogue.Items:
     return gallery.items("material")
@@ -247,4 +250,17 @@ class OPTISENSE_OT_keep_material(polls.Checked, bpy.types.Operator):
         return {"FINISHED"}
 
 
+@bpy.app.handlers.persistent
+def _follow(scene: bpy.types.Scene, *_: object) -> None:
+    """Offer coatings once the sensing surface is selected, and materials once another part is."""
+    global _active
+    own = _part(bpy.context) if bpy.context.view_layer else None
+    name = own.id_data.name if own is not None and own.id_data.select_get() else ""
+    if own is not None and name not in ("", _active):
+        kind = "coating" if own.role == "sensing_surface" else "material"
+        _choice(bpy.context).kind = kind
+    _active = name
+
+
 PROPERTIES = {"WindowManager": {"optisense_material": OPTISENSE_PG_material_choice}}
+HOOKS = ((bpy.app.handlers.depsgraph_update_post, _follow),)

@@ -49,6 +49,18 @@ def test_coatings_are_chosen_from_pictures(mini: Any) -> None:
     assert gallery.missing("coating") == names[:1]
 
 
+def test_what_suits_the_selected_part_is_offered(mini: Any, select: Callable[..., None]) -> None:
+    choice = bpy.context.window_manager.optisense_material
+    for name, kind in (("skin", "coating"), ("gel", "material"), ("skin", "coating")):
+        select(object_of(mini, "PART", name))
+        bpy.context.view_layer.update()
+        assert choice.kind == kind
+    choice.kind = "material"  # by hand, and another update does not take it back
+    bpy.context.active_object.location.x += 0.0
+    bpy.context.view_layer.update()
+    assert choice.kind == "material"
+
+
 def test_an_own_material_does_not_change_what_is_chosen(
     mini: Any, select: Callable[..., None], own_library: Path
 ) -> None:
