@@ -49,7 +49,7 @@ class OPTISENSE_PG_search(bpy.types.PropertyGroup):
     """
 
     vary: CollectionProperty(type=OPTISENSE_PG_vary)
-    vary_index: IntProperty(options={"HIDDEN"})
+    vary_index: IntProperty(description="Chosen parameter of the list", options={"HIDDEN"})
     objective: StringProperty(
         name="Objective",
         default="aoap",

@@ -118,11 +118,20 @@ def description(button: str) -> str:
     if is_operator:
         module, _, name = operator.partition(".")
         return str(getattr(getattr(bpy.ops, module), name).get_rna_type().description)
-    name = button.rpartition(".")[2]
-    for group in bpy.types.PropertyGroup.__subclasses__():
-        if "optisense" in group.__name__.lower() and name in group.bl_rna.properties:
-            return str(group.bl_rna.properties[name].description)
+    owner, _, name = button.rpartition(".")
+    for group in _groups(owner.rpartition(".")[2]):
+        if name in group.properties:
+            return str(group.properties[name].description)
     return ""
+
+
+def _groups(owner: str) -> list[Any]:
+    """The types of ours that a button's property may belong to: that of its owner's name first."""
+    places = (bpy.types.WindowManager, bpy.types.Scene, bpy.types.Object)
+    named = [getattr(place.bl_rna.properties.get(owner), "fixed_type", None) for place in places]
+    types = bpy.types.PropertyGroup.__subclasses__()
+    every = [each.bl_rna for each in types if "optisense" in each.__name__.lower()]
+    return [each for each in named if each is not None] + every
 
 
 def is_named(button: str, what: str) -> bool:
