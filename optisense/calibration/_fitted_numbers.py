@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,33 @@ class FittedNumber:
     after: float
     uncertainty: float
     determined: bool
+
+
+def with_known_total(
+    chosen: Sequence[FitQuantity], solution: Solution, fitted: SensorDesign
+) -> Solution:
+    """Return a solution with the covariance of powers whose sum is kept.
+
+    Photographs determine the ratios of powers only. If the sum is kept, the error of one power
+    changes all others: a power that alone is uncertain makes them uncertain, too.
+
+    Args:
+        chosen: fitted quantities.
+        solution: their solution.
+        fitted: fitted design.
+    """
+    total = sum(group.flux * len(group.lights) for group in fitted.lights.values())
+    powers, shares = [], []
+    for index, each in enumerate(chosen):
+        if each.path.startswith("lights.") and each.path.endswith(".flux") and each.logarithmic:
+            group = fitted.lights[each.path.split(".")[1]]
+            powers.append(index)
+            shares.append(group.flux * len(group.lights) / total if total > 0.0 else 0.0)
+    ranges = np.array([chosen[index].plausible_range for index in powers])
+    change = np.eye(len(chosen))
+    # A step changes the logarithm of a power by its range, and that of the sum by its share of it.
+    change[np.ix_(powers, powers)] -= np.outer(1.0 / ranges, np.array(shares) * ranges)
+    return replace(solution, covariance=change @ solution.covariance @ change.T)
 
 
 def fitted_numbers(

@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 from optisense.calibration._body_changes import with_single_lights
 from optisense.calibration._cross_readings import realism_and_readings
 from optisense.calibration._fit_rounds import FitRounds, Progress
-from optisense.calibration._fitted_numbers import FittedNumber, correlated_pairs, fitted_numbers
+from optisense.calibration._fitted_numbers import (
+    FittedNumber,
+    correlated_pairs,
+    fitted_numbers,
+    with_known_total,
+)
 from optisense.calibration.comparing import Comparison, usable
 from optisense.calibration.families import LEDS
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
@@ -78,6 +83,7 @@ def calibrate(
     held = tuple(full.presses[index].name for index in fit.held_out)
     notes += fit.doubts(solution)
     fitted, exposure = _with_exposure(design, chosen, solution.steps, fit.exposure)
+    solution = with_known_total(chosen, solution, fitted)
     numbers = fitted_numbers(chosen, solution, fitted)
     fitted = _marked(fitted, chosen, numbers, full)
     places = fit.places(fitted, exposure)

@@ -14,8 +14,10 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.calibration import Photographs, photograph_model, save_photographs
 from optisense.calibration._body_changes import with_single_lights
+from optisense.calibration._fitted_numbers import fitted_numbers, with_known_total
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
+from optisense.calibration._solution import Solution
 from optisense.calibration.calibrating import calibrate
 from optisense.calibration.families import chosen_families
 from optisense.calibration.kept_renderings import KeptRenderings
@@ -162,6 +164,26 @@ def test_fitted_numbers_become_a_design() -> None:
     assert moved @ right == pytest.approx(chosen[-3].value(float(steps[-3])))
     assert moved @ up == pytest.approx(chosen[-2].value(float(steps[-2])))
     assert design.camera.tone_curve is None
+
+
+def test_an_uncertain_power_makes_powers_of_a_kept_sum_uncertain() -> None:
+    """By the spread of powers that are drawn, and then scaled to the same sum."""
+    design = ots.load("gelsight-mini-ideal")
+    chosen = quantities_of(design, ["powers", "tone"])
+    deviations = np.array([0.002, 0.03, 0.001, 0.05])
+    steps = np.array([0.1, -0.2, 0.3, 0.0])
+    solution = Solution(steps, np.zeros((0, 3)), np.diag(deviations**2), (0.0, 0.0), np.zeros(0))
+    fitted = designed(design, chosen, steps)
+    scaled = with_known_total(chosen, solution, fitted)
+    numbers = fitted_numbers(chosen, scaled, fitted)
+    drawn = steps + deviations * np.random.default_rng(1).standard_normal((20_000, 4))
+    powers = np.array(
+        [[each.value(row[index]) for index, each in enumerate(chosen[:3])] for row in drawn]
+    )
+    total = sum(number.after for number in numbers[:3])
+    powers *= total / powers.sum(axis=1, keepdims=True)  # as many lights in each group
+    assert [n.uncertainty for n in numbers[:3]] == pytest.approx(powers.std(axis=0), rel=0.03)
+    assert scaled.covariance[3, 3] == solution.covariance[3, 3]
 
 
 @pytest.mark.parametrize(
