@@ -104,7 +104,7 @@ def dataset(
             made = generate(model, out, count, settings, show, mend=mend)
             if parquet:
                 line.begin(WRITING, text="writing Parquet files")
-                write_parquet(made)
+                write_parquet(made, line.advance)
             write_card(made, licence)
     except KeyboardInterrupt:
         from optisense.tasks.dataset import Dataset
