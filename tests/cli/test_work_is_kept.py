@@ -19,7 +19,7 @@ from optisense.cli import app
 from optisense.errors import OptiSenseError
 from optisense.folders import FolderLock
 from optisense.search import SearchSpace, Study, search
-from optisense.search.executors import remote
+from optisense.search.executors import _remote
 
 OWN_FILE = '''
 import os
@@ -221,7 +221,7 @@ def test_a_failed_search_removes_nothing_of_others(
     run = ran
     if cause == "cluster":
         run = ran_here  # which need not wait long for a scheduler
-        monkeypatch.setattr(remote, "CONNECT_SECONDS", 0.5)
+        monkeypatch.setattr(_remote, "CONNECT_SECONDS", 0.5)
         code, said = run(*search_words(mine, out, "--cluster", "tcp://127.0.0.1:9"))
         assert code == 1 and "no Dask scheduler answers" in said
         assert "the study was removed" in said
