@@ -143,3 +143,28 @@ def test_a_misspelt_name_gets_the_near_match() -> None:
     assert things().find("home") is Path
     with pytest.raises(SearchError, match="Did you mean 'home'"):
         things().find("hoem")
+
+
+def built_in_registries() -> list[Registry]:
+    """All registries of this package."""
+    import optisense.design.lenses  # noqa: F401  defines further kinds
+    from optisense.design.kinds import KindModel
+    from optisense.geometry.indenter_kinds import INDENTERS
+    from optisense.objectives.registry import OBJECTIVES
+    from optisense.robots.formats import ROBOT_FORMATS
+    from optisense.search.methods._registry import METHODS
+    from optisense.sensors.registry import SENSORS
+    from optisense.workshop._formats import FORMATS
+
+    kinds = [kind.kinds for kind in KindModel.__subclasses__()]
+    return [INDENTERS, OBJECTIVES, ROBOT_FORMATS, METHODS, SENSORS, FORMATS, *kinds]
+
+
+def test_every_built_in_name_can_be_loaded() -> None:
+    """A registry knows its modules by name only, so that a renamed module would go unnoticed."""
+    registries = built_in_registries()
+    assert len(registries) == 14
+    for registry in registries:
+        assert registry.names()
+        for name in registry.names():
+            registry.find(name)
