@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from optisense.cli.console import handles_errors, output
+from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
 from optisense.cli.options import VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 JSON_FILE = "verify.json"
 REPORT_FILE = "verify.html"
+KEPT_FOLDER = "presses"
+"""Subfolder of --out in which what was read from each press is kept while the command runs."""
 
 PICTURE_WORK = 0.4
 """Processor time of a picture with an object and of reading it, s; measured on GelSight Mini."""
@@ -70,7 +72,8 @@ def verify(
     """Test whether a sensor reads shapes better than another, on objects that no score uses.
 
     Both sensors are calibrated with presses of balls. Then screws, coins, letters and other objects
-    are pressed into both at the same places, and the errors of normals and depth are compared.
+    are pressed into both at the same places, and the errors of normals and depth are compared. If
+    the command was interrupted, the same command continues from the presses that it kept in --out.
     """
     compared = compare(first, second, trial, options, out, variant)
     if as_json:
@@ -123,6 +126,7 @@ def compare(
         ]
         for design, label in zip(designs, SIDES, strict=True):
             _expect(line, options, design, label)
+        from optisense.kept_arrays import KeptArrays
         from optisense.tasks import verify as compared_by_objects
 
         shown: dict[int, Any] = {}
@@ -133,7 +137,14 @@ def compare(
                 shown[side] = sample_progress(line, models[side], SIDES[side], after)
             shown[side](done, count)
 
-        found = compared_by_objects((models[0], models[1]), settings, names, show)
+        kept = KeptArrays(None if out is None else out / KEPT_FOLDER)
+        try:
+            found = compared_by_objects((models[0], models[1]), settings, names, show, kept)
+        except KeyboardInterrupt:
+            if out is None:
+                raise
+            messages.print("interrupted: the same command continues; finished presses are kept")
+            raise typer.Exit(EXIT_INTERRUPTED) from None
         compared = ComparisonResult(found, conditions_of(first, trial) if second is None else [])
         if out is not None:
             from optisense.report.verification import render_verification
@@ -143,6 +154,7 @@ def compare(
             first_axes, second_axes = (design.camera.axes() for design in designs)
             page = render_verification(found, (first_axes, second_axes))
             write_text(out / REPORT_FILE, page)
+            kept.remove()
     return compared
 
 

@@ -5,7 +5,7 @@ places, and a reader of the surface's tilt from colours is fitted to the picture
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
+from optisense.design.difference import fingerprint
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.mechanics import ELASTIC
 from optisense.quality import SAMPLE_PHOTONS
 from optisense.reading.camera_noise import MEASURED_NOISE, add_camera_noise
@@ -119,6 +121,7 @@ class CalibratedSensor:
         settings: ReconstructionSettings,
         progress: Callable[[int], None] = lambda done: None,
         readers: int = 1,
+        kept: KeptArrays = NOTHING_KEPT,
     ) -> None:
         """Press the balls and fit the reader.
 
@@ -128,6 +131,7 @@ class CalibratedSensor:
             progress: function that is called with the number of balls pressed.
             readers: number of readers fitted to the same presses, each to other pixels and with
                 another seed, so that the variation between fits can be separated from the sensor.
+            kept: store of the balls' pixels.
         """
         self._model = model
         self._settings = settings
@@ -141,8 +145,10 @@ class CalibratedSensor:
         self._exposure = blank.auto_exposure()
         # The background of a real sensor is the mean of many pictures and so has no noise.
         self._background = blank.without_noise().picture(self._exposure).astype(np.float64)
-        samples = [np.hstack(self._press(i)) for i in _counted(settings.presses, progress)]
-        known = np.concatenate(samples)
+        self.inputs: tuple[object, ...] = (fingerprint(model.design), asdict(settings))
+        known = np.concatenate(
+            [self._learned(i, kept) for i in _counted(settings.presses, progress)]
+        )
         self.fitted_pixels = min(len(known), MOST_SAMPLES)
         self._readers = [self._fitted(known, number) for number in range(readers)]
 
@@ -182,6 +188,14 @@ class CalibratedSensor:
         image = self._render([contact])
         seed = [self._settings.seed, self._settings.presses + number, _CAMERA]
         return image, self._picture(image, seed)
+
+    def _learned(self, index: int, kept: KeptArrays) -> FloatArray:
+        """Return colours, places and tilts (n, 7) of pixels of one ball press."""
+        return kept.arrays(
+            ["ball", *self.inputs, index],
+            lambda: {"pixels": np.hstack(self._press(index))},
+            ["pixels"],
+        )["pixels"]
 
     def _press(self, index: int) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return colours, places and tilts of pixels in, near and far from one ball press."""

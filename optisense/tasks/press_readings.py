@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from optisense.errors import TaskError
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.reading.tilts import angles_between
 from optisense.tasks._calibration import LEAST_PIXELS, CalibratedSensor
 
@@ -59,6 +60,33 @@ class PressReading:
     flat_depths: FloatArray
     pictures: PressPictures | None = None
 
+    def as_arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all arrays by name."""
+        arrays = {name: getattr(self, name) for name in READING_ARRAYS}
+        if self.pictures is not None:
+            arrays |= {name: getattr(self.pictures, own) for name, own in PICTURE_ARRAYS.items()}
+        return arrays
+
+    @classmethod
+    def from_arrays(cls, arrays: dict[str, NDArray[Any]]) -> PressReading:
+        """Return the reading of arrays by name, as from `as_arrays`."""
+        pictures = None
+        if arrays.keys() >= PICTURE_ARRAYS.keys():
+            pictures = PressPictures(**{own: arrays[name] for name, own in PICTURE_ARRAYS.items()})
+        return cls(**{name: arrays[name] for name in READING_ARRAYS}, pictures=pictures)
+
+
+READING_ARRAYS = ("points", "areas", "angles", "depths", "flat_angles", "flat_depths")
+"""Names of the arrays of a stored reading."""
+
+PICTURE_ARRAYS = {
+    "picture": "picture",
+    "true_normals": "true_normals",
+    "read_normals": "read_normals",
+    "picture_angles": "angles",
+}
+"""Attributes of the pictures of a stored reading, by their names among its arrays."""
+
 
 def read_press(
     sensor: CalibratedSensor,
@@ -67,6 +95,7 @@ def read_press(
     number: int,
     readers: int,
     keeps: bool,
+    kept: KeptArrays = NOTHING_KEPT,
 ) -> PressReading:
     """Press something into a calibrated sensor and read it.
 
@@ -77,7 +106,26 @@ def read_press(
         number: number of the picture, for its noise.
         readers: number of the sensor's readers, all of which are used.
         keeps: whether the pictures are kept.
+        kept: store of readings.
     """
+    pressed = [type(contact.indenter).__name__, asdict(contact)]
+    return PressReading.from_arrays(
+        kept.arrays(
+            ["reading", *sensor.inputs, pressed, number, readers],
+            lambda: _read(sensor, areas, contact, number, readers, keeps).as_arrays(),
+            [*READING_ARRAYS, *(PICTURE_ARRAYS if keeps else ())],
+        )
+    )
+
+
+def _read(
+    sensor: CalibratedSensor,
+    areas: FloatArray,
+    contact: Contact,
+    number: int,
+    readers: int,
+    keeps: bool,
+) -> PressReading:
     image, picture = sensor.take_picture(contact, number)
     mask = image.contact_mask & (areas > 0.0)
     true = image.normals.astype(np.float64)

@@ -16,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
+from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.near import suggestion
 from optisense.objectives.score import json_ready
 from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
@@ -225,6 +226,7 @@ def verify(
     settings: VerificationSettings | None = None,
     names: tuple[str, str] = (BEFORE, AFTER),
     progress: Callable[[int, int, int], None] | None = None,
+    kept: KeptArrays = NOTHING_KEPT,
 ) -> Verification:
     """Press the same objects into two sensors and compare the errors of their readings.
 
@@ -234,6 +236,7 @@ def verify(
         names: names of the sensors.
         progress: function that is called with the sensor (0 or 1), the number of its pictures
             taken, and their total number.
+        kept: store of what is read from each press.
 
     Raises:
         TaskError: a camera sees nothing, there is no place for an object, or a sensor cannot be
@@ -255,9 +258,9 @@ def verify(
         on_press = _progress_of_sensor(
             progress, number, settings.reading.presses + len(chosen.presses)
         )
-        sensor = CalibratedSensor(model, settings.reading, on_press, settings.readers)
+        sensor = CalibratedSensor(model, settings.reading, on_press, settings.readers, kept)
         areas = _areas(model, sensor)
-        readings.append(_read_all(sensor, areas, chosen.presses, number, settings, on_press))
+        readings.append(_read_all(sensor, areas, chosen.presses, number, settings, on_press, kept))
         views.append(_view(model, areas, sensor))
         trees.append(cKDTree(sensor.untouched.points[areas > 0.0]))
         reach += NEAR * float(np.sqrt(np.median(areas[areas > 0.0])))
@@ -329,6 +332,7 @@ def _read_all(
     side: int,
     settings: VerificationSettings,
     on_press: Callable[[int], None],
+    kept: KeptArrays,
 ) -> list[PressReading]:
     """Return a sensor's readings of all presses, with pictures at the first place of each
     object.
@@ -338,7 +342,7 @@ def _read_all(
         on_press(settings.reading.presses + number)
         keeps = number % settings.places == 0
         found.append(
-            read_press(sensor, areas, press.contacts[side], number, settings.readers, keeps)
+            read_press(sensor, areas, press.contacts[side], number, settings.readers, keeps, kept)
         )
     on_press(settings.reading.presses + len(presses))
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,11 @@ from scipy.spatial import cKDTree
 from optisense import OpticalModel, load, set_value
 from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
+from optisense.kept_arrays import KeptArrays
 from optisense.optics import TactileImage
 from optisense.sensors._gelsight_mini_ideal import gelsight_mini_ideal
 from optisense.tasks import ReconstructionSettings, VerificationSettings, verify
+from optisense.tasks._calibration import CalibratedSensor
 from optisense.tasks._unseen_presses import MOST_DEEP, choose_presses
 from optisense.tasks.paired_bootstrap import BETTER, INCONCLUSIVE, WORSE
 from optisense.tasks.press_readings import PressReading, whole_errors
@@ -73,6 +76,39 @@ def test_a_sensor_is_not_better_than_itself(lambertian: Any) -> None:
     assert found.normal_change.change == 0.0
     assert found.verdict == INCONCLUSIVE
     assert "inconclusive" in found.in_words()
+
+
+def test_an_interrupted_verification_continues_where_it_was(
+    lambertian: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Balls and objects that were read are not pressed again, and the result is the same."""
+    objects = FEW[:2]
+    settings = VerificationSettings(objects, places=1, readers=1, reading=READING)
+    pair = (lambertian, lambertian)
+    pressed = []
+    take = CalibratedSensor._render
+
+    def counted(sensor: CalibratedSensor, contacts: Any) -> TactileImage:
+        pressed.extend(contacts)
+        return take(sensor, contacts)
+
+    def stop(side: int, done: int, count: int) -> None:
+        if done == count - 1:  # the last object of the first sensor
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(CalibratedSensor, "_render", counted)
+    with pytest.raises(KeyboardInterrupt):
+        verify(pair, settings, progress=stop, kept=KeptArrays(tmp_path / "presses"))
+    before = len(pressed)
+    assert before >= READING.presses + 1
+    found = verify(pair, settings, kept=KeptArrays(tmp_path / "presses"))
+    # Both sensors are the same, so that the second one finds everything.
+    assert len(pressed) == before + 1
+    whole = verify(pair, settings)
+    assert found.to_dict() == whole.to_dict()
+    for one, other in zip(found.pictures[objects[0]], whole.pictures[objects[0]], strict=True):
+        assert (one.picture == other.picture).all()
+        np.testing.assert_array_equal(one.angles, other.angles)
 
 
 def test_presses_are_alike_in_both_and_not_too_deep(mini: OpticalModel) -> None:
