@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 from optisense.errors import TaskError
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.reading.tilts import angles_between
-from optisense.tasks._calibration import LEAST_PIXELS, CalibratedSensor
+from optisense.tasks._calibration import CalibratedSensor
 
 if TYPE_CHECKING:
     from optisense.geometry import Contact
@@ -154,6 +154,23 @@ def _read(
     )
 
 
+def check_seen(name: str, pair: Sequence[PressReading]) -> None:
+    """Check that a sensor sees the contact of an object.
+
+    Args:
+        name: name of the object.
+        pair: the readings of its press by two sensors.
+
+    Raises:
+        TaskError: neither camera sees the contact.
+    """
+    if not any(len(each.areas) for each in pair):
+        raise TaskError(
+            f"no camera sees the {name} where it presses",
+            hint="Use a higher --resolution, or another --seed",
+        )
+
+
 def whole_errors(
     pair: tuple[PressReading, ...], trees: Sequence[cKDTree], reach: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
@@ -163,18 +180,10 @@ def whole_errors(
     Parts that only the other camera sees count as read flat.
 
     Args:
-        pair: the readings of the same press by two sensors.
+        pair: the readings of the same press by two sensors, one of which sees the contact.
         trees: search trees of the points (mm) of the skin that each camera sees.
         reach: largest distance (mm) from one of these points at which a place counts as seen.
-
-    Raises:
-        TaskError: neither camera sees the contact.
     """
-    if max(len(each.areas) for each in pair) < LEAST_PIXELS:
-        raise TaskError(
-            "no camera sees one of the objects where it presses",
-            hint="Use a higher resolution, or another seed",
-        )
     normals: list[FloatArray] = []
     depths: list[FloatArray] = []
     for side, own in enumerate(pair):

@@ -33,6 +33,7 @@ from optisense.tasks.paired_bootstrap import (
 from optisense.tasks.press_readings import (
     PressPictures,
     PressReading,
+    check_seen,
     flat_errors,
     read_press,
     whole_errors,
@@ -260,7 +261,10 @@ def verify(
         )
         sensor = CalibratedSensor(model, settings.reading, on_press, settings.readers, kept)
         areas = _areas(model, sensor)
-        readings.append(_read_all(sensor, areas, chosen.presses, number, settings, on_press, kept))
+        others = readings[0] if readings else None
+        readings.append(
+            _read_all(sensor, areas, chosen.presses, number, settings, on_press, kept, others)
+        )
         views.append(_view(model, areas, sensor))
         trees.append(cKDTree(sensor.untouched.points[areas > 0.0]))
         reach += NEAR * float(np.sqrt(np.median(areas[areas > 0.0])))
@@ -333,9 +337,13 @@ def _read_all(
     settings: VerificationSettings,
     on_press: Callable[[int], None],
     kept: KeptArrays,
+    others: Sequence[PressReading] | None,
 ) -> list[PressReading]:
     """Return a sensor's readings of all presses, with pictures at the first place of each
-    object.
+    object; ``others`` are the readings of the other sensor.
+
+    Raises:
+        TaskError: neither camera sees a contact.
     """
     found = []
     for number, press in enumerate(presses):
@@ -344,5 +352,7 @@ def _read_all(
         found.append(
             read_press(sensor, areas, press.contacts[side], number, settings.readers, keeps, kept)
         )
+        if others is not None:
+            check_seen(press.name, (others[number], found[number]))
     on_press(settings.reading.presses + len(presses))
     return found

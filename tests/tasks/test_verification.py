@@ -21,7 +21,7 @@ from optisense.tasks import ReconstructionSettings, VerificationSettings, verify
 from optisense.tasks._calibration import CalibratedSensor
 from optisense.tasks._unseen_presses import MOST_DEEP, choose_presses
 from optisense.tasks.paired_bootstrap import BETTER, INCONCLUSIVE, WORSE
-from optisense.tasks.press_readings import PressReading, whole_errors
+from optisense.tasks.press_readings import PressReading, check_seen, whole_errors
 
 FEW = ("screw-head", "cable", "wedge", "nut", "bean", "braille")
 READING = ReconstructionSettings(presses=8, resolution=(96, 72), seed=2)
@@ -180,8 +180,9 @@ def test_what_only_the_other_camera_sees_counts_as_read_flat() -> None:
     none = _reading(grid[:0], 0.0)
     normals, _ = whole_errors((_reading(grid, 4.0), none), [cKDTree(grid), cKDTree(half)], np.inf)
     assert normals[1] == pytest.approx([30.0])
-    with pytest.raises(TaskError, match="no camera sees"):
-        whole_errors((none, none), trees, 0.4)
+    check_seen("nut", (_reading(grid[:1], 4.0), none))
+    with pytest.raises(TaskError, match="no camera sees the nut where it presses"):
+        check_seen("nut", (none, none))
 
 
 @pytest.mark.parametrize(
