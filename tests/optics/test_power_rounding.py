@@ -49,8 +49,8 @@ def test_the_cache_of_a_seed_is_always_the_same() -> None:
     for _ in range(3):
         model = OpticalModel(design, "llvm")
         model.render((), PIXELS, photons=PHOTONS)
-        (running,) = model._store._running.values()
-        tallies.append([np.array(table) for table in (*running.tally.landed, running.tally.halves)])
+        (tally,) = model._store._running.values()
+        tallies.append([np.array(table) for table in (*tally.landed, tally.halves)])
     assert all(table.any() for table in tallies[0][:2])
     for other in tallies[1:]:
         for one, two in zip(tallies[0], other, strict=True):
