@@ -110,7 +110,7 @@ CASES = {
             f"{AT_PLACES} --set photons=500000 --budget 60 --out colours",
             "apply colours --trial best --out coloured",
             "make best-of-paper",
-            "verify best-of-paper coloured --quick --out proof",
+            "verify best-of-paper coloured --quick --resolution 320x240 --out proof",
         ),
     ),
 }
