@@ -38,10 +38,6 @@ from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
 from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
 
-MAX_PHOTONS = 512_000_000
-"""Number of photons at which tracing ends even if the wanted noise is not reached. The noise of the
-light is then about 0.1 %, a thirtieth of that of a normal image."""
-
 SPPM_PASS_PHOTONS = 1_000_000
 """Number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on GelSight
 Mini gets some 300 landings, and a photon map of 60 MB."""
@@ -211,7 +207,7 @@ class OpticalModel(RayModel):
             if number is None and noise is None and seconds is None:
                 wanted = PICTURE_PHOTONS
             store = self._store
-            limits = TracingLimits(wanted, target, seconds, MAX_PHOTONS, began)
+            limits = TracingLimits(wanted, target, seconds, began=began)
             light = store.radiance_cache(seed, limits, on_stage, partial)
             lit = time.perf_counter()
             on_stage(Stage.SHADING, 1.0, light[0].photons, light[0].noise)

@@ -11,6 +11,9 @@ reported and Ctrl-C obeyed between passes."""
 MAX_SINGLE_PASS = 2.5 * PASS_PHOTONS
 """Number of photons below which all are traced in one pass, as each pass has a fixed cost: fewer
 than three passes save more by it than their photon map costs in memory (75 MB)."""
+MAX_PHOTONS = 512_000_000
+"""Number of photons at which tracing ends even if the wanted noise is not reached. The noise of the
+light is then about 0.1 %, a thirtieth of that of a normal image."""
 LARGEST_GUESS = 0.95
 """Largest completed fraction that is reported before a limit is reached, where it is estimated from
 the noise or the time; the rest is for the noise, which decreases unevenly."""
@@ -48,7 +51,7 @@ class TracingLimits:
     photons: int | None = None
     noise: float | None = None
     seconds: float | None = None
-    most: int = 512_000_000
+    most: int = MAX_PHOTONS
     began: float = 0.0
 
     @property
