@@ -11,6 +11,7 @@ import contextlib
 import hashlib
 import json
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ class KeptArrays:
 
         Args:
             inputs: all values that determine the arrays: numbers, texts, paths, arrays, and
-                sequences and dictionaries of these.
+                sequences, dictionaries and dataclasses of these.
             make: function that makes the arrays.
             names: names that stored arrays must have, in their order.
 
@@ -90,6 +91,11 @@ def _in_text(value: object) -> object:
         return [str(value.dtype), value.shape, hashlib.sha256(value.tobytes()).hexdigest()]
     if isinstance(value, np.generic):
         return value.item()
+    if is_dataclass(value):
+        return [
+            type(value).__name__,
+            {each.name: getattr(value, each.name) for each in fields(value)},
+        ]
     if isinstance(value, Path):
         return str(value)
     raise TypeError(f"{type(value).__name__} can't identify a stored result")

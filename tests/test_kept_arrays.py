@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,16 @@ import pytest
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 
 NAMES = ["one"]
+
+
+@dataclass(frozen=True)
+class Ball:
+    radius: float
+
+
+@dataclass(frozen=True)
+class Rod:
+    radius: float
 
 
 class Maker:
@@ -38,6 +49,9 @@ def test_other_inputs_give_new_arrays(tmp_path: Path, other: object) -> None:
     assert kept.arrays([other], make, NAMES)["one"] == 2.0
     assert kept.arrays([np.arange(3)], make, NAMES)["one"] == 3.0
     assert kept.arrays([np.arange(3) + 1], make, NAMES)["one"] == 4.0
+    assert kept.arrays([Ball(1.0)], make, NAMES)["one"] == 5.0
+    assert kept.arrays([Rod(1.0)], make, NAMES)["one"] == 6.0
+    assert kept.arrays([Ball(1.0)], make, NAMES)["one"] == 5.0
 
 
 def test_damaged_and_unexpected_arrays_are_made_again(tmp_path: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +48,7 @@ class KeptRenderings(KeptArrays):
         Raises:
             OutputError: the layers can't be written.
         """
-        pressed = [[type(each.indenter).__name__, asdict(each)] for each in contacts]
-        inputs = [fingerprint(design), pressed, *settings]
+        inputs = [fingerprint(design), *contacts, *settings]
         return self.arrays(inputs, render, list(design.lights))
 
 

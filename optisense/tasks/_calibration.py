@@ -5,7 +5,7 @@ places, and a reader of the surface's tilt from colours is fitted to the picture
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -145,7 +145,7 @@ class CalibratedSensor:
         self._exposure = blank.auto_exposure()
         # The background of a real sensor is the mean of many pictures and so has no noise.
         self._background = blank.without_noise().picture(self._exposure).astype(np.float64)
-        self.inputs: tuple[object, ...] = (fingerprint(model.design), asdict(settings))
+        self.inputs: tuple[object, ...] = (fingerprint(model.design), settings)
         known = np.concatenate(
             [self._learned(i, kept) for i in _counted(settings.presses, progress)]
         )

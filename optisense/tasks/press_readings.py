@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -108,10 +108,9 @@ def read_press(
         keeps: whether the pictures are kept.
         kept: store of readings.
     """
-    pressed = [type(contact.indenter).__name__, asdict(contact)]
     return PressReading.from_arrays(
         kept.arrays(
-            ["reading", *sensor.inputs, pressed, number, readers],
+            ["reading", *sensor.inputs, contact, number, readers],
             lambda: _read(sensor, areas, contact, number, readers, keeps).as_arrays(),
             [*READING_ARRAYS, *(PICTURE_ARRAYS if keeps else ())],
         )
