@@ -145,23 +145,20 @@ def box_around(mask: NDArray[np.bool_], margin: int = MARGIN) -> tuple[slice, sl
     )
 
 
+def window_camera(whole: RayCamera, window: tuple[slice, slice]) -> WindowCamera:
+    """Return the camera of the rows and columns of another camera's image."""
+    rows, columns = window
+    size = {"width": columns.stop - columns.start, "height": rows.stop - rows.start}
+    own = {**whole.__dict__, **size}
+    return WindowCamera(**own, whole=whole, left=int(columns.start), top=int(rows.start))
+
+
 def _one_seed(
     case: Case, window: tuple[slice, slice], photons: int, seed: int, radius: float
 ) -> tuple[FloatArray, int]:
     """Return the radiance (rows, columns, 3) in the window, and the number of photons."""
     model = case.model
-    whole = model.camera(RESOLUTION)
-    rows, columns = window
-    camera = WindowCamera(
-        **{
-            **whole.__dict__,
-            "width": columns.stop - columns.start,
-            "height": rows.stop - rows.start,
-        },
-        whole=whole,
-        left=int(columns.start),
-        top=int(rows.start),
-    )
+    camera = window_camera(model.camera(RESOLUTION), window)
     table = model.scenes.emitter_table
     per_light = max(1, min(PASS_PHOTONS, photons) // table.count)
     passes = max(1, round(photons / (per_light * table.count)))

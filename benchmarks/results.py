@@ -63,11 +63,13 @@ def measure_parts(
     here = machine()
     say_if_busy(console, here)
     path = FOLDER / f"{name}.json"
-    found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
     for part in (options.only,) if options.only else measures:
         console.print(f"[dim]{part}")
-        found[part] = {"machine": here, **measures[part]()}
-        console.print_json(json.dumps(found[part]))
+        row = {"machine": here, **measures[part]()}
+        console.print_json(json.dumps(row))
+        # Read now, since another process may have measured another part meanwhile.
+        found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        found[part] = row
         if not options.dry:
             path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
             path.with_suffix(".md").write_text(table(found), encoding="utf-8")

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.light_tracing import light_traced
 from benchmarks.patches import RESOLUTION, PatchCase, Patches, means
+from benchmarks.reference import box_around, window_camera
 from optisense import OpticalModel
 
 PATH = json.loads((Path(__file__).parents[1] / "assets" / "metal-patches.json").read_text())
@@ -25,6 +27,12 @@ RING = 0.04
 """Relative error of the green light of the skin around the contact; a twentieth of it comes from
 the contact by reflection at the glass."""
 
+PILOT = 100_000
+"""Photons of an image of which only the contact mask is used."""
+TRACED = {"contact": 0.03, "rim": 0.12}
+"""Relative error of the mean of each channel by light tracing with two million photons, three times
+the noise. With 32 million photons it is given in benchmarks/patches.md."""
+
 
 @pytest.mark.parametrize("specularity", CONTACT)
 def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> None:
@@ -39,3 +47,20 @@ def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> N
     if specularity == 1.0:
         green = image.radiance[patches.skin >= 0].mean(axis=0)[1]
         assert green == pytest.approx(PATH["ring"]["1"][1], rel=RING)
+
+
+def test_light_tracing_finds_the_light_of_the_path_tracer() -> None:
+    case = PatchCase("gelsight-mini-ideal", 0.6)
+    model = OpticalModel(case.design(), "llvm")
+    contact = case.contact(model)
+    image = model.render([contact], RESOLUTION, PILOT, seed=1, skin="conforming")
+    patches = Patches.of(image)
+    window = box_around(image.contact_mask, margin=2)
+    camera = window_camera(model.camera(RESOLUTION), window)
+    scene = model.scenes.touched([contact], [model.place(contact)]).full
+    traced = np.zeros(image.radiance.shape)
+    traced[window] = light_traced(model, scene, camera, PHOTONS, passes=2)(seed=1)
+    for where, limit in TRACED.items():
+        truth = np.array(PATH[where]["0.6"]).mean(axis=0)
+        found = means(traced, getattr(patches, where)).mean(axis=0)
+        assert found == pytest.approx(truth, rel=limit)
