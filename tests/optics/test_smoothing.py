@@ -57,7 +57,7 @@ def errors(kernels, photons: int) -> tuple[float, float]:  # type: ignore[no-unt
     cells = kernels.cells
     truth = within_cells(cells.centres, SIZE)
     landed = truth * cells.areas[:, None]
-    blurred = kernels.smoothing(photons).kernel.matrix @ landed
+    blurred = kernels.smoothing(photons).kernel @ landed
     sharp = blurred * kernels.sharpening(landed, photons)
     middle = np.hypot(*cells.centres[:, :2].T) < 1.0
     found = (as_read(each, cells.centres, SIZE) for each in (blurred, sharp))
@@ -70,7 +70,7 @@ def test_a_kernel_takes_from_a_peak_what_theory_says(kernels) -> None:  # type: 
     radius = kernels.radii(1)[np.hypot(*kernels.cells.centres[:, :2].T).argmin()]
     cells = kernels.cells
     truth = light(cells.centres)
-    blurred = kernels.smoothing(1).kernel.matrix @ (truth * cells.areas[:, None])
+    blurred = kernels.smoothing(1).kernel @ (truth * cells.areas[:, None])
     nearest = np.hypot(*cells.centres[:, :2].T).argmin()
     expected = -(radius**2) / (2 * HEIGHT**2)
     assert (blurred / truth - 1)[nearest, 0] == pytest.approx(expected, rel=0.15)
@@ -86,7 +86,7 @@ def test_twicing_undoes_most_of_the_blur_and_leaves_even_light_even(kernels) -> 
     cells = kernels.cells
     both = kernels.smoothing(5_000_000, corrected=True)
     truth = within_cells(cells.centres, SIZE)
-    once = both.kernel.matrix @ (truth * cells.areas[:, None])
+    once = both.kernel @ (truth * cells.areas[:, None])
     twice = both.correction @ once
     middle = np.hypot(*cells.centres[:, :2].T) < 1.0
     plain, sharp = (
@@ -95,7 +95,7 @@ def test_twicing_undoes_most_of_the_blur_and_leaves_even_light_even(kernels) -> 
     )
     assert plain < -0.01
     assert abs(sharp) < AT_DEFAULT
-    even = both.correction @ (both.kernel.matrix @ cells.areas[:, None])
+    even = both.correction @ (both.kernel @ cells.areas[:, None])
     assert even == pytest.approx(np.ones_like(even), rel=1e-6)
 
 
@@ -105,7 +105,7 @@ def test_the_blur_goes_as_photons_grow(kernels) -> None:  # type: ignore[no-unty
     landed = truth * kernels.cells.areas[:, None]
     middle = np.hypot(*kernels.cells.centres[:, :2].T) < 1.0
     plain = [
-        abs((kernels.smoothing(photons).kernel.matrix @ landed / truth - 1)[middle].mean())
+        abs((kernels.smoothing(photons).kernel @ landed / truth - 1)[middle].mean())
         for photons in many
     ]
     # Eight times the photons halve the square of the radius, and so the blur.
@@ -121,7 +121,7 @@ def test_the_blur_goes_as_photons_grow(kernels) -> None:  # type: ignore[no-unty
 def test_even_light_stays_even_up_to_the_edge(kernels) -> None:  # type: ignore[no-untyped-def]
     cells = kernels.cells
     landed = cells.areas[:, None]
-    assert kernels.smoothing(1).kernel.matrix @ landed == pytest.approx(
+    assert kernels.smoothing(1).kernel @ landed == pytest.approx(
         np.ones_like(landed), rel=1e-6
     )
     assert kernels.sharpening(landed, 1) == pytest.approx(np.ones_like(landed), rel=1e-6)
@@ -173,7 +173,7 @@ def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels) -> No
     some = Kernels(cells, np.full(cells.cells, 20.0), DENSITY, near)
     whole = Kernels(cells, np.full(cells.cells, 20.0), DENSITY)
     landed = np.random.default_rng(3).exponential(size=(cells.cells, 1)) * cells.areas[:, None]
-    smooth, as_whole = (each.smoothing(1).kernel.matrix @ landed for each in (some, whole))
+    smooth, as_whole = (each.smoothing(1).kernel @ landed for each in (some, whole))
     assert smooth[near] == pytest.approx(as_whole[near])
     # Nothing but the cells that they touch counts, so most of the grain stays.
     assert smooth[~near].std() > 0.5

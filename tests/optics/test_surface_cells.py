@@ -104,7 +104,7 @@ def test_light_on_a_top_is_not_averaged_with_the_dark_wall_beside_it() -> None:
     dr.eval(cell, found)
     assert np.asarray(found).all()
     landed = np.bincount(np.asarray(cell), power[lit], cells.cells)[:, None]
-    kernel = Kernels(cells, np.full(cells.cells, 10.0), 1e-3).smoothing(1_000_000).kernel.matrix
+    kernel = Kernels(cells, np.full(cells.cells, 10.0), 1e-3).smoothing(1_000_000).kernel
     light = (kernel @ landed)[:, 0]
     on_top = np.abs(cells.normals[:, 2]) > 0.999
     # Areas of cells are known to a few per cent; a cell of both faces would have half the light.

@@ -8,17 +8,15 @@ go to zero as photons are added.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 import drjit as dr
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags, identity
 from scipy.spatial import cKDTree
 
-from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.surface_cells import SurfaceCells
 
 FloatArray = NDArray[np.floating]
@@ -61,39 +59,17 @@ MAX_SHARPENING = 0.25
 
 
 @dataclass
-class WeightedSums:
-    """Weighted sums among cells, as the rows of a sparse matrix.
-
-    Attributes:
-        start: index of the first entry of each row.
-        cell: the neighbour of each entry.
-        weight: the weight of each entry.
-        matrix: the same as a SciPy matrix.
-    """
-
-    start: mi.UInt32
-    cell: mi.UInt32
-    weight: mi.Float
-    matrix: csr_matrix
-
-    @classmethod
-    def of(cls, matrix: csr_matrix) -> WeightedSums:
-        """Return the sums that multiplication with a matrix computes."""
-        return cls(indices(matrix.indptr), indices(matrix.indices), floats(matrix.data), matrix)
-
-
-@dataclass
 class Smoothing:
     """The smoothing that is applied to tallied light.
 
     Attributes:
-        kernel: the smoothing kernel, which maps mW on cells to mW/mm^2.
+        kernel: matrix (cells, cells) that smooths, from mW on cells to mW/mm^2.
         blur: the kernel with the blur of the cells themselves added.
         correction: matrix (cells, cells) that undoes the blur of kernel and cells in smoothed
             light, in cells in or near the camera's view; None without this correction.
     """
 
-    kernel: WeightedSums
+    kernel: csr_matrix
     blur: csr_matrix
     correction: csr_matrix | None
 
@@ -162,7 +138,7 @@ class Kernels:
             matrix = kernel_matrix(self.cells, radii)
             blur = self._blur(radii)
             twice = self._twice(blur) if corrected else None
-            self._known = {key: Smoothing(WeightedSums.of(matrix), blur, twice)}
+            self._known = {key: Smoothing(matrix, blur, twice)}
         return self._known[key]
 
     def _twice(self, blur: csr_matrix) -> csr_matrix:
@@ -185,7 +161,7 @@ class Kernels:
             photons: number of emitted photons.
         """
         kernel = self.smoothing(photons)
-        smooth = kernel.kernel.matrix @ landed
+        smooth = kernel.kernel @ landed
         again = kernel.blur @ (smooth * self.cells.areas[:, None])
         sharpened = (again > 0) & self.near[:, None]
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened)
@@ -258,57 +234,26 @@ def _pairs_within(
     return rows[order], columns[order], distance[order]
 
 
-@dr.syntax
-def smooth(
-    kernel: WeightedSums,
-    size: tuple[int, int],
-    tables: list[mi.Float],
-    kinds: list[Any],
-    bins: mi.UInt32,
-    stride: mi.UInt32,
-    groups: int,
-    factors: mi.Float,
-) -> list[list[Any]]:
-    """Return kernel-weighted sums over neighbouring cells of the chosen bins.
+def product(matrix: csr_matrix, table: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return the product (m, k) of a sparse matrix (m, n) and a table (n, k).
 
-    Args:
-        kernel: the weights.
-        size: number of planes, and of cells in each (see `RadianceCache.planes`).
-        tables: the tables that are smoothed; the first holds the moments of a radiance cache.
-        kinds: the type of an entry of each table: `mi.Float` or a vector.
-        bins: (k,) the numbers of the chosen bins.
-        stride: number of bins per cell in the tables.
-        groups: number of light groups.
-        factors: (planes cells groups,) factors by which the sums are multiplied.
-
-    Returns:
-        For each plane and each table, the sums (cells k groups,) of the table's kind.
+    The rows are shared among as many threads as the renderer uses. The result does not depend on
+    their number. For a table in which most bins of directions are empty, as those of few photons
+    are, this takes half the time of a loop of Dr.Jit on the same processors, which gathers numbers
+    one by one.
     """
-    planes, cells = size
-    lane = dr.arange(mi.UInt32, cells * dr.width(bins) * groups)
-    used = dr.opaque(mi.UInt32, dr.width(bins))  # one kernel for any number of bins
-    group = lane % groups
-    rest = lane // groups
-    slot = dr.gather(mi.UInt32, bins, rest % used) * groups + group
-    cell = rest // used
-    plane = dr.opaque(mi.UInt32, cells) * (stride * groups)
-    j = dr.gather(mi.UInt32, kernel.start, cell)
-    end = dr.gather(mi.UInt32, kernel.start, cell + 1)
-    totals = [[kind(0) for kind in kinds] for _ in range(planes)]
-    while j < end:
-        other = dr.gather(mi.UInt32, kernel.cell, j) * (stride * groups) + slot
-        weight = dr.gather(mi.Float, kernel.weight, j)
-        for p in range(planes):
-            # Most bins are empty: the fourth float of their first table is 0.
-            first = dr.gather(kinds[0], tables[0], other)
-            if first.w != 0:
-                totals[p][0] += weight * first
-                for i in range(1, len(kinds)):
-                    totals[p][i] += weight * dr.gather(kinds[i], tables[i], other)
-            other += plane
-        j += 1
-    for p in range(planes):
-        row = cell + dr.opaque(mi.UInt32, p * cells)
-        factor = dr.gather(mi.Float, factors, row * groups + group)
-        totals[p] = [total * factor for total in totals[p]]
-    return totals
+    threads = min(dr.thread_count(), matrix.shape[0])
+    if threads < 2:
+        return np.asarray(matrix @ table)
+    # Each thread gets about as many weights as the others.
+    starts = np.searchsorted(matrix.indptr, np.linspace(0, matrix.nnz, threads + 1))
+    starts[0], starts[-1] = 0, matrix.shape[0]
+    out = np.empty((matrix.shape[0], table.shape[1]), dtype=np.float32)
+
+    def multiply(part: int) -> None:
+        rows = slice(starts[part], starts[part + 1])
+        out[rows] = matrix[rows] @ table
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(multiply, range(threads)))
+    return out

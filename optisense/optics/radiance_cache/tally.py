@@ -10,9 +10,8 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
-from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.backend.arrays import floats
 from optisense.optics.radiance_cache._direction_bins import (
     COARSE_BINS,
     FINEST_BINS,
@@ -29,7 +28,7 @@ from optisense.optics.radiance_cache._power_rounding import PowerRounding
 from optisense.optics.radiance_cache._raised_plane import areas, crossings
 from optisense.optics.radiance_cache.beams import collect_beams
 from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
-from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, smooth
+from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, product
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
 from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
@@ -192,7 +191,7 @@ class CacheTally:
         """
         if self.passes < 1:
             return float("inf")
-        kernel = self._smoothing().kernel.matrix
+        kernel = self._smoothing().kernel
         near, areas = self.kernels.near, self.cells.areas
         return noise_of_worst_places(*self._light_and_variance(), near, areas, kernel)
 
@@ -201,36 +200,37 @@ class CacheTally:
         deviation.
         """
         kernel = self._smoothing()
-        means = [kernel.kernel.matrix @ landed for landed in self._landed()[0]]
+        means = [kernel.kernel @ landed for landed in self._landed()[0]]
         if kernel.correction is not None:
             means = [kernel.correction @ light for light in means]
         # Half the difference of two halves has the same standard deviation as their mean.
         return (means[0] + means[1]) / 2, ((means[0] - means[1]) / 2) ** 2
 
-    def _corrected(
-        self,
-        tables: Tables,
-        kernel: csr_matrix,
-        correction: csr_matrix,
-        used: NDArray[np.integer],
-    ) -> Tables:
-        """Return the smoothed light of the bins ``used``, with the blur of each bin undone.
-
-        Matrix products take half the time of `smooth` here, as the correction fills most of the
-        many bins.
+    def _products(self, tables: Tables, kernel: Smoothing, used: NDArray[np.integer]) -> Tables:
+        """Return the smoothed light of the bins ``used``, in which the blur is undone: in each bin
+        by itself where the kernel has a correction, else by one factor for each cell and group.
         """
         cells, count = self.cells.cells, self.directions.count
-        # Elsewhere the correction is the identity; a copy of a table takes as long as a product.
-        near = np.flatnonzero(self.kernels.near)
-        once = (kernel / self.passes).astype(np.float32)
-        twice = correction[near].astype(np.float32)
+        once = (kernel.kernel / self.passes).astype(np.float32)
+        near, twice, factors = np.flatnonzero(self.kernels.near), None, None
+        if kernel.correction is None:
+            landed = self._landed().mean(axis=1)
+            factors = [self.kernels.sharpening(each, self.photons) for each in landed]
+        else:
+            # Elsewhere the correction is the identity; a copy of a table takes as long as a
+            # product.
+            twice = kernel.correction[near].astype(np.float32)
 
         def summed(table: mi.Float) -> mi.Float:
             planes = []
-            for whole in np.asarray(table).reshape(self.planes, cells, count, -1):
+            for plane, whole in enumerate(np.asarray(table).reshape(self.planes, cells, count, -1)):
                 chosen = whole if len(used) == count else whole[:, used]
-                light = once @ chosen.reshape(cells, -1)
-                light[near] = twice @ light
+                light = product(once, chosen.reshape(cells, -1))
+                if twice is not None:
+                    light[near] = product(twice, light)
+                elif factors is not None:
+                    groups = light.reshape(cells, len(used), self.groups, -1)
+                    groups *= factors[plane].astype(np.float32)[:, None, :, None]
                 planes.append(light)
             return floats(planes[0] if len(planes) == 1 else np.stack(planes))
 
@@ -258,39 +258,11 @@ class CacheTally:
                 power += fluxes.sum(axis=0).sum(axis=1)
         used = np.flatnonzero(power > EMPTY_BIN_SHARE * power.sum())
         used = used if len(used) else np.zeros(1, dtype=np.int64)
-        bins = indices(used)
         kernel = self._smoothing()
-        factors: FloatArray = np.ones((self.planes, self.cells.cells, self.groups))
-        if kernel.correction is None:
-            landed = self._landed().mean(axis=1)
-            factors = np.stack([self.kernels.sharpening(each, self.photons) for each in landed])
-        rest = (
-            bins,
-            dr.opaque(mi.UInt32, count),
-            self.groups,
-            floats(factors / self.passes),
-        )
-
-        def smoothed(tables: Tables) -> Tables:
-            if kernel.correction is not None:
-                return self._corrected(tables, kernel.kernel.matrix, kernel.correction, used)
-            given, kinds = [tables.moments, tables.heights], [mi.Vector4f, mi.Float]
-            if self.coloured:
-                given.append(tables.colours)
-                kinds.append(mi.Vector4f)
-            size = self.planes, self.cells.cells
-            sums = smooth(kernel.kernel, size, given, kinds, *rest)
-            dr.eval(sums)  # together; otherwise the loop would run again for each array
-            flat = [
-                each[0] if len(each) == 1 else dr.concat(each)
-                for each in (
-                    [dr.ravel(sums[p][i]) for p in range(self.planes)] for i in range(len(kinds))
-                )
-            ]
-            return Tables(flat[0], flat[1], flat[2] if self.coloured else flat[0])
-
-        tables = smoothed(self.landed)
-        above = None if self.above_surface is None else smoothed(self.above_surface)
+        tables = self._products(self.landed, kernel, used)
+        above = self.above_surface
+        if above is not None:
+            above = self._products(above, kernel, used)
         size = dr.opaque(mi.UInt32, len(used))
         cells, groups = self.cells.cells, self.groups
         table = irradiance_table(tables.moments, cells, size, groups)
