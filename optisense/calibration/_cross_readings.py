@@ -15,7 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -168,28 +169,56 @@ def cross_readings(
 
 
 class _Reader:
-    """Polynomial that maps changes of colour and places to tilts."""
+    """Polynomial that maps changes of colour and places to tilts, fitted by ridge regression.
+
+    Its variables and its terms are standardised. The normal equations are solved here, as
+    scikit-learn takes a second to load.
+    """
 
     def __init__(self, known: Sequence[Pixels], balls: Sequence[_Ball]) -> None:
-        from sklearn.linear_model import Ridge
-        from sklearn.pipeline import make_pipeline
-        from sklearn.preprocessing import PolynomialFeatures, StandardScaler
-
-        self._model: Any = make_pipeline(
-            StandardScaler(),
-            PolynomialFeatures(DEGREE, include_bias=False),
-            StandardScaler(),
-            Ridge(RIDGE),
-        )
-        terms = np.concatenate([_terms(each) for each in known])
-        self._model.fit(terms, np.concatenate([ball.tilts for ball in balls]))
+        given = np.concatenate([_variables(each) for each in known])
+        tilts = np.concatenate([ball.tilts for ball in balls])
+        self._variables = _Standard(given)
+        powers = _terms(self._variables(given))
+        self._terms = _Standard(powers)
+        terms = self._terms(powers)
+        self._mean = tilts.mean(axis=0)
+        weighted = terms.T @ terms + RIDGE * np.eye(terms.shape[1])
+        self._slopes = np.linalg.solve(weighted, terms.T @ (tilts - self._mean))
 
     def normals(self, pixels: Pixels) -> FloatArray:
         """Return the read normals (n, 3); the third axis is the untouched normal."""
-        return tilts_to_normals(np.asarray(self._model.predict(_terms(pixels))))
+        terms = self._terms(_terms(self._variables(_variables(pixels))))
+        return tilts_to_normals(terms @ self._slopes + self._mean)
 
 
-def _terms(pixels: Pixels) -> FloatArray:
+class _Standard:
+    """Shift and scale that give the columns of a table the mean 0 and the deviation 1; a constant
+    column is only shifted."""
+
+    def __init__(self, table: FloatArray) -> None:
+        self._mean, deviation = table.mean(axis=0), table.std(axis=0)
+        constant = deviation <= 1e-9 * np.abs(self._mean)  # up to the rounding of the mean
+        self._scale = np.where(constant, 1.0, deviation)
+
+    def __call__(self, table: FloatArray) -> FloatArray:
+        return np.asarray((table - self._mean) / self._scale)
+
+
+def _terms(variables: FloatArray) -> FloatArray:
+    """Return all products (n, k) of one up to `DEGREE` of the variables (n, m)."""
+    columns = range(variables.shape[1])
+    return np.stack(
+        [
+            variables[:, list(factors)].prod(axis=1)
+            for degree in range(1, DEGREE + 1)
+            for factors in combinations_with_replacement(columns, degree)
+        ],
+        axis=1,
+    )
+
+
+def _variables(pixels: Pixels) -> FloatArray:
     """Return the changes of R, G and B, and the places, (n, 5)."""
     return np.concatenate([pixels.picture - pixels.untouched, pixels.places], axis=1)
 
