@@ -224,7 +224,7 @@ class CacheTally:
         def summed(table: mi.Float) -> mi.Float:
             planes = []
             for plane, whole in enumerate(np.asarray(table).reshape(self.planes, cells, count, -1)):
-                chosen = whole if len(used) == count else whole[:, used]
+                chosen = whole if len(used) == count else np.take(whole, used, axis=1)
                 light = product(once, chosen.reshape(cells, -1))
                 if twice is not None:
                     light[near] = product(twice, light)
