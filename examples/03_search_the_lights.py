@@ -7,7 +7,7 @@ result = search(
     ots.load("gelsight-mini"),
     {"lights.red.shift.z": Around(1.5), "lights.red.flux": (1.0, 5.0)},
     objective="normdiff",
-    budget=3,  # a real search takes a few hundred trials, and nine places
+    budget=2,  # a real search takes a few hundred trials, and nine places
     settings={"resolution": (120, 90), "photons": "draft", "places": [(-4, -3), (4, 3)]},
     out="study",
 )

@@ -14,6 +14,6 @@ def evenness(evaluation):
     return float((low / high).min())
 
 
-for name in ("gelsight-mini", "gelsight360"):
+for name in ("gelsight-mini", "gelsight-mini-ideal"):
     score = ots.evaluate(ots.load(name), "evenness", resolution=(80, 60), photons="draft")
     print(f"{name:<14} {score.value:.3f}")

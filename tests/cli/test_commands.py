@@ -21,6 +21,10 @@ from optisense.sensors import SENSORS
 
 runner = CliRunner()
 
+OTHER_SENSOR = "gelsight-mini-ideal-cylindrical"
+"""A sensor in whose report no ball is pressed: beside a picture of GelSight Mini, one is, as it was
+into the real sensor."""
+
 
 def run(*arguments: str) -> tuple[int, str]:
     """Exit code and everything that was printed."""
@@ -95,8 +99,7 @@ def test_a_command_does_not_wait_for_the_others() -> None:
     [
         (["check", "gelsight-mini-ideal"], {"drjit", "mitsuba", "scipy.optimize", "jinja2"}),
         (
-            # Beside a GelSight Mini's picture the report presses a ball, as a real one was pressed.
-            ["render", "gelbelt", "--resolution=40x30", "--photons=20000", "--out=here"],
+            ["render", OTHER_SENSOR, "--resolution=40x30", "--photons=20000", "--out=here"],
             {"scipy.optimize", "scipy.stats", "optisense.objectives", "optisense.report.scores"},
         ),
     ],

@@ -233,7 +233,7 @@ def test_relit_presses_read_as_rendered_ones(relighting: Relighting) -> None:
 def test_the_exposure_is_that_of_the_untouched_skin() -> None:
     """A shiny coating saturates where other scores turn the exposure down."""
     design = set_value(ots.load("gelsight-mini-ideal"), "coating.specularity", 0.8)
-    settings = {"resolution": (160, 120), "photons": 200_000}
+    settings = {"resolution": (120, 90), "photons": 60_000}
     sensor = OpticalModel(design)
     evaluation = Evaluation(sensor, Settings(**settings, places=PLACES))
     as_set = evaluate(evaluation, "reading")

@@ -249,7 +249,6 @@ def mirrored_means(image: TactileImage) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "specularity"),
     [
-        ("gelsight-mini-ideal", 0.0),
         ("gelsight-mini-ideal-cylindrical", 0.0),
         ("gelsight-mini-ideal", 0.3),
     ],

@@ -121,9 +121,7 @@ def test_the_blur_goes_as_photons_grow(kernels) -> None:  # type: ignore[no-unty
 def test_even_light_stays_even_up_to_the_edge(kernels) -> None:  # type: ignore[no-untyped-def]
     cells = kernels.cells
     landed = cells.areas[:, None]
-    assert kernels.smoothing(1).kernel @ landed == pytest.approx(
-        np.ones_like(landed), rel=1e-6
-    )
+    assert kernels.smoothing(1).kernel @ landed == pytest.approx(np.ones_like(landed), rel=1e-6)
     assert kernels.sharpening(landed, 1) == pytest.approx(np.ones_like(landed), rel=1e-6)
 
 

@@ -98,15 +98,15 @@ def test_the_page_asks_the_network_for_nothing(section: LightSection) -> None:
 
 def test_the_commands_write_the_section(tmp_path: Path) -> None:
     few = ["--photons", "20000", "--out", str(tmp_path)]
-    done = CliRunner().invoke(app, ["ledger", "gelbelt", *few])
+    done = CliRunner().invoke(app, ["ledger", "gelsight-svelte", *few])
     assert done.exit_code == 0, done.output
     page = (tmp_path / "ledger.html").read_text(encoding="utf-8")
     data = json.loads((tmp_path / "ledger.json").read_text())
-    assert "absorbed by wheels" in page
+    assert "absorbed by body" in page
     assert {"absorbed by a part"} == {
-        entry["kind"] for entry in data["entries"] if entry["where"] == "absorbed by wheels"
+        entry["kind"] for entry in data["entries"] if entry["where"] == "absorbed by body"
     }
-    done = CliRunner().invoke(app, ["render", "gelbelt", "--resolution", "32x24", *few])
+    done = CliRunner().invoke(app, ["render", "gelsight-svelte", "--resolution", "32x24", *few])
     assert done.exit_code == 0, done.output
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Where the light goes" in report and "absorbed by wheels" in report
+    assert "Where the light goes" in report and "absorbed by body" in report

@@ -211,7 +211,7 @@ def test_the_command_renders_the_best_trials(tmp_path: Path) -> None:
     folder = tmp_path / "study"
     space = {"camera.fov": (45.0, 55.0, 2)}
     search(
-        ots.load("gelsight-mini-ideal"),
+        ots.set_value(ots.load("gelsight-mini-ideal"), "camera.resolution", (64, 48)),
         space,
         "aoap",
         method="grid",

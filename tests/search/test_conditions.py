@@ -371,7 +371,7 @@ def test_long_searches_read_the_start_and_the_best_so_far(
     options: dict[str, Any],
 ) -> None:
     monkeypatch.setattr("optisense.search.study._reading_watch.FIRST_SECONDS", 0.0)
-    settings = {"photons": 60_000, "resolution": [160, 120]}
+    settings = {"photons": 60_000, "resolution": [160, 120], "together": True}
     found = search(mini, space, goal, budget=3, settings=settings, **options)
     best = max((each for each in found.trials if not each.failure), key=lambda each: each.score)
     assert not best.is_start

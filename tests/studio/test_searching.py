@@ -15,7 +15,7 @@ from studio.optimise import search_progress, unfinished_studies
 from studio.optimise.operator import TITLE
 from studio.scene.collections import objects_of
 
-TRIALS = 60
+TRIALS = 30
 """Number of trials of a search that is stopped during its first trials."""
 
 GOAL = """
