@@ -60,10 +60,27 @@ class SensingSurface:
         mesh.validate("sensing surface", closed=False)
         self.mesh = mesh.welded()
         self._origin_face, self.origin = self._closest(origin)
-        normal = self.mesh.face_normals[self._origin_face]
+        self._inward = normal = self.mesh.face_normals[self._origin_face]
         self.u_axis = _in_plane(np.asarray(u_axis, dtype=np.float64), [normal], "u")
         self.v_axis = _in_plane(np.asarray(v_axis, dtype=np.float64), [normal, self.u_axis], "v")
         self._points = lru_cache(maxsize=KEPT_POINTS)(self._point_found)
+
+    def tangents(self, inward: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
+        """Return two perpendicular unit tangents (..., 3) of the surface for inward normals.
+
+        The frame at the origin, with `u_axis` as its first tangent, is turned by the smallest
+        rotation that takes the normal there to the given one. The tangents of neighbouring places
+        are therefore similar all over a dome, except where the surface has turned by 180 degrees.
+        Projections of `u_axis` would change their sign where the surface faces its direction.
+
+        Args:
+            inward: (..., 3) unit normals into the gel.
+        """
+        normals = np.asarray(inward, dtype=np.float64)
+        halfway = normals + self._inward
+        cosine = np.maximum(1.0 + normals @ self._inward, 1e-12)
+        first = self.u_axis - ((normals @ self.u_axis) / cosine)[..., None] * halfway
+        return first, np.cross(first, normals)
 
     def point_at(self, u: float, v: float) -> SurfacePoint:
         """Return the place with surface coordinates (u, v), mm.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 
-USUAL = (23.0, 2.8)
+USUAL = (25.0, 2.8)
 """Errors (degrees) of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
 
 

@@ -14,10 +14,7 @@ def frame_of(contact: Contact, surface: SensingSurface) -> dict[str, Any]:
     """Return the frame of a press: place, inward normal, compass directions, the ball's centre."""
     assert isinstance(contact.indenter, Sphere)
     spot = locate(contact, surface)
-    east = surface.u_axis - (surface.u_axis @ spot.inward) * spot.inward
-    if np.linalg.norm(east) < 1e-6:  # the surface has turned by 90 degrees since the origin
-        east = np.cross(surface.v_axis, spot.inward)
-    east = east / np.linalg.norm(east)
+    east, _ = surface.tangents(spot.inward)
     return {
         "place": spot.point,
         "inward": spot.inward,

@@ -150,8 +150,7 @@ def light_at(
             hint=f"Give at least {100 * lights}",
         )
     place = model.surface.point_at(*at) if len(at) == 2 else model.surface.nearest(at)
-    right = model.surface.u_axis - place.inward * (model.surface.u_axis @ place.inward)
-    right /= np.linalg.norm(right)
+    right, _ = model.surface.tangents(place.inward)
     up = np.cross(place.inward, right)
     up *= np.sign(up @ model.surface.v_axis)
     disc = Disc(place.point, place.inward, right, up, PLACE_RADIUS)

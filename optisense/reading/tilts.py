@@ -1,8 +1,8 @@
 """Tilts of a surface, normals, and the angles between them.
 
 The *tilt* of a surface at a place is the two components of its unit normal along the tangents of
-the untouched surface there (the sines of the slopes). It is 0 where nothing touches, also on curved
-sensors.
+the untouched surface there (the sines of the slopes; see `SensingSurface.tangents`). It is 0 where
+nothing touches, also on curved sensors.
 """
 
 from __future__ import annotations

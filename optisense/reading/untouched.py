@@ -82,15 +82,3 @@ class UntouchedSurface:
         inside = image.contact_mask
         depth[inside] = np.maximum(depth[inside], 0.0)
         return depth.astype(np.float32)
-
-    def frames(self, right: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return two perpendicular unit tangents of the surface at each pixel, (h, w, 3) each.
-
-        Args:
-            right: (3,) direction whose projection on the surface is the first tangent.
-        """
-        along = right - (self.normals @ right)[..., None] * self.normals
-        with np.errstate(invalid="ignore"):
-            first = along / np.linalg.norm(along, axis=2, keepdims=True)
-        second = np.cross(first, self.normals)
-        return first, second

@@ -139,7 +139,7 @@ class CalibratedSensor:
         height = max(1, round(settings.width * camera.resolution[1] / camera.resolution[0]))
         self.resolution = settings.resolution or (settings.width, height)
         self.untouched = UntouchedSurface.of(model.chief_rays(self.resolution))
-        self._frames = self.untouched.frames(model.surface.u_axis)
+        self._frames = model.surface.tangents(self.untouched.normals)
         self._integrator = NormalIntegrator(self.untouched)
         blank = self._render([])
         self._exposure = blank.auto_exposure()

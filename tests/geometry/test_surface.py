@@ -51,6 +51,31 @@ def test_on_a_ball_straight_ways_are_great_circles() -> None:
         np.testing.assert_allclose(surface.point_at(u, v).point, expected, atol=1e-2)
 
 
+def test_tangents_turn_with_the_surface_without_a_jump_on_a_dome() -> None:
+    surface = bent(9.0, ball=True)
+    polar, azimuth = np.meshgrid(np.radians(np.linspace(0, 100, 51)), np.linspace(-4, 4, 401))
+    normals = np.stack(
+        [-np.sin(polar) * np.cos(azimuth), -np.sin(polar) * np.sin(azimuth), -np.cos(polar)], -1
+    )
+    first, second = surface.tangents(normals)
+    axes = np.stack([first, second, normals], axis=-2)
+    np.testing.assert_allclose(axes @ axes.swapaxes(-1, -2), np.broadcast_to(np.eye(3), axes.shape),
+                               atol=1e-9)  # fmt: skip
+    np.testing.assert_allclose(first[:, 0], np.broadcast_to([1.0, 0, 0], first[:, 0].shape),
+                               atol=1e-3)  # fmt: skip
+    # Neighbours are two degrees of polar angle or a fiftieth of a radian of azimuth apart.
+    for step in (np.diff(first, axis=0), np.diff(first, axis=1)):
+        assert np.linalg.norm(step, axis=-1).max() < 0.05
+
+
+def test_tangents_of_a_flat_surface_are_its_axes() -> None:
+    mesh = TriangleMesh.grid((20.0, 16.0), (7, 6), height=0.3).flipped()
+    surface = SensingSurface(mesh, (1, 2, 5), (1, 0, 0.2), (0.3, 1, 0))
+    first, second = surface.tangents(np.array([[0.0, 0.0, -1.0]]))
+    np.testing.assert_allclose(first, [[1, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(np.abs(second), [[0, 1, 0]], atol=1e-12)
+
+
 def test_off_the_edge_says_how_far_the_edge_is() -> None:
     surface = bent(8.0, ball=False)
     with pytest.raises(ContactError, match=r"\(12, 0\).*10\.00 mm"):

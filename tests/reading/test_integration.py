@@ -119,11 +119,3 @@ def test_depth_on_a_cylinder_is_the_distance_from_it() -> None:
         np.broadcast_to(depth, SHAPE)[5:-5, 5:-5], abs=1e-4
     )
     assert np.isnan(untouched.depth(np.full((2, 3), np.nan))).all()
-
-
-def test_frames_are_square_and_lie_in_the_surface() -> None:
-    untouched = rays(8.0, 12.0)
-    first, second = untouched.frames(np.array([1.0, 0.0, 0.0]))
-    for a, b in ((first, second), (first, untouched.normals), (second, untouched.normals)):
-        assert np.abs(np.einsum("...i,...i", a, b)).max() < 1e-12
-    assert np.linalg.norm(second, axis=2) == pytest.approx(1)
