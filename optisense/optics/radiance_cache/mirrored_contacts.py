@@ -35,6 +35,10 @@ from optisense.optics.transport.interact import RayKind
 MIN_LANES = 2
 """Lower bound on the number of places that are shaded at once, as Dr.Jit compiles other kernels for
 arrays of one entry."""
+MOST_LANES = 16_000
+"""Largest number of places that are shaded; if rays end at more, a part of them is drawn. A ball of
+1.5 mm in GelSight Mini has up to 5,000. A plate that fills the image has 160,000, which would take
+ten times as long as the rest of the image."""
 
 
 def mirrored_contacts(
@@ -69,7 +73,16 @@ def mirrored_contacts(
     if found is None:
         return None
     end, owner = found
-    alone = dr.width(owner) < MIN_LANES
+    count = dr.width(owner)
+    if count > MOST_LANES:
+        # The places are in the order of their pixels, so that each pixel keeps an equal share.
+        shift = unit_float(dr.gather(mi.UInt32, points.random, mi.UInt32(0)))
+        drawn = mi.UInt32((dr.arange(mi.Float, MOST_LANES) + shift) * (count / MOST_LANES))
+        drawn = dr.minimum(drawn, count - 1)
+        end, owner = dr.gather(PathEnd, end, drawn), dr.gather(mi.UInt32, owner, drawn)
+        end.weight *= count / MOST_LANES
+        dr.eval(end, owner)
+    alone = count < MIN_LANES
     if alone:
         lanes = dr.repeat(mi.UInt32(0), MIN_LANES)
         end, owner = dr.gather(PathEnd, end, lanes), dr.gather(mi.UInt32, owner, lanes)
