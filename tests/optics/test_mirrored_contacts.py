@@ -1,14 +1,54 @@
-"""Light that contacts reflect to metal coatings through the interfaces."""
+"""Light of contacts that a metal coating reflects through the interfaces, and its averaging."""
 
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+import numpy as np
 import pytest
 
 import optisense as ots
 from optisense.mechanics import CONFORMING
+from optisense.optics.backend.arrays import joined
+from optisense.optics.imaging._film import Film
 from optisense.optics.radiance_cache import mirrored_contacts
+from optisense.optics.transport.camera_paths import VisiblePoints
 
 RELATIVE = 0.01
 """Relative error of the mean radiance of a contact; all the light that it reflects through the
 interfaces makes a difference of 4 %."""
+
+
+def test_arrays_of_vectors_and_of_tuples_are_joined() -> None:
+    one = mi.Point3f(mi.Float([1, 2]), mi.Float([3, 4]), mi.Float([5, 6]))
+    other = mi.Point3f(mi.Float([7]), mi.Float([8]), mi.Float([9]))
+    points, numbers = joined((one, mi.UInt32([1, 2])), (other, mi.UInt32([3])))
+    assert np.array(points).tolist() == [[1, 2, 7], [3, 4, 8], [5, 6, 9]]
+    assert np.array(numbers).tolist() == [1, 2, 3]
+
+
+def film_of(values: np.ndarray) -> Film:
+    """A film of one group with one sample of each pixel of (h, w)."""
+    pixel = dr.arange(mi.UInt32, values.size)
+    points = dr.zeros(VisiblePoints, values.size)
+    points.valid, points.weight, points.pixel = mi.Bool(True), mi.Color3f(1), pixel
+    film = Film(values.size, 1)
+    film.count(pixel)
+    film.add(points, [mi.Color3f(mi.Float(values.ravel().astype(np.float32)))])
+    return film
+
+
+def test_spreading_keeps_even_light_and_the_sum_of_a_bright_sample() -> None:
+    where = np.ones((40, 40), dtype=bool)
+    where[:, :5] = False
+    even = film_of(np.full((40, 40), 3.0)).averaged_layers(40, 40, [(where, 5)])
+    assert even == pytest.approx(3.0, rel=1e-5)
+    spark = np.zeros((40, 40))
+    spark[20, 20], spark[10, 2] = 1.0, 1.0
+    spread = film_of(spark).averaged_layers(40, 40, [(where, 5)])[0, ..., 0]
+    assert spread[where].sum() == pytest.approx(1.0, rel=1e-5)
+    assert spread[20, 20] < 0.1 and (spread[where] > 0).sum() > 30
+    assert spread[10, 2] == 1.0 and not spread[~where].sum() > 1.0
 
 
 def test_drawing_a_part_of_the_places_changes_no_mean(monkeypatch: pytest.MonkeyPatch) -> None:
