@@ -63,3 +63,14 @@ def test_drawing_a_part_of_the_places_changes_no_mean(monkeypatch: pytest.Monkey
 
     everywhere = mean_in_contact(10**9)  # about 13,000 places
     assert mean_in_contact(2000) == pytest.approx(everywhere, rel=RELATIVE)
+
+
+def test_averaging_without_blur_keeps_a_peak() -> None:
+    across = np.arange(40) - 20.0
+    peak = 500.0 - across[:, None] ** 2 - across[None, :] ** 2
+    where = np.ones((40, 40), dtype=bool)
+    region = [(where, 5)]
+    blurred, kept = (film_of(peak).averaged_layers(40, 40, region, each) for each in (False, True))
+    # Away from the border, the kernel lowers this peak by its variance: twice that of two squares.
+    assert blurred[0, 20, 20, 0] == pytest.approx(500.0 - 8.0, rel=1e-5)
+    assert kept[0, 20, 20, 0] == pytest.approx(500.0, rel=1e-5)

@@ -128,7 +128,11 @@ class Film:
         return layers
 
     def averaged_layers(
-        self, width: int, height: int, regions: list[tuple[NDArray[np.bool_], int]]
+        self,
+        width: int,
+        height: int,
+        regions: list[tuple[NDArray[np.bool_], int]],
+        deblurred: bool = False,
     ) -> NDArray[np.float32]:
         """Return the layers with the pixels of each region averaged over the samples of other
         pixels of the region around them.
@@ -138,12 +142,14 @@ class Film:
             height: number of rows.
             regions: (h, w) mask of pixels that are averaged with one another, and half the side
                 (pixels, odd) of the square over which a triangular kernel averages them.
+            deblurred: whether most of the blur is undone by twicing: the kernel K is replaced by
+                2 K - K K. The noise is then up to a quarter larger.
         """
         layers = self.layers(width, height)
         samples = np.asarray(self.counts).reshape(height, width)
         for where, reach in regions:
             if reach > 1:
-                _average(layers, samples, where, reach)
+                _average(layers, samples, where, reach, deblurred)
         return layers
 
 
@@ -152,6 +158,7 @@ def _average(
     samples: NDArray[np.float32],
     where: NDArray[np.bool_],
     reach: int,
+    deblurred: bool,
 ) -> None:
     """Average the pixels ``where`` of layers (groups, h, w, 3) as in `Film.averaged_layers`.
 
@@ -180,4 +187,6 @@ def _average(
             values = layer[*part, k]
             if values.any():
                 mean = around(values * counts) * share
+                if deblurred:
+                    mean = np.maximum(2 * mean - around(mean * counts) * share, 0)
                 layer[*part, k] = np.where(where, mean, values)
