@@ -82,7 +82,8 @@ def _around(piece: NDArray[np.bool_]) -> FloatArray:
 
     rows, columns = np.nonzero(piece)
     middles = np.column_stack([columns, rows]) + 0.5
-    hull = MultiPoint(middles).buffer(1.5, quad_segs=4).convex_hull
+    # The hull comes first: its few corners are widened in a thousandth of the time of all pixels.
+    hull = MultiPoint(middles).convex_hull.buffer(1.5, quad_segs=4)
     return np.asarray(hull.exterior.coords)[:-1]
 
 

@@ -124,12 +124,19 @@ def influences(trials: Sequence[Trial], name: str) -> list[Influence]:
 
 def rank_correlation(one: ArrayLike, other: ArrayLike) -> float:
     """Return Spearman's rank correlation of two samples (n,); 0 if one of them is constant."""
-    from scipy.stats import rankdata
-
-    first, second = rankdata(one), rankdata(other)
+    first, second = _ranks(one), _ranks(other)
     if np.ptp(first) == 0.0 or np.ptp(second) == 0.0:
         return 0.0
     return float(np.corrcoef(first, second)[0, 1])
+
+
+def _ranks(values: ArrayLike) -> NDArray[np.float64]:
+    """Return the ranks (n,) of values (n,), from 1; equal values have the mean of their ranks.
+
+    `scipy.stats`, which has this too, takes a second to load.
+    """
+    _, which, counts = np.unique(np.asarray(values), return_inverse=True, return_counts=True)
+    return np.asarray((np.cumsum(counts) - (counts - 1) / 2)[which])
 
 
 def correlation_ratio(groups: ArrayLike, values: ArrayLike) -> float:
