@@ -137,9 +137,13 @@ def _frame(normal: FloatArray, mesh: TriangleMesh) -> FloatArray:
     edges = edges.reshape(-1, 3)[np.abs(edges.reshape(-1, 3) @ normal) < 1e-6]
     # Diagonals of quadrilaterals are no edges of the plate; its sides tell which are.
     sides = mesh.face_normals[np.abs(mesh.face_normals @ normal) < 1e-6]
-    along = [e for e in edges if len(sides) and np.abs(sides @ e).min() < 1e-6 * np.linalg.norm(e)]
-    right = max(along or list(edges), key=lambda edge: float(np.linalg.norm(edge)))
-    right = right / np.linalg.norm(right)
+    lengths = np.linalg.norm(edges, axis=1)
+    order = np.argsort(-lengths, kind="stable")
+    right = edges[order[0]] / lengths[order[0]]
+    for edge, length in zip(edges[order], lengths[order], strict=True):
+        if len(sides) and np.abs(sides @ edge).min() < 1e-6 * length:
+            right = edge / length
+            break
     return np.array([right, np.cross(normal, right), normal])
 
 

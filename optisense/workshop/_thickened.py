@@ -89,15 +89,20 @@ def _plate(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
 def _offsets(mesh: TriangleMesh, thickness: float) -> FloatArray:
     """Return the displacement from each vertex to the far face, (n, 3) mm, which is `thickness`
     behind the plane of each of its faces, in the least-squares sense.
+
+    It is the shortest solution of the normal equations: where the faces are in one plane, it is
+    along their normal.
     """
-    result = np.empty_like(mesh.vertices)
-    normals = mesh.face_normals
+    normals = np.repeat(mesh.face_normals, 3, axis=0)
     corners = mesh.faces.reshape(-1)
-    order = np.argsort(corners, kind="stable")
-    bounds = np.searchsorted(corners[order], np.arange(len(mesh.vertices) + 1))
-    for vertex in range(len(mesh.vertices)):
-        own = normals[order[bounds[vertex] : bounds[vertex + 1]] // 3]
-        way = np.linalg.lstsq(own, np.full(len(own), -thickness), rcond=SAME_NORMAL**0.5)[0]
-        length = float(np.linalg.norm(way))
-        result[vertex] = way * min(1.0, LONGEST_MITRE * thickness / max(length, 1e-12))
-    return result
+    squares = np.zeros((len(mesh.vertices), 3, 3))
+    sums = np.zeros((len(mesh.vertices), 3))
+    np.add.at(squares, corners, normals[:, :, None] * normals[:, None, :])
+    np.add.at(sums, corners, normals)
+    values, axes = np.linalg.eigh(squares)
+    known = values > SAME_NORMAL * values[:, -1:]
+    inverse = np.divide(1.0, values, out=np.zeros_like(values), where=known)
+    along = np.einsum("nik,ni->nk", axes, -thickness * sums)
+    ways = np.einsum("nik,nk->ni", axes, inverse * along)
+    lengths = np.maximum(np.linalg.norm(ways, axis=1), 1e-12)
+    return ways * np.minimum(1.0, LONGEST_MITRE * thickness / lengths)[:, None]
