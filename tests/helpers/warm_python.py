@@ -20,6 +20,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -108,7 +109,9 @@ def import_all() -> None:
 
     use_variant("llvm")
     import_renderer("drjit").set_thread_count(1)
-    import matplotlib.figure  # noqa: F401
+    # Commands load these only when they need them, as each takes up to a second.
+    for name in ("matplotlib.figure", "scipy.stats", "sklearn.ensemble", "sklearn.neural_network"):
+        import_module(name)
 
     import optisense.cli
     import optisense.commands.rendering
