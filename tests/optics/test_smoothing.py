@@ -215,3 +215,21 @@ def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels) -> None:  # ty
     clear = np.abs(cells.centres[:, :2]).max(axis=1) < 5.0
     assert np.median((found / even)[clear & (aside < 0.5)]) < 0.8
     assert np.median((found / even)[clear & (aside > 4.0)]) == pytest.approx(1.0)
+
+
+def test_products_do_not_depend_on_the_number_of_threads(kernels) -> None:  # type: ignore[no-untyped-def]
+    import drjit as dr
+
+    from optisense.optics.radiance_cache.smoothing import product
+
+    matrix = kernels.smoothing(1_000_000).kernel.astype(np.float32)
+    table = np.random.default_rng(3).random((matrix.shape[1], 12), dtype=np.float32)
+    before, found = dr.thread_count(), []
+    try:
+        for threads in (1, 3):
+            dr.set_thread_count(threads)
+            found.append(product(matrix, table))
+    finally:
+        dr.set_thread_count(before)
+    np.testing.assert_array_equal(*found)
+    np.testing.assert_allclose(found[0], matrix.toarray() @ table, rtol=1e-5)
