@@ -14,13 +14,13 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from optisense.optics.backend.arrays import gathered, indices
+from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.sequences import seed_of, sequence_4d, unit_float
 from optisense.optics.scene.emitters import EmitterTable, emit
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 from optisense.optics.transport.emission_guide import GUIDE_CELLS, EmissionGuide, warp
-from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, RayKind, interact
+from optisense.optics.transport.interact import LobeSample, RayKind, interact
 from optisense.optics.transport.photon_map import (
     HALF_SHIFT,
     SURFACE_SHIFT,
@@ -30,16 +30,10 @@ from optisense.optics.transport.photon_map import (
 )
 from optisense.optics.transport.volume_flux import SAMPLES_PER_SEGMENT, FluxLayer, sample_segment
 
-STAGES = (4, 4, 6)
-"""Numbers of surfaces after which the surviving photons are gathered into a dense array. Photons
-with long paths would leave most lanes of a vector idle: in GelSight Mini, DIGIT, GelSight Svelte
-and GelSight360, 26 to 44 % of the photons survive the first stage, 4 to 10 % the second, and less
-than 2 % the third."""
 LANDINGS_PER_PHOTON = 1.5
-"""Number of landings per photon for which memory is reserved at first. The sensors named above have
-0.3 to 1.3; a pass with more landings is traced again with more memory."""
-MIN_GATHERED_PHOTONS = 100_000
-"""Number of photons of a pass below which gathering the survivors costs more time than it saves."""
+"""Number of landings per photon for which memory is reserved at first. GelSight Mini, DIGIT,
+GelSight Svelte and GelSight360 have 0.3 to 1.3; a pass with more landings is traced again with more
+memory."""
 MAX_SURVIVAL = 0.95
 """Upper bound on the probability that a photon survives its reflection (Russian roulette), so that
 no path between white surfaces is endless: less than 4 % of them meet all `MAX_DEPTH` surfaces."""
@@ -100,16 +94,12 @@ class Flight:
         ray: their current rays.
         throughput: their power.
         group: their light group and half, as bits.
-        landed: mask of the photons that have met the target.
-        scattered: mask of the photons that an opaque surface has scattered last.
         number: their index in the pass.
     """
 
     ray: Ray
     throughput: mi.Color3f
     group: mi.UInt32
-    landed: mi.Bool
-    scattered: mi.Bool
     number: mi.UInt32
 
 
@@ -164,27 +154,23 @@ def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[Flig
         ray=ray,
         throughput=power,
         group=group | ((number & 1) << HALF_SHIFT),
-        landed=dr.full(mi.Bool, False, photons),
-        scattered=dr.full(mi.Bool, False, photons),
         number=place * table.count + light,
     )
     return flight, light * (GUIDE_CELLS * GUIDE_CELLS) + cell
 
 
 @dr.syntax
-def _fly(
-    scene: RayScene, flight: Flight, recording: _Recording, limit: mi.UInt32, seed: mi.UInt64
-) -> Flight:
-    """Follow photons until they have met ``limit`` surfaces in all."""
+def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64) -> mi.Bool:
+    """Follow photons to their ends; return the mask (n,) of those that have met the target."""
     ray = flight.ray
     throughput = mi.Color3f(flight.throughput)
-    landed = mi.Bool(flight.landed)
-    scattered = mi.Bool(flight.scattered)
+    landed = mi.Bool(False)
+    scattered = mi.Bool(False)  # by an opaque surface, at the ray's start
     # The stream depends on the photon's number alone. With `size` it would also depend on the lane,
     # and one photon that ended earlier would change the paths of all photons after it. A small
     # change of the design therefore changes few paths.
     rng = mi.PCG32(initstate=seed, initseq=mi.UInt64(flight.number))
-    while ray.active & (ray.depth < limit):
+    while ray.active:
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
         step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
@@ -225,38 +211,7 @@ def _fly(
             survival = dr.minimum(dr.max(step.lobe.weight), MAX_SURVIVAL)
             ray.active &= rng.next_float32() < survival
             throughput /= dr.maximum(survival, 1e-6)
-    return Flight(ray, throughput, flight.group, landed, scattered, flight.number)
-
-
-def _trace(
-    scene: RayScene, emission: Emission, lights: mi.UInt32, recording: _Recording
-) -> mi.UInt32:
-    """Trace a pass stage by stage.
-
-    Returns:
-        The guide's cell of each photon, or a number of all one bits if it never landed.
-    """
-    photons = emission.per_light * dr.width(lights)
-    flight, cell = launch(scene, emission, lights)
-    arrived = dr.zeros(mi.UInt32, photons)
-    stages = STAGES if photons > MIN_GATHERED_PHOTONS else ()
-    limits = [*np.cumsum(stages, dtype=int).tolist(), MAX_DEPTH]
-    for stage, limit in enumerate(limits):
-        flight = _fly(
-            scene,
-            flight,
-            recording,
-            dr.opaque(mi.UInt32, limit),
-            dr.opaque(mi.UInt64, seed_of(emission.seed, emission.first, stage)),
-        )
-        if recording.target is not None:
-            dr.scatter(arrived, mi.UInt32(1), flight.number, flight.landed)
-        dr.eval(flight, arrived, cell, recording.landings, recording.crossings)
-        lanes = dr.compress(flight.ray.active)
-        if dr.width(lanes) == 0:
-            break
-        flight = gathered(flight, lanes)
-    return dr.select(arrived != 0, cell, mi.UInt32(0xFFFFFFFF))
+    return landed
 
 
 def trace_pilot(
@@ -301,7 +256,11 @@ def _traced(
     while True:
         landings, crossings = (Records.of(each, coloured) for each in room)
         recording = _Recording(landings, target, flux_layer, crossings)
-        cells = _trace(scene, emission, lights, recording)
+        flight, cell = launch(scene, emission, lights)
+        seed = dr.opaque(mi.UInt64, seed_of(emission.seed, emission.first))
+        landed = _fly(scene, flight, recording, seed)
+        cells = dr.select(landed, cell, mi.UInt32(0xFFFFFFFF))
+        dr.eval(cells, landings, crossings)
         found = [int(records.counter[0]) for records in (landings, crossings)]
         if all(count <= each for count, each in zip(found, room, strict=True)):
             break
