@@ -1,10 +1,9 @@
 """Effect of each acceleration and refinement of the optics: each is switched off in turn.
 
-``python -m benchmarks.ablation [--sensor NAME] [--only WORD ...] [--dry]`` writes ablation.json and
-ablation.md beside this file. The four built-in sensors, each with a diffuse and with a metallic
-coating and a ball pressed in, are compared with progressive photon mapping, which shares the photon
-pass and the surfaces with the radiance cache but neither its cells nor its shading. Nothing of the
-product is made for this: constants and functions are replaced while an image is rendered.
+``python -m benchmarks.ablation [--case WORD ...] [--only WORD ...] [--dry]`` writes ablation.json
+and ablation.md beside this file. Images with and without a feature are rendered in turn, so that
+other work of the machine slows both; times are processor times. The errors are those against the
+references of `benchmarks.ablation_cases`.
 """
 
 from __future__ import annotations
@@ -12,200 +11,287 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
-from unittest import mock
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from rich.console import Console
-from scipy.ndimage import uniform_filter
 
+from benchmarks.ablation_cases import (
+    BOX,
+    CASES,
+    DEPTH,
+    PHOTONS,
+    RADIUS,
+    REFERENCE_PHOTONS,
+    RESOLUTION,
+    Case,
+    Truth,
+    reference,
+    smooth,
+)
+from benchmarks.ablation_features import Ablation, ablations
 from benchmarks.results import machine, say_if_busy
-from optisense import OpticalModel, sensors
-from optisense.design import set_value
-from optisense.geometry import Contact, Sphere
+from optisense import OpticalModel
 from optisense.mechanics import CONFORMING
 
 FOLDER = Path(__file__).parent
-CACHE = FOLDER / ".cache"
-SENSORS = ("gelsight-mini-ideal", "gelsight-svelte", "gelbelt", "gelsight360")
-COATINGS = {"diffuse": 0.0, "metallic": 0.6}
-"""Specularity (0 to 1) of each coating: no metallic share, and more than half."""
-RESOLUTION = (160, 120)
-"""Width and height (pixels) of the images, half those of `benchmarks.case`, since eight references
-are rendered."""
-PHOTONS = 600_000
-"""Number of photons of an image, near the 560,000 of `benchmarks.case`."""
 SEEDS = (1, 2)
-"""Seeds of the images; the first run also compiles kernels, so that the last run is timed."""
-RUNS = 4
-"""Number of images with a kept radiance cache, of which the fastest is reported."""
-REFERENCE_PHOTONS = 6_000_000
-"""Largest number of photons of each seed of the reference."""
-REFERENCE_SEEDS = (101, 102)
-"""Seeds of the two reference images, which no judged image has; the difference of the two gives the
-noise of the reference."""
-BOX = 3
-"""Side (pixels) of the square over which pictures are averaged before they are compared, which
-removes most of the reference's noise."""
-RADIUS, DEPTH = 1.5, 0.8
-"""Radius and depth (mm) of the ball, those of `benchmarks.case`."""
-ERRORS = ("error_in_contact", "error_elsewhere")
-TIMES = ("cpu_s_new_light", "cpu_s_kept_light")
+"""Seeds of the images of a feature of shading."""
+LIGHT_SEEDS = (1, 2, 3)
+"""Seeds of the images of a feature of the light, whose errors differ more between seeds."""
+PAIRS = 2
+"""Number of pairs of images from a kept radiance cache, for each of `SEEDS`; for each of
+`LIGHT_SEEDS`, there is one."""
+WARM_UP_PHOTONS = 20_000
+"""Number of photons of the first image of a model, which compiles the kernels."""
+LEAST_ERROR = 0.005
+"""Smallest error that changes are relative to: smaller ones are less than the noise of a camera."""
+SMALL = 0.1
+"""Relative change below which a feature is not worth its code."""
+CERTAINTY = 2.0
+"""Number of standard errors that are added to a change before it is compared with `SMALL`."""
 
+ERRORS = ("error_in_contact", "error_elsewhere")
+BIASES = ("bias_in_contact", "bias_elsewhere")
+TIMES = ("new_light", "kept_light")
 FloatArray = NDArray[np.floating]
 
 
-class Change(NamedTuple):
-    """A value of a module or class that is replaced."""
-
-    place: Any
-    name: str
-    value: Any
-
-
-@dataclass(frozen=True)
-class Ablation:
-    """An acceleration or refinement that is switched off.
+@dataclass
+class Measured:
+    """Images of a case with every feature (first of each pair) and without one (second).
 
     Attributes:
-        name: its name in the table.
-        changes: function that returns the values to replace; it is called after Mitsuba is loaded.
-        light: whether the content of the radiance cache depends on it, and not only the shading.
+        squares: squared errors in the contact and elsewhere of the images of each seed.
+        biases: errors of their means.
+        differences: squared differences of each pair, relative to the squared mean.
+        seconds: processor seconds, of images with new light and with kept light.
     """
 
-    name: str
-    changes: Callable[[], Sequence[Change]]
-    light: bool
+    squares: list[list[FloatArray]] = field(default_factory=list)
+    biases: list[list[FloatArray]] = field(default_factory=list)
+    differences: list[FloatArray] = field(default_factory=list)
+    seconds: dict[str, list[list[float]]] = field(default_factory=lambda: {k: [] for k in TIMES})
 
-    @contextmanager
-    def applied(self) -> Iterator[None]:
-        """Context in which the feature is switched off."""
-        with ExitStack() as stack:
-            for change in self.changes():
-                stack.enter_context(mock.patch.object(*change))
-            yield
+    def add(self, truth: Truth, images: list[FloatArray]) -> None:
+        """Add the radiance (h, w, 3) of a pair."""
+        squares, biases = zip(*(truth.errors(image) for image in images), strict=True)
+        self.squares.append(list(squares))
+        self.biases.append(list(biases))
+        one, other = (smooth(image) for image in images)
+        self.differences.append(
+            np.array([((one - other)[m] ** 2).mean() / one[m].mean() ** 2 for m in truth.masks])
+        )
+
+    def row(self) -> dict[str, Any]:
+        """Return the results of the second image of the pairs, and their changes."""
+        squares, biases = np.array(self.squares), np.array(self.biases)
+        errors = np.sqrt(squares.mean(axis=0))
+        row: dict[str, Any] = dict(zip(ERRORS, errors[1].tolist(), strict=True))
+        row |= dict(zip(BIASES, biases.mean(axis=0)[1].tolist(), strict=True))
+        row["difference"] = np.sqrt(np.mean(self.differences, axis=0)).tolist()
+        row["changes"] = {key: _of_errors(squares[..., k]) for k, key in enumerate(ERRORS)}
+        for key, pairs in self.seconds.items():
+            if pairs:
+                times = np.array(pairs)
+                row[f"cpu_s_{key}"] = float(np.median(times[:, 1]))
+                ratios = times[:, 1] / times[:, 0] - 1
+                # The standard error of a median is 1.25 times that of a mean.
+                scatter = 1.25 * ratios.std(ddof=1) / len(ratios) ** 0.5
+                row["changes"][key] = [float(np.median(ratios)), float(scatter)]
+        return rounded(row)
 
 
-def ablations() -> list[Ablation]:
-    """Return all ablations; those of shading alone come first, since they share one cache."""
-    import drjit as dr
-    import mitsuba as mi
+def _of_errors(squares: FloatArray) -> list[float]:
+    """Return the relative change of an error, and its standard error by the jackknife over seeds.
 
-    from optisense.optics.backend import sequences
-    from optisense.optics.imaging import _grain, cached, sampling
-    from optisense.optics.radiance_cache import (
-        angular_variance,
-        beam_sums,
-        beams,
-        bin_sums,
-        glossy_interreflection,
-        interreflection,
-        shading,
-        shading_points,
-        smoothing,
-        store,
-        tally,
+    Args:
+        squares: squared errors (seeds, 2) with and without a feature.
+    """
+
+    def change(some: FloatArray) -> float:
+        with_it, without = np.sqrt(some.mean(axis=0))
+        return float((without - with_it) / max(with_it, LEAST_ERROR))
+
+    count = len(squares)
+    parts = np.array([change(np.delete(squares, k, axis=0)) for k in range(count)])
+    return [change(squares), float(np.sqrt((count - 1) * parts.var()))]
+
+
+def rounded(value: Any) -> Any:
+    """Return a tree of numbers, rounded to five digits after the point."""
+    if isinstance(value, dict):
+        return {key: rounded(each) for key, each in value.items()}
+    if isinstance(value, list):
+        return [rounded(each) for each in value]
+    return round(value, 5) if isinstance(value, float) else value
+
+
+def compared(case: Case, on: OpticalModel, ablation: Ablation | None, truth: Truth) -> Measured:
+    """Return images with and without a feature; the feature None switches off nothing.
+
+    Args:
+        case: the case.
+        on: its model with every feature, whose kernels are compiled. Features of shading use its
+            radiance caches.
+        ablation: the feature.
+        truth: the reference.
+    """
+    off_is = nullcontext if ablation is None else ablation.applied
+    new_light = ablation is None or ablation.light or case.draft
+    ball = case.ball(on)
+    off = on
+    if new_light:
+        with off_is():
+            off = case.model()
+
+    def image(which: int, seed: int, photons: int = case.photons) -> tuple[FloatArray, float]:
+        with off_is() if which else nullcontext():
+            began = time.process_time()
+            seen = (on, off)[which].render(
+                [ball], case.resolution, photons, seed=seed, skin=CONFORMING
+            )
+            return seen.radiance, time.process_time() - began
+
+    def forget() -> None:
+        nonlocal on, off
+        if case.draft:  # it would show the same image again
+            on = case.model()
+            with off_is():
+                off = case.model()
+        else:
+            on.forget_light(guide=True)
+            off.forget_light(guide=True)
+
+    found = Measured()
+    image(1, 0, WARM_UP_PHOTONS) if new_light else image(1, SEEDS[0])
+    for seed in LIGHT_SEEDS if new_light else SEEDS:
+        pictures: list[FloatArray] = []
+        if new_light:
+            forget()
+            pair = [image(which, seed) for which in (0, 1)]
+            found.seconds["new_light"].append([seconds for _, seconds in pair])
+            pictures = [picture for picture, _ in pair]
+        for _ in range(0 if case.draft else 1 if new_light else PAIRS):
+            pair = [image(which, seed) for which in (0, 1)]
+            found.seconds["kept_light"].append([seconds for _, seconds in pair])
+            pictures = pictures or [picture for picture, _ in pair]
+        found.add(truth, pictures)
+    if off is not on:
+        off.forget_light(guide=True)
+    return found
+
+
+def measure(case: Case, only: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the results of each ablation of a case; the first is "nothing", with every feature.
+
+    Args:
+        case: the case.
+        only: words; an ablation is measured if its name contains one of them.
+    """
+    truth = reference(case)
+    model = case.model()
+    ball = case.ball(model)
+    for seed in SEEDS:
+        model.render([ball], case.resolution, case.photons, seed=seed, skin=CONFORMING)
+    for ablation in ablations():
+        if any(word in ablation.name for word in only):
+            yield ablation.name, compared(case, model, ablation, truth).row()
+    yield "nothing", compared(case, model, None, truth).row()
+    model.forget_light(guide=True)
+
+
+def worth(found: dict[str, Any], what: str) -> bool:
+    """Return whether an error or a time grows by a tenth in some case without a feature, within the
+    uncertainty of the measurement.
+    """
+    return any(
+        change + CERTAINTY * (scatter or 0.0) > SMALL
+        for case in found.values()
+        if what in case["rows"]
+        for change, scatter in case["rows"][what]["changes"].values()
     )
-    from optisense.optics.scene import assembly
-    from optisense.optics.transport import emission_guide, interact, photons
 
-    def random_4d(index: Any, stream: Any, seed: Any) -> tuple[Any, ...]:
-        first, second = mi.sample_tea_32(index, stream ^ (seed * 0x9E3779B9))
-        both = mi.sample_tea_32(first ^ 0x85EBCA6B, second)
-        return tuple(sequences.unit_float(bits) for bits in (first, second, *both))
 
-    def random_richtmyer(series: Any, number: Any, dimension: int) -> Any:
-        return sequences.unit_float(mi.sample_tea_32(series ^ mi.UInt32(dimension), number)[0])
-
-    def own_cell(
-        cells: Any, base: Any, active: Any, series: Any, number: Any
-    ) -> tuple[Any, Any, Any]:
-        home, found = shading_points.cell_at(cells, base, active)
-        return home, mi.Vector3f(0), found
-
-    def no_overlap(place: Any, direction: Any, bins: Any) -> tuple[Any, Any]:
-        return mi.Float(0), mi.Float(0)
-
-    def no_interreflection(field: Any, *rest: Any) -> list[Any]:
-        return [mi.Color3f(0) for _ in range(field.binned.groups)]
-
-    def always_doubtful(balls: Any, count: Any, point: Any, *rest: Any) -> Any:
-        return dr.zeros(mi.Float, dr.width(point)) + 2
-
-    def isotropic(axis: Any, towards: Any, cosine: Any, height: Any) -> Any:
-        frame = mi.Frame3f(towards)
-        half = dr.minimum(1 - cosine, angular_variance.MAX_SPREAD)
-        return angular_variance.AngularVariance(towards, frame.s, frame.t, half, half)
-
-    def here(light: Any, fixed: Any, at: Any, k: Any) -> Any:
-        return at.cell
-
-    def sharp(coating: Any, cosine: Any) -> Any:
-        return coating
-
-    def one_length(cells: Any, halves: Any, radii: FloatArray) -> FloatArray:
-        return np.full(cells.cells, np.inf)
-
-    def every_facet(mesh: Any) -> Any:
-        return mesh
-
-    def shading_only(name: str, *changes: Change) -> Ablation:
-        return Ablation(name, lambda: changes, False)
-
-    def of_light(name: str, *changes: Change) -> Ablation:
-        return Ablation(name, lambda: changes, True)
-
-    coherent = property(lambda path: False)
-    return [
-        shading_only("culled beams", Change(cached, "cull_beams", lambda b, *rest: b)),
-        shading_only("shading of every second pixel",
-                     Change(cached, "SPARSE_SHADING_BEAMS", np.inf),
-                     Change(cached, "SPARSE_METALLIC_BEAMS", np.inf)),
-        shading_only("more samples in noisy areas", Change(_grain, "GRAIN_THRESHOLD", np.inf)),
-        shading_only("more samples in small contacts", Change(sampling, "MIN_CONTACT_SAMPLES", 0)),
-        shading_only("several cells per sample", Change(shading, "CELLS_PER_SAMPLE", 1)),
-        shading_only("interpolation of cells", Change(shading, "interpolating_cell", own_cell)),
-        shading_only("low-discrepancy samples of a pixel",
-                     Change(bin_sums, "richtmyer", random_richtmyer),
-                     Change(shading_points, "richtmyer", random_richtmyer)),
-        shading_only("interreflection in contacts",
-                     Change(shading, "interreflected", no_interreflection),
-                     Change(shading, "glossy_interreflection", no_interreflection)),
-        shading_only("interreflection beyond one bounce",
-                     Change(interreflection, "MAX_BOUNCES", 1),
-                     Change(glossy_interreflection, "MAX_BOUNCES", 1)),
-        shading_only("occluder horizon", Change(shading, "occluder_horizon", always_doubtful)),
-        shading_only("light partly below the horizon",
-                     Change(bin_sums, "cosine_half_width", lambda *rest: mi.Float(0))),
-        shading_only("anisotropic angular variance",
-                     Change(bin_sums, "angular_variance", isotropic),
-                     Change(beam_sums, "angular_variance", isotropic)),
-        shading_only("lookup displaced along the beam", Change(bin_sums, "_place", here)),
-        shading_only("lobes broadened by angular variance",
-                     Change(bin_sums, "broadened_coating", sharp)),
-        shading_only("coherent camera rays", Change(interact.Path, "is_coherent", coherent)),
-        of_light("emission guiding", Change(emission_guide, "MIN_DENSITY", 1.0)),
-        of_light("low-discrepancy photons", Change(photons, "sequence_4d", random_4d)),
-        of_light("compaction of surviving photons", Change(photons, "STAGES", ())),
-        of_light("volume flux", Change(store, "GRAZING_SHARE_LIMIT", 2.0)),
-        of_light("kernel widths from pilot photons", Change(smoothing, "varies_over", one_length)),
-        of_light("narrow kernels outside the view", Change(store, "SMOOTHED_MARGIN", 1e6)),
-        of_light("sharpening", Change(smoothing, "MAX_SHARPENING", 0.0)),
-        of_light("overlapping bins", Change(tally, "dither", no_overlap)),
-        of_light("weak beams merged", Change(beams, "STRONG_SHARE", 0.0)),
-        of_light("flat faces merged", Change(assembly, "_merged", every_facet)),
+def table(found: dict[str, Any]) -> str:
+    """Return the results as Markdown."""
+    lines = [
+        "# Ablation of the optics", "",
+        "The command `python -m benchmarks.ablation` writes this page; do not edit it.", "",
+        "Each acceleration and refinement of the optics is switched off in turn. Images have "
+        f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels and {PHOTONS:,} photons, and a ball of radius "
+        f"{RADIUS} mm is pressed in by {DEPTH} mm, unless the case says otherwise. The error is "
+        "the RMS difference from progressive photon mapping with "
+        f"{2 * REFERENCE_PHOTONS / 1e6:g} million photons, over squares of {BOX} pixels, relative "
+        "to the mean; the noise of the reference is subtracted. The bias is the error of the mean. "
+        "Times are processor times of all threads: of an image with its pilot pass and photons "
+        "(*new light*), and of a further image with the same radiance cache (*light kept*). Images "
+        "with and without a feature are rendered in turn; the change of a time is the median over "
+        f"{len(LIGHT_SEEDS)} or {PAIRS * len(SEEDS)} pairs (features of light or of shading). The "
+        "± is the standard error: of that median, and of an error's change by the jackknife over "
+        f"{len(SEEDS)} or {len(LIGHT_SEEDS)} seeds. Changes without ± come from an earlier "
+        "measurement, against 12 million photons and with images minutes apart; their times are "
+        "uncertain by a tenth or more. Changes of errors below "
+        f"{100 * LEAST_ERROR:g} % are relative to {100 * LEAST_ERROR:g} %.", "",
+        "## Largest effects", "",
+        "Each cell is the largest increase of the error or the time without the feature among the "
+        "cases, in brackets the case. The last column tells whether some increase, with twice its "
+        f"standard error, exceeds {100 * SMALL:g} %. The row *nothing* compares two models with "
+        "all features.", "",
+        "| switched off | error in the contact | error elsewhere | seconds, new light "
+        f"| seconds, light kept | above {100 * SMALL:g} % |", "|---|---|---|---|---|---|",
     ]  # fmt: skip
+    names = list(dict.fromkeys(what for case in found.values() for what in case["rows"]))
+    for what in names:
+        cells = []
+        for key in (*ERRORS, *TIMES):
+            known = [
+                (*case["rows"][what]["changes"][key], name)
+                for name, case in found.items()
+                if key in case["rows"].get(what, {}).get("changes", {})
+            ]
+            change, scatter, name = max(known, default=(None, None, ""))
+            cells.append("" if change is None else f"{_percent(change, scatter)} ({name})")
+        cells.append("yes" if worth(found, what) else "no")
+        lines.append(f"| {what} | " + " | ".join(cells) + " |")
+    for name, case in found.items():
+        lines += ["", f"## {name}", "",
+                  "| switched off | error in the contact | change | error elsewhere | change "
+                  "| bias in the contact | bias elsewhere | seconds, new light | change "
+                  "| seconds, light kept | change |",
+                  "|---|---|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
+        for what, row in case["rows"].items():
+            changes = {key: _percent(*value) for key, value in row["changes"].items()}
+            cells = []
+            for key in ERRORS:
+                cells += [f"{100 * row[key]:.2f} %", changes[key]]
+            cells += [f"{100 * row[key]:+.2f} %" for key in BIASES]
+            for key in TIMES:
+                seconds = row.get(f"cpu_s_{key}")
+                cells += ["" if seconds is None else f"{seconds:.2f}", changes.get(key, "")]
+            lines.append(f"| {what} | " + " | ".join(cells) + " |")
+        about = case["machine"]
+        busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
+        lines += ["", f"{about['date']}, {about['processor']}, {about['cores']} cores{busy}"]
+    return "\n".join(lines) + "\n"
+
+
+def _percent(change: float, scatter: float | None) -> str:
+    known = "" if scatter is None else f" ± {100 * scatter:.0f}"
+    return f"{100 * change:+.0f}{known} %"
 
 
 def main() -> None:
     """Run the benchmark, print its results and write them."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sensor", choices=SENSORS, help="measure one sensor only")
+    parser.add_argument(
+        "--case", nargs="+", default=[""], help="measure only cases with such a word in their name"
+    )
     parser.add_argument(
         "--only", nargs="+", default=[""], help="switch off only what has such a word in its name"
     )
@@ -215,191 +301,19 @@ def main() -> None:
     about = machine()
     say_if_busy(console, about)
     path = FOLDER / "ablation.json"
-    for name in (options.sensor,) if options.sensor else SENSORS:
-        for coating in COATINGS:
-            case = f"{name}, {coating}"
-            for what, row in measure(name, coating, options.only):
-                # Read anew: sensors may be measured by processes of their own.
-                found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-                known = found.setdefault(case, {"machine": about, "rows": {}})
-                known["machine"] = about
-                known["rows"][what] = row
-                console.print(f"{case}: {what} " + json.dumps(row), highlight=False)
-                if not options.dry:
-                    path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
-                    (FOLDER / "ablation.md").write_text(table(found), encoding="utf-8")
-
-
-def measure(name: str, coating: str, only: Sequence[str]) -> Iterator[tuple[str, dict[str, float]]]:
-    """Yield the results of each ablation on a sensor; the first is "nothing", with every feature.
-
-    Args:
-        name: built-in sensor.
-        coating: key of `COATINGS`.
-        only: words; an ablation is measured if its name contains one of them.
-    """
-    model = OpticalModel(set_value(sensors.build(name), "coating.specularity", COATINGS[coating]))
-    place = model.nine_contacts()[4].point
-    assert place is not None
-    ball = Contact(Sphere(radius=RADIUS), point=place, depth=DEPTH)
-    truth, noise = reference(model, ball, f"{name}-{coating}")
-    yield "nothing", judged(model, ball, truth, noise, True)
-    for ablation in ablations():
-        if any(word in ablation.name for word in only):
-            with ablation.applied():
-                if ablation.name == "flat faces merged":
-                    yield (
-                        ablation.name,
-                        judged(OpticalModel(model.design), ball, truth, noise, True),
-                    )
-                else:
-                    yield ablation.name, judged(model, ball, truth, noise, ablation.light)
-    model.forget_light()
-
-
-def judged(
-    model: OpticalModel, ball: Contact, truth: FloatArray, noise: FloatArray, light: bool
-) -> dict[str, float]:
-    """Return errors, bias and processor seconds of images.
-
-    Args:
-        model: sensor.
-        ball: contact.
-        truth: smoothed radiance (h, w, 3) of the reference.
-        noise: variance of the reference's noise in each of the two masks of `masks`.
-        light: whether photons are traced again, with the pilot pass, and timed.
-    """
-    errors, ratios, cpu = [], [], {}
-    if light:
-        model.forget_light(guide=True)
-    for seed in SEEDS:
-        if light and seed == SEEDS[-1]:
-            model.forget_light(guide=True)
-        began = time.process_time()
-        image = model.render([ball], RESOLUTION, PHOTONS, seed=seed, skin=CONFORMING)
-        cpu["cpu_s_new_light"] = time.process_time() - began
-        got = smooth(image.radiance)
-        where = masks(image.contact_mask, truth)
-        errors.append([((got - truth)[mask] ** 2).mean() for mask in where])
-        ratios.append([got[mask].mean() / truth[mask].mean() for mask in where])
-    kept = []
-    for _ in range(RUNS):
-        began = time.process_time()
-        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[-1], skin=CONFORMING)
-        kept.append(time.process_time() - began)
-    cpu["cpu_s_kept_light"] = min(kept)
-    if not light:
-        del cpu["cpu_s_new_light"]
-    if light:  # ablations of shading alone read the radiance caches of both seeds
-        model.render([ball], RESOLUTION, PHOTONS, seed=SEEDS[0], skin=CONFORMING)
-    means = [truth[mask].mean() for mask in where]
-    square = np.maximum(np.mean(errors, axis=0) - noise, 0.0)
-    relative = np.sqrt(square) / means
-    bias = np.mean(ratios, axis=0) - 1
-    return {
-        **{key: round(float(v), 5) for key, v in zip(ERRORS, relative, strict=True)},
-        "bias_in_contact": round(float(bias[0]), 5),
-        "bias_elsewhere": round(float(bias[1]), 5),
-        **{key: round(value, 3) for key, value in cpu.items()},
-    }
-
-
-def masks(contact: NDArray[np.bool_], truth: FloatArray) -> list[NDArray[np.bool_]]:
-    """Return masks (h, w) of the pixels in the contact, and of all others that are not dark.
-
-    Args:
-        contact: contact mask (h, w).
-        truth: radiance (h, w, 3) of the reference.
-    """
-    return [contact, ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())]
-
-
-def smooth(image: FloatArray) -> FloatArray:
-    """Return an image (h, w, 3), averaged over squares of `BOX` pixels."""
-    return np.asarray(uniform_filter(image.astype(np.float64), (BOX, BOX, 1)))
-
-
-def reference(model: OpticalModel, ball: Contact, name: str) -> tuple[FloatArray, FloatArray]:
-    """Return the smoothed reference (h, w, 3) and the variance (2,) of its noise in each mask.
-
-    Both are kept in a file of `CACHE`.
-    """
-    CACHE.mkdir(exist_ok=True)
-    path = CACHE / f"ablation-{name}-{REFERENCE_PHOTONS}.npz"
-    if not path.is_file():
-        images = [
-            model.render(
-                [ball], RESOLUTION, REFERENCE_PHOTONS, seed=seed, estimator="sppm", skin=CONFORMING
-            )
-            for seed in REFERENCE_SEEDS
-        ]
-        seen = images[0].contact_mask
-        np.savez(path, *(image.radiance for image in images), contact=seen)
-    with np.load(path) as kept:
-        one, other, contact = smooth(kept["arr_0"]), smooth(kept["arr_1"]), kept["contact"]
-    truth = (one + other) / 2
-    noise = [((one - other)[mask] ** 2).mean() / 4 for mask in masks(contact, truth)]
-    return truth, np.array(noise)
-
-
-def changes(rows: dict[str, dict[str, float]], what: str) -> dict[str, float]:
-    """Return the relative increase of each error and time without a feature."""
-    with_it, without = rows["nothing"], rows[what]
-    return {
-        key: without[key] / with_it[key] - 1
-        for key in (*ERRORS, *TIMES)
-        if key in without and with_it[key] > 0
-    }
-
-
-def table(found: dict[str, Any]) -> str:
-    """Return the results as Markdown."""
-    lines = [
-        "# Ablation of the optics", "",
-        "The command `python -m benchmarks.ablation` writes this page; do not edit it.", "",
-        "Each acceleration and refinement of the optics is switched off in turn. Images have "
-        f"{RESOLUTION[0]}x{RESOLUTION[1]} pixels and {PHOTONS:,} photons; a ball of radius "
-        f"{RADIUS} mm is pressed in by {DEPTH} mm, and coatings have a specularity of "
-        f"{COATINGS['diffuse']:g} (diffuse) or {COATINGS['metallic']:g} (metallic). The error is "
-        "the RMS difference from progressive photon mapping with "
-        f"{2 * REFERENCE_PHOTONS / 1e6:g} million photons, over squares of {BOX} pixels, relative "
-        "to the mean; the noise of the reference is subtracted. The bias is the error of the mean. "
-        "Seconds are the processor time of all threads: of an image with its pilot pass and "
-        "photons (*new light*), and of a further image with the same radiance cache (*light "
-        "kept*).", "",
-        "## Largest effects", "",
-        "Each cell is the largest increase of the error or the time without the feature among the "
-        "measured cases, in brackets the case.", "",
-        "| switched off | error in the contact | error elsewhere | seconds, new light "
-        "| seconds, light kept |", "|---|---|---|---|---|",
-    ]  # fmt: skip
-    names = list(dict.fromkeys(what for case in found.values() for what in case["rows"]))
-    for what in names:
-        cells = []
-        for key in (*ERRORS, *TIMES):
-            known = [
-                (changes(case["rows"], what)[key], name)
-                for name, case in found.items()
-                if {what, "nothing"} <= set(case["rows"]) and key in changes(case["rows"], what)
-            ]
-            most = max(known, default=None)
-            cells.append("" if most is None else f"{100 * most[0]:+.0f} % ({most[1]})")
-        if what != "nothing":
-            lines.append(f"| {what} | " + " | ".join(cells) + " |")
-    for name, case in found.items():
-        lines += ["", f"## {name}", "",
-                  "| switched off | error in the contact | error elsewhere | bias in the contact "
-                  "| bias elsewhere | seconds, new light | seconds, light kept |",
-                  "|---|---|---|---|---|---|---|"]  # fmt: skip
-        for what, row in case["rows"].items():
-            cells = [f"{100 * row[key]:.2f} %" for key in ERRORS]
-            cells += [f"{100 * row[key]:+.2f} %" for key in ("bias_in_contact", "bias_elsewhere")]
-            cells += [f"{row[key]:.2f}" if key in row else "" for key in TIMES]
-            lines.append(f"| {what} | " + " | ".join(cells) + " |")
-        about = case["machine"]
-        busy = f"; the machine was busy (load {about['load_at_start']})" if about["busy"] else ""
-        lines += ["", f"{about['date']}, {about['processor']}, {about['cores']} cores{busy}"]
-    return "\n".join(lines) + "\n"
+    for case in CASES:
+        if not any(word in case.name for word in options.case):
+            continue
+        for what, row in measure(case, options.only):
+            # Read anew: cases may be measured by processes of their own.
+            found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+            known = found.setdefault(case.name, {"machine": about, "rows": {}})
+            known["machine"] = about
+            known["rows"][what] = row
+            console.print(f"{case.name}: {what} " + json.dumps(row), highlight=False)
+            if not options.dry:
+                path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+                (FOLDER / "ablation.md").write_text(table(found), encoding="utf-8")
 
 
 if __name__ == "__main__":

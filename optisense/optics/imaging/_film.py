@@ -23,7 +23,8 @@ that must be bright for the pixel to count as real: the visible reflection of a 
 LONE_RATIO = 2.0
 """Ratio of a pixel's light to that of the `LONE_RANK`-th brightest pixel in its square above which
 the excess light is spread over the pixels around it. A factor of two is more than the noise between
-neighbouring pixels of a real reflection."""
+neighbouring pixels of a real reflection. Of the built-in sensors, only GelSight360 shows such
+pixels: without the spreading, its picture of 160x120 pixels differs by 6 % (RMS)."""
 
 SPECK_WIDTH = 1.0 / 8.0
 """Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the

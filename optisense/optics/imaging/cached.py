@@ -37,7 +37,9 @@ from optisense.optics.transport.chief_rays import ChiefRays
 
 SPARSE_SHADING_BEAMS = 1.5e7
 """Number of beams to sum for an image above which only every second pixel is shaded where the image
-is smooth. Summing so many beams takes about 0.2 s on two cores."""
+is smooth. Summing so many beams takes about 0.2 s on two cores. Without the interpolation, an image
+of GelSight360 with a specularity of 0.6 from a finished cache takes 17 % longer, and the pictures
+differ by 2.5 % (RMS, at a noise of 10 %)."""
 SPARSE_METALLIC_BEAMS = 4e6
 """Value of `SPARSE_SHADING_BEAMS` for metallic coatings. They take longer for each beam, as they
 evaluate a metallic lobe, and sum all beams, while diffuse ones sum those near indenters."""
