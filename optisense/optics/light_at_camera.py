@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.lenses.defocus import Defocus
+from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.quality import PICTURE_PHOTONS
 
@@ -97,7 +97,7 @@ def projected_solid_angles(camera: RayCamera) -> NDArray[np.float64]:
     It is the area of the pixel on the plane of direction cosines.
     """
     rows, columns = np.indices((camera.height + 1, camera.width + 1), dtype=np.float32)
-    _, ways = camera.rays(mi.Float(columns.ravel()), mi.Float(rows.ravel()))
+    _, ways = camera.rays(floats(columns), floats(rows))
     right, up, _ = camera.axes()
     direction = np.array(ways, dtype=np.float64).T.reshape(*rows.shape, 3)
     corners = np.stack([direction @ right, direction @ up], axis=-1)

@@ -16,6 +16,10 @@ from numpy.typing import NDArray
 
 Value = TypeVar("Value")
 
+PACKET = 64
+"""Number of entries of which a kernel reads a multiple, at least: four times those of the widest
+vectors of processors, 16 single-precision numbers."""
+
 
 def gathered(value: Value, lanes: mi.UInt32) -> Value:
     """Return the given lanes of an array, or of each array of a dataclass; fields that are None
@@ -63,5 +67,19 @@ def indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
 
 def _copied(values: NDArray[np.uint32]) -> mi.UInt32:
     """Return an expression of device integers that gets memory of its own when it is evaluated."""
-    held = mi.UInt32(values)
+    held = mi.UInt32(padded(values))
     return held + dr.opaque(mi.UInt32, 0) if len(values) else held
+
+
+def padded(values: NDArray[Any]) -> NDArray[Any]:
+    """Return an array (n,) whose memory extends to a multiple of `PACKET` entries.
+
+    Dr.Jit uses the memory of NumPy arrays as it is, and its kernels read whole vectors. At the end
+    of the last mapped page of memory, reading beyond the array would end the process.
+    """
+    rest = len(values) % PACKET
+    if rest == 0:
+        return values
+    held = np.empty(len(values) + PACKET - rest, dtype=values.dtype)
+    held[: len(values)] = values
+    return held[: len(values)]

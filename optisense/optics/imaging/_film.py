@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.backend.arrays import floats, indices, padded
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.transport.camera_paths import VisiblePoints
 
@@ -37,7 +37,7 @@ def repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]
     """
     # The arrays are made on the device, as NumPy arrays differ in alignment, which is part of
     # kernels.
-    chosen = dr.compress(mi.Bool(mask.ravel()))
+    chosen = dr.compress(mi.Bool(padded(mask.ravel())))
     lane = dr.arange(mi.UInt32, dr.width(chosen) * times)
     count = dr.opaque(mi.UInt32, dr.width(chosen))
     return dr.gather(mi.UInt32, chosen, lane % count), lane // count + 1

@@ -9,6 +9,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.backend.arrays import padded
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._contact_light import (
@@ -274,7 +275,7 @@ class _Shading:
         sparse = self._sparse = int(far.sum()) * beams > most
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
         first = far & ~filled
-        pixel = dr.compress(mi.Bool(first.ravel()))
+        pixel = dr.compress(mi.Bool(padded(first.ravel())))
         self.sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
         reflections = self.reflections()
         if sparse:
