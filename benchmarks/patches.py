@@ -110,7 +110,7 @@ CASES = [
         PatchCase("gelsight-mini-ideal-cylindrical", s, depth=0.3, batches=24, images=6)
         for s in (0.0, 0.3, 0.6, 1.0)
     ),
-    *(PatchCase("gelsight-mini-ideal-spherical", s) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal-spherical", s, batches=16) for s in (0.0, 0.3, 0.6, 1.0)),
     *(PatchCase("gelbelt", s) for s in (0.0, 0.3, 0.6, 1.0)),
     *(PatchCase("gelbelt", s, place=0) for s in (0.0, 0.6)),
     *(PatchCase("gelsight-svelte", s) for s in (0.0, 0.3, 0.6, 1.0)),
