@@ -20,7 +20,7 @@ def learn(answer: dict[str, Any]) -> None:
 
 
 def is_known() -> bool:
-    """Whether an engine has described its kinds."""
+    """Return whether an engine has described its kinds."""
     return bool(_told)
 
 

@@ -245,7 +245,7 @@ def _loading(*_: Any) -> None:
 
 
 def is_busy() -> bool:
-    """Whether a long job is running."""
+    """Return whether a long job is running."""
     return _job is not None and not _job.done
 
 

@@ -30,5 +30,5 @@ def load(title: str, file: str) -> bpy.types.Image:
 
 
 def is_there(file: str) -> bool:
-    """Whether the engine's file of a figure still exists."""
+    """Return whether the engine's file of a figure still exists."""
     return bool(file) and Path(file).is_file()

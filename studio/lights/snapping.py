@@ -22,7 +22,7 @@ CAUGHT = {"EDGE", "EDGE_MIDPOINT", "VERTEX"}
 
 
 def is_on(scene: bpy.types.Scene) -> bool:
-    """Whether moves snap to edges."""
+    """Return whether moves snap to edges."""
     settings = scene.tool_settings
     return settings.use_snap and set(settings.snap_elements) >= {"EDGE"}
 

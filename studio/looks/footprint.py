@@ -47,7 +47,7 @@ class OPTISENSE_PG_footprint(bpy.types.PropertyGroup):
 
 
 def is_on(scene: bpy.types.Scene | None) -> bool:
-    """Whether a scene shows the footprint of its camera."""
+    """Return whether a scene shows the footprint of its camera."""
     return scene is not None and scene.optisense.is_open and scene.optisense_looks.footprint
 
 
@@ -97,7 +97,7 @@ def _take(result: dict[str, Any]) -> None:
 
 
 def is_current(scene: bpy.types.Scene) -> bool:
-    """Whether the known footprint belongs to the sensor of a scene, and not to an earlier one."""
+    """Return whether the known footprint is that of the sensor in a scene, not an earlier one."""
     surface = sensing_surface(scene)
     return surface is not None and _shown.get("of") == surface.as_pointer()
 

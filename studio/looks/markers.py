@@ -44,7 +44,7 @@ def of_design(scene: bpy.types.Scene) -> dict[str, Any] | None:
 
 
 def is_on(scene: bpy.types.Scene | None) -> bool:
-    """Whether a scene shows markers."""
+    """Return whether a scene shows markers."""
     return (
         scene is not None
         and scene.optisense.is_open

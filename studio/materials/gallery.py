@@ -56,7 +56,7 @@ def picture(kind: str, name: str) -> str:
 
 
 def is_begun(kind: str) -> bool:
-    """Whether at least one picture of a kind is drawn."""
+    """Return whether at least one picture of a kind is drawn."""
     return any(each == kind for each, _ in _files)
 
 

@@ -71,12 +71,12 @@ _chosen = polls.requires(lambda c: _choice(c).entry, "The library is not loaded 
 
 
 def _is_for_a_coating(context: bpy.types.Context) -> bool:
-    """Whether the sensing surface is selected, or the chosen entry is no coating."""
+    """Return whether the sensing surface is selected, or the chosen entry is no coating."""
     return _choice(context).kind != "coating" or any(_are_coated(context))
 
 
 def _is_for_a_material(context: bpy.types.Context) -> bool:
-    """Whether a part other than the sensing surface is selected, or the chosen entry is no
+    """Return whether a part other than the sensing surface is selected, or the chosen entry is no
     material.
     """
     return _choice(context).kind != "material" or not all(_are_coated(context))

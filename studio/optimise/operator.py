@@ -91,7 +91,9 @@ class OPTISENSE_OT_vary_remove(polls.Checked, bpy.types.Operator):
 
 
 def _is_taken(folder: Path) -> bool:
-    """Whether a folder is not empty; False for an unreadable one, which the engine reports."""
+    """Return whether a folder is not empty; the engine reports an unreadable one, which counts as
+    empty.
+    """
     try:
         return folder.is_dir() and any(folder.iterdir())
     except OSError:

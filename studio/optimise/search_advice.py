@@ -53,7 +53,7 @@ def advice(design: dict[str, Any], search: bpy.types.PropertyGroup, fields: dict
 
 
 def is_flat(scores: list[float]) -> bool:
-    """Whether all trials of a search have the same score, so that the parameters have no effect."""
+    """Return whether all trials of a search have the same score: the parameters have no effect."""
     return len(scores) >= LEAST and max(scores) - min(scores) <= ALIKE * max(map(abs, scores))
 
 

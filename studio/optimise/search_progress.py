@@ -117,7 +117,7 @@ def clear_ghosts(scene: bpy.types.Scene) -> None:
 
 
 def has_trials() -> bool:
-    """Whether there is a curve to show."""
+    """Return whether there is a curve to show."""
     return bool(_curve)
 
 

@@ -31,7 +31,7 @@ def objects_of(scene: bpy.types.Scene, *kinds: str) -> list[bpy.types.Object]:
 
 
 def is_edited(depsgraph: bpy.types.Depsgraph, *kinds: str) -> bool:
-    """Whether an update of Blender's dependency graph concerns an object of some kinds."""
+    """Return whether an update of Blender's dependency graph concerns an object of some kinds."""
     items = (update.id.original for update in depsgraph.updates)
     return any(
         isinstance(item, bpy.types.Object) and item.optisense.kind in kinds for item in items

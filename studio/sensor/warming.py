@@ -59,5 +59,5 @@ def put_off() -> None:
 
 
 def is_put_off() -> bool:
-    """Whether a preparation was cancelled and has not been repeated yet."""
+    """Return whether a preparation was cancelled and has not been repeated yet."""
     return _is_put_off

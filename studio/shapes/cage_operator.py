@@ -50,7 +50,7 @@ def _has_bounds(context: bpy.types.Context) -> bool:
 
 
 def _are_free(context: bpy.types.Context) -> bool:
-    """Whether no selected part is in a cage."""
+    """Return whether no selected part is in a cage."""
     caged = {n for c in objects_of(context.scene, "CAGE") for n in cage_data(c)["parts"]}
     return not any(each.optisense.key in caged for each in polls.picked(context, "PART"))
 

@@ -93,7 +93,7 @@ class OPTISENSE_PG_view(bpy.types.PropertyGroup):
 
 
 def is_plain() -> bool:
-    """Whether the picture is shown unchanged."""
+    """Return whether the picture is shown unchanged."""
     values = bpy.context.window_manager.optisense_view
     compared = values.compare != "NONE" and _pinned is not None
     return values.channel == "COLOUR" and not values.false_colour and not compared
@@ -220,7 +220,7 @@ def _draw_header(header: bpy.types.Header, context: bpy.types.Context) -> None:
 
 
 def _is_ours(context: bpy.types.Context) -> bool:
-    """Whether an Image Editor shows the picture, or is empty."""
+    """Return whether an Image Editor shows the picture, or is empty."""
     image = context.space_data.image
     return image is None or image.name in (IMAGE, picture.IMAGE)
 
