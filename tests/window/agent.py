@@ -239,7 +239,9 @@ def _scan(
 
 
 def _say(line: str) -> None:
+    _listener.connection.setblocking(True)  # a long answer does not fit into the socket at once
     _listener.connection.sendall(line.encode() + b"\n")
+    _listener.connection.setblocking(False)
 
 
 def _answer(text: str) -> str:
