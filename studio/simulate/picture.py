@@ -12,6 +12,13 @@ from numpy.typing import NDArray
 
 IMAGE = "OptiSense picture"
 
+PAUSE = 0.5
+"""Time (s) between a change of an image and its packing, which takes 8 ms, so that drafts do not
+wait for it."""
+
+_unpacked: set[str] = set()
+"""Names of images that changed since they were packed."""
+
 _previews: bpy.utils.previews.ImagePreviewCollection | None = None
 
 
@@ -54,7 +61,20 @@ def fill(name: str, pixels: NDArray[np.float32]) -> bpy.types.Image:
     flat = np.ascontiguousarray(pixels, dtype=np.float32).ravel()
     image.pixels.foreach_set(flat)
     image.update()
+    _unpacked.add(name)
+    if not bpy.app.background and not bpy.app.timers.is_registered(pack):
+        bpy.app.timers.register(pack, first_interval=PAUSE)
     return image
+
+
+def pack() -> None:
+    """Pack the images that changed into the .blend file. Otherwise they count as modified, and
+    Blender 5.2 asks whether to save them whenever the file is saved.
+    """
+    while _unpacked:
+        image = bpy.data.images.get(_unpacked.pop())
+        if image is not None and image.is_dirty:
+            image.pack()
 
 
 def enlarged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.float32]:
@@ -109,6 +129,9 @@ def register() -> None:
 
 def unregister() -> None:
     global _previews
+    _unpacked.clear()
+    if bpy.app.timers.is_registered(pack):
+        bpy.app.timers.unregister(pack)
     if _previews is not None:
         bpy.utils.previews.remove(_previews)
     _previews = None

@@ -106,3 +106,13 @@ def test_the_header_has_what_the_picture_needs(mini: Any) -> None:
         viewing.draw_header(layout, bpy.context)
         assert layout.properties[-2:] == ["compare", slider]
     bpy.ops.optisense.unpin_picture()
+
+
+def test_a_packed_picture_is_not_modified_and_the_next_replaces_it(mini: Any) -> None:
+    for size in ((6, 8), (6, 8), (12, 16)):
+        pixels = made(*size)
+        image = picture.show(pixels)
+        assert image.is_dirty
+        picture.pack()
+        assert not image.is_dirty, "else Blender 5.2 asks about it whenever the file is saved"
+        np.testing.assert_allclose(shown(picture.IMAGE), pixels, atol=1 / 255)
