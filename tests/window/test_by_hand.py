@@ -17,7 +17,7 @@ DRAFT = "manager.optisense_picture.is_draft"
 MOVED = 1.5
 """Distance (mm) by which a light is moved."""
 
-LIGHTS, SIMULATE, REPORT = 3, 4, 7
+SENSOR, LIGHTS, SIMULATE, EVALUATE, OPTIMISE, REPORT = 0, 3, 4, 5, 6, 7
 """Places of panels in the sidebar; the first is 0."""
 
 VARY = 'wm.call_menu(name="OPTISENSE_MT_vary")'
@@ -67,13 +67,14 @@ def test_the_tab_is_there(bench: Bench) -> None:
 
 
 def test_a_new_mini(bench: Bench) -> None:
-    bench.new_sensor("gelsight-mini-ideal")
+    bench.new_sensor("gelsight-mini-ideal", panels=False)
     assert bench.see("scene().optisense.title") == "gelsight-mini-ideal"
     assert len(bench.see("[light.name for light in kinds('LIGHT')]")) == 15
     bench.drawn()
     right = bench.see(f"max({CORNERS_ACROSS})")
     assert right < bench.sidebar()[0], "the sensor is not hidden by the sidebar"
     bench.until(f"manager.optisense_picture.shown and {DRAFT}")  # nobody asked for it
+    bench.only(SIMULATE)
     bench.press("optisense.add_contact", across=0.75)
     bench.until("len(kinds('CONTACT')) == 1")
     bench.photograph("1-new-mini")
@@ -97,6 +98,7 @@ def test_a_light_is_moved(bench: Bench) -> None:
 
 
 def test_a_material_is_chosen_from_pictures(bench: Bench) -> None:
+    bench.open_all()  # so that the sidebar can be scrolled, and the pictures have room
     before = bench.see("manager.optisense_material.material")
     bench.press("optisense.material_pictures", across=0.9)
     bench.until("part('materials.gallery').is_begun('material')")
@@ -113,6 +115,7 @@ def test_a_material_is_chosen_from_pictures(bench: Bench) -> None:
 
 
 def test_a_picture_appears(bench: Bench) -> None:
+    bench.only(SIMULATE)
     bench.press("optisense.simulate")
     bench.until(f"state().busy == 'Simulating' or not {DRAFT}")
     bench.rest()
@@ -133,6 +136,7 @@ def test_a_picture_appears(bench: Bench) -> None:
 
 
 def test_scores_appear(bench: Bench) -> None:
+    bench.only(EVALUATE)
     for name in ("aoap", "2to3pw"):
         bench.tick(name)
     bench.until("manager.optisense_evaluation.chosen == {'aoap', '2to3pw'}")
@@ -160,6 +164,7 @@ def test_scores_appear(bench: Bench) -> None:
 
 
 def test_it_is_saved(bench: Bench) -> None:
+    bench.only(SENSOR)
     bench.press("optisense.save_as", across=0.85)
     bench.choose_file()
     bench.until("scene().optisense.is_saved")
@@ -169,12 +174,14 @@ def test_it_is_saved(bench: Bench) -> None:
 
 
 def test_a_small_grid_finds_the_best_of_three(bench: Bench) -> None:
+    bench.only(EVALUATE)
     bench.press("optisense.hide_rays", across=0.75)
     bench.until("not kinds('SHOWN')")
     camera = bench.see("kinds('CAMERA')[0].name")
     bench.desktop.click(*bench.see(f"on_screen(bpy.data.objects[{camera!r}].matrix_world"
                                    ".translation)"))  # fmt: skip
     bench.until(f"bpy.context.view_layer.objects.active.name == {camera!r}")
+    bench.only(OPTIMISE)
     labels = bench.see("[each.label for each in part('core.search_parameters').for_camera()]")
     bench.choose(bench.bring(VARY, 0.3), labels.index("Field of view"))
     bench.until("len(scene().optisense_search.vary) == 1")
@@ -200,6 +207,7 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     bench.until("not state().busy and abs(kinds('CAMERA')[0].optisense.fov - "
                 f"{before}) > 1e-3")  # fmt: skip
     assert bench.see("kinds('CAMERA')[0].optisense.fov") == pytest.approx(best, abs=1e-4)
+    bench.only(SENSOR)
     bench.press("optisense.save")
     bench.until("'Saved in' in state().note")
     folder = bench.home / "gelsight-mini-ideal"
@@ -214,6 +222,7 @@ def test_the_best_is_applied_saved_and_opened_again(bench: Bench) -> None:
     heights = sorted(bench.see("[each.location.z for each in kinds('LIGHT')]"))
     assert heights == pytest.approx([heights[-1] - MOVED, *[heights[-1]] * 14], abs=1e-3)
     bench.until(f"{DRAFT} and not manager.optisense_picture.is_before")
+    bench.only(SIMULATE)
     bench.press("optisense.simulate")
     bench.until("not manager.optisense_picture.is_draft")
     bench.rest()
@@ -256,7 +265,7 @@ def test_a_click_on_a_group_selects_its_lights(bench: Bench) -> None:
 
 
 def test_the_workspace_shows_the_picture_whole(bench: Bench) -> None:
-    bench.only(0)
+    bench.only(SENSOR)
     bench.press("optisense.workspace")
     bench.until("window().workspace.name == 'OptiSense'")
     bench.until("sorted(a.type for a in window().screen.areas) == ['IMAGE_EDITOR', 'VIEW_3D']")
