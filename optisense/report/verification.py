@@ -88,7 +88,7 @@ def change_figure(found: Verification) -> Figure:
     axes.set_yticks(range(len(names) + 1), [*(OBJECTS[name].title for name in names), "all"])
     axes.invert_yaxis()
     axes.set_xlabel(
-        f"change of the normals' error, degrees: left of 0 {found.names[1]} reads better"
+        f"change of the error of normals (degrees); where negative, {found.names[1]} reads better"
     )
     legend_above(axes)
     return figure
