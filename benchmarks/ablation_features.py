@@ -195,6 +195,9 @@ def _of_light() -> list[Ablation]:
     def no_overlap(place: Any, bins: Any) -> tuple[Any, Any]:
         return mi.Float(0), mi.Float(0)
 
+    def one_length(cells: Any, halves: Any, radii: Any) -> Any:
+        return np.full(cells.cells, np.inf)
+
     false = property(lambda store: False)
     return [
         _light("emission guiding", Change(emission_guide, "MIN_DENSITY", 1.0)),
@@ -202,6 +205,7 @@ def _of_light() -> list[Ablation]:
         _light("volume flux", Change(store, "GRAZING_SHARE_LIMIT", 2.0)),
         _light("raised plane", Change(store.CacheStore, "_raises", false)),
         _light("bins of curved surfaces", Change(store.CacheStore, "_curved", false)),
+        _light("kernel widths from pilot photons", Change(smoothing, "varies_over", one_length)),
         _light("kernels within one orientation", Change(smoothing, "MIN_NORMAL_COSINE", -2.0)),
         _light("narrow kernels outside the view", Change(store, "SMOOTHED_MARGIN", 1e6)),
         _light("sharpening", Change(smoothing, "MAX_SHARPENING", 0.0)),

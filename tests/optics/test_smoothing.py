@@ -179,6 +179,44 @@ def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels) -> No
     assert np.all(some.sharpening(landed, 1)[~near] == 1.0)
 
 
+def test_light_of_a_lamp_varies_over_its_distance(kernels) -> None:  # type: ignore[no-untyped-def]
+    from optisense.optics.radiance_cache.smoothing import varies_over
+
+    cells = kernels.cells
+    halves = np.array([light(cells.centres) * cells.areas[:, None]] * 2)
+    found = varies_over(cells, halves, np.full(cells.cells, 1.0))
+    nearest = np.hypot(*cells.centres[:, :2].T).argmin()
+    # Somewhat more: the blur falls off to the sides, and the kernel looks at its own result.
+    assert found[nearest] == pytest.approx(HEIGHT, rel=0.2)
+
+
+def test_noise_is_not_taken_for_light_that_varies(kernels) -> None:  # type: ignore[no-untyped-def]
+    from optisense.optics.radiance_cache.smoothing import varies_over
+
+    cells = kernels.cells
+    inside = np.abs(cells.centres[:, :2]).max(axis=1) < 4.0
+    random = np.random.default_rng(5)
+    noisy = random.poisson(3.0, (2, cells.cells, 1)) * cells.areas[:, None]
+    radii = np.full(cells.cells, 1.2)
+    assert (varies_over(cells, noisy, radii)[inside] > 1000.0).mean() > 0.9
+    # The same noise in both halves can't be told from light that varies.
+    assert (varies_over(cells, noisy[[0, 0]], radii)[inside] < 6.0).mean() > 0.9
+
+
+def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels) -> None:  # type: ignore[no-untyped-def]
+    from optisense.optics.radiance_cache.smoothing import Kernels
+
+    cells = kernels.cells
+    lit = np.where(cells.centres[:, :1] > 0.0, 1.0, 0.3) * cells.areas[:, None]
+    distance = np.full(cells.cells, 10.0)
+    found = Kernels(cells, distance, DENSITY, None, np.array([lit, lit]), 200.0).radii(1_000_000)
+    even = Kernels(cells, distance, DENSITY).radii(1_000_000)
+    aside = np.abs(cells.centres[:, 0])
+    clear = np.abs(cells.centres[:, :2]).max(axis=1) < 5.0
+    assert np.median((found / even)[clear & (aside < 0.5)]) < 0.8
+    assert np.median((found / even)[clear & (aside > 4.0)]) == pytest.approx(1.0)
+
+
 def test_products_do_not_depend_on_the_number_of_threads(kernels) -> None:  # type: ignore[no-untyped-def]
     import drjit as dr
 

@@ -1,8 +1,9 @@
 """The kernels that smooth a radiance cache, and their radii.
 
-Light varies over the distance of the nearest lamp. Blur grows as the square of the kernel's radius
-over that length; noise falls as the radius and the number of photons grow. The radius minimises the
-sum of their squares, so both go to zero as photons are added.
+Light varies over a length: the distance of the nearest lamp, or less where the pilot photons show
+that it varies faster. Blur grows as the square of the kernel's radius over that length; noise falls
+as the radius and the number of photons grow. The radius minimises the sum of their squares, so both
+go to zero as photons are added.
 """
 
 from __future__ import annotations
@@ -54,8 +55,7 @@ a cell and reading from up to half a cell away is three box filters of a cell's 
 variance 1/12; the variance of Epanechnikov's kernel is 1/6 of its squared radius."""
 MAX_SHARPENING = 0.25
 """Largest relative change of a cell's light by the sharpening. Kernels of `MAX_RADIUS_RATIO` need
-5 %: under a lamp at distance h, a kernel of radius r lowers the peak by r^2 / (2 h^2). More is due
-to noise or to the edge of a shadow."""
+5 % (see `varies_over`); more is due to noise or to the edge of a shadow."""
 
 
 @dataclass
@@ -83,8 +83,10 @@ class Kernels:
         lamp_distance: FloatArray,
         density: float,
         near: NDArray[np.bool_] | None = None,
+        pilot_power: FloatArray | None = None,
+        pilot_density: float = 0.0,
     ) -> None:
-        """Prepare the kernels; none is computed yet.
+        """Find the length over which light varies in each cell.
 
         Args:
             cells: the cells of the surface.
@@ -92,17 +94,26 @@ class Kernels:
             density: landings per mm^2 for each emitted photon (1/mm^2).
             near: (cells,) whether a cell is in or near the camera's view. Other cells are smoothed
                 with the narrowest kernel, which saves time.
+            pilot_power: (2, cells, groups) power (mW) of the two halves of the pilot photons on
+                each cell, which shows where light varies over less than the distance of the lamps.
+            pilot_density: density of the pilot photons (1/mm^2).
         """
         self.cells = cells
         self.near = np.ones(cells.cells, dtype=bool) if near is None else near
         self.density = density
         self._size = 1 / float(cells.inverse_size[0])
         self._length = np.maximum(np.asarray(lamp_distance), 1e-3)
+        if pilot_power is not None:
+            found = varies_over(cells, pilot_power, self._radii(pilot_density))
+            self._length = np.minimum(self._length, found)
         self._known: dict[tuple[int, bool], Smoothing] = {}
 
     def radii(self, photons: int) -> FloatArray:
         """Return the kernel radius (cells,), mm, for this number of emitted photons."""
-        wider = (REFERENCE_DENSITY / max(self.density * photons, 1e-9)) ** DENSITY_EXPONENT
+        return self._radii(self.density * photons)
+
+    def _radii(self, density: float) -> FloatArray:
+        wider = (REFERENCE_DENSITY / max(density, 1e-9)) ** DENSITY_EXPONENT
         best = REFERENCE_RADIUS * (self._length / REFERENCE_LENGTH) ** LENGTH_EXPONENT * wider
         least = (
             float(np.clip(MIN_RADIUS_CELLS * wider, MIN_RADIUS_CELLS_LIMIT, MIN_RADIUS_CELLS))
@@ -155,6 +166,33 @@ class Kernels:
         sharpened = (again > 0) & self.near[:, None]
         factor = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened)
         return np.clip(factor, 1 - MAX_SHARPENING, 1 + MAX_SHARPENING)
+
+
+def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> FloatArray:
+    """Return the length (cells,), mm, over which light varies.
+
+    It is the distance of a lamp whose light the kernel would blur as much: under a lamp at distance
+    h, a kernel of radius r lowers the peak by r^2 / (2 h^2). The blur is measured by smoothing the
+    smoothed light once more. The product of the results of two halves of the photons is free of
+    their noise, and it counts where it is larger than the noise. Light groups have equal weights,
+    each relative to its own light.
+
+    Args:
+        cells: the cells of the surface.
+        halves: (2, cells, groups) power (mW) of each half of the photons on each cell.
+        radii: (cells,) kernel radii (mm).
+    """
+    kernel = kernel_matrix(cells, radii)
+    areas = cells.areas[:, None]
+    once = [kernel @ half for half in halves]
+    one, other = (kernel @ (light * areas) - light for light in once)
+    scale = np.maximum(np.prod([(light * areas).mean(axis=0) for light in once], axis=0), 1e-30)
+    changes, squares = (
+        np.maximum(kernel @ (each / scale * areas), 0.0).sum(axis=1)
+        for each in (one * other - (one - other) ** 2, once[0] * once[1])
+    )
+    relative = np.sqrt(changes / np.maximum(squares, 1e-30))
+    return np.asarray(radii / np.sqrt(2 * np.maximum(relative, 1e-9)))
 
 
 def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:

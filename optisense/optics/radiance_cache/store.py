@@ -16,7 +16,7 @@ from optisense.optics.backend.arrays import indices
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.backend.stages import Stage, StageCallback
 from optisense.optics.radiance_cache._direction_bins import COARSE_BINS, CURVED_BINS, DirectionBins
-from optisense.optics.radiance_cache._pilot_photons import grazing_share
+from optisense.optics.radiance_cache._pilot_photons import PilotPhotons
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.smoothing import Kernels
@@ -87,8 +87,9 @@ class CacheStore:
     thorough = True
     """Whether curved surfaces get direction bins of their own, and surfaces a raised plane."""
     uses_pilot = True
-    """Whether the pilot photons also estimate how much light grazes: indenters are then lit by the
-    flux layer above the surface."""
+    """Whether the pilot photons also estimate the distribution of the light: where it grazes,
+    indenters are then lit by the flux layer above the surface, and where it varies, kernels are
+    narrower."""
     pilot_photons = PILOT_PHOTONS
     """Number of photons of the pilot pass; see `PILOT_PHOTONS`."""
     groups: frozenset[int] | None = None
@@ -104,7 +105,7 @@ class CacheStore:
         self._lit = lit
         self._seen = seen
         self._guide: EmissionGuide | None = None
-        self._grazing_share = 0.0  # of the pilot photons
+        self._pilot: PilotPhotons | None = None
         self._above: FluxLayer | None = None
         self._cells: SurfaceCells | None = None
         self._kernels: Kernels | None = None
@@ -175,10 +176,19 @@ class CacheStore:
     @cached_property
     def _grazes(self) -> bool:
         """Whether much of the light in the camera's view is grazing."""
-        if not self.uses_pilot:
-            return False
-        self.guide  # noqa: B018  learned from the pilot photons
-        return self._grazing_share > GRAZING_SHARE_LIMIT
+        seen = self._seen_pilot
+        return seen is not None and seen.grazing_share() > GRAZING_SHARE_LIMIT
+
+    @property
+    def _used_pilot(self) -> PilotPhotons | None:
+        """The pilot photons, if they are used for more than the guide."""
+        return self._pilot if self.uses_pilot and self.guide else None
+
+    @cached_property
+    def _seen_pilot(self) -> PilotPhotons | None:
+        """The pilot photons that landed in or near the camera's view."""
+        pilot = self._used_pilot
+        return None if pilot is None else pilot.within(*self._target)
 
     @property
     def guide(self) -> EmissionGuide:
@@ -195,7 +205,7 @@ class CacheStore:
             )
             self._guide = learn_guide(arrived, lights, per_light)
             if self.uses_pilot:
-                self._grazing_share = grazing_share(landed, cells, near)
+                self._pilot = PilotPhotons.of(landed)
         return self._guide
 
     @cached_property
@@ -254,11 +264,17 @@ class CacheStore:
         if self._kernels is None:
             cells, (rough, where) = self.cells, self._target
             area = float(rough.areas[where].sum())
+            landed, pilot_density = None, 0.0
+            if self._used_pilot is not None and self._seen_pilot is not None:
+                landed = self._used_pilot.landed(cells, self._lit.table.groups)
+                pilot_density = len(self._seen_pilot.powers) / area
             self._kernels = Kernels(
                 cells,
                 self._lamp_distance(cells.centres),
                 self.guide.arriving / area,
                 cells_near(cells, self._seen, SMOOTHED_MARGIN),
+                landed,
+                pilot_density,
             )
         return self._kernels
 
