@@ -21,10 +21,14 @@ PHOTONS = 150_000
 BALL = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
 ASIDE = Contact(Sphere(radius=2.0), at=(3.0, -2.0), depth=0.6)
 
-IN_CONTACT = {"gelsight-mini-ideal": 0.03, "gelsight-mini-ideal-cylindrical": 0.06}
+IN_CONTACT = {"gelsight-mini-ideal": 0.03, "gelsight-mini-ideal-cylindrical": 0.08}
 """Field against photon mapping, relative, over the whole contact: of green, and of red and blue
-together, which mirror each other. On the cylinder photon mapping's own noise is 2 %, and the field
-2.5 % brighter in red and blue (of twelve seeds)."""
+together, which mirror each other. Few red and blue photons reach the ball on the cylinder: their
+noise is 2 % in the mean of four pictures by photon mapping, and 2.5 % in that of five fields. The
+field is 4 % brighter (of forty seeds)."""
+
+FIELDS = {"gelsight-mini-ideal": 1, "gelsight-mini-ideal-cylindrical": 5}
+"""Number of fields, with light of their own, whose means in the contact are averaged."""
 
 MAPPED = {"gelsight-mini-ideal": 2, "gelsight-mini-ideal-cylindrical": 4}
 """Pictures by photon mapping that are averaged: an even number, as their halves tell the noise."""
@@ -255,14 +259,19 @@ def mirrored_means(image: TactileImage) -> np.ndarray:
 )
 def test_the_light_field_agrees_with_photon_mapping(name: str, specularity: float) -> None:
     of = model(name, specularity)
-    field = of.render([BALL], resolution=PIXELS, photons=1_000_000)
+    fields = [
+        of.render([BALL], resolution=PIXELS, photons=1_000_000, seed=seed)
+        for seed in range(FIELDS[name])
+    ]
+    field = fields[0]
     mapped = [
         of.render([BALL], resolution=PIXELS, photons=2_000_000, seed=seed, estimator="sppm")
         for seed in range(1, MAPPED[name] + 1)
     ]
     inside = field.contact_mask
     expected = np.mean([mirrored_means(image) for image in mapped], axis=0)
-    assert mirrored_means(field) == pytest.approx(expected, rel=IN_CONTACT[name])
+    found = np.mean([mirrored_means(image) for image in fields], axis=0)
+    assert found == pytest.approx(expected, rel=IN_CONTACT[name])
     for number, group in enumerate(field.layers):
         ours = field.layers[group][..., number].astype(float)
         one, two = (
