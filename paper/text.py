@@ -145,16 +145,12 @@ def _took(spent: Iterable[Sequence[float]]) -> str:
     """Return the sentence on the cost of all evaluations, each of which counts once.
 
     Args:
-        spent: wall seconds, processor seconds, and whether the evaluation ran alone.
+        spent: wall seconds, processor seconds, and whether the evaluation ran alone. Wall seconds
+            depend on what else the machine did, and are not reported.
     """
     rows = list(spent)
-    shared = sum(wall for wall, _, alone in rows if not alone)
-    alone = sum(wall for wall, _, alone in rows if alone)
     processor = sum(seconds for _, seconds, _ in rows)
-    return (
-        f"According to the recorded times, the {len(rows)} evaluations take {processor / 60:.0f} "
-        f"processor minutes. Two parallel processes take {(shared / 2 + alone) / 60:.0f} minutes."
-    )
+    return f"The {len(rows)} evaluations take {processor / 60:.0f} processor minutes."
 
 
 def _counted(number: int, verdict: str) -> str:
