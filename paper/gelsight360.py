@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SENSOR = "gelsight360"
-ANY_JUMP = 1e9
-"""Largest jump of 2to3PW between neighbouring rays, so large that no triangle is left out."""
+ANY_JUMP = 1000.0
+"""Largest value of the setting `jump` of 2to3PW, with which no triangle is left out."""
 
 FINER = 6
 """Number of rows by which each grid of chief rays is finer than the one before."""
