@@ -35,12 +35,18 @@ NEW_SENSOR = 22
 """Pixels from the button *Open* up to the menu *New Sensor*."""
 
 
-def test_a_picture_from_cad_files_takes_few_actions(bench: Bench) -> None:
-    folder = bench.home / "Documents"
-    for place in (bench.home, folder):
+def copy_parts(bench: Bench) -> None:
+    """Copy the five files to the home folder and to its documents, one of which the file browser
+    shows first.
+    """
+    for place in (bench.home, bench.home / "Documents"):
         place.mkdir(exist_ok=True)
         for name in FILES:
             shutil.copy(PARTS / name, place)
+
+
+def test_a_picture_from_cad_files_takes_few_actions(bench: Bench) -> None:
+    copy_parts(bench)
     bench.greet()
     bench.open_tab()
     bench.until("bool(part('engine.catalogue').entries('sensors'))")

@@ -5,7 +5,6 @@ by mouse and keys, and the time that it takes.
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +13,7 @@ import yaml
 
 from .bench import Bench
 from .test_by_hand import LIGHTS, SIMULATE
-from .test_cad_by_hand import FILES, NEW_SENSOR, PARTS, SECONDS_OF_ACTION, mark_all_files
+from .test_cad_by_hand import FILES, NEW_SENSOR, SECONDS_OF_ACTION, copy_parts, mark_all_files
 from .test_rows_by_hand import EVALUATE, LIGHTS_OF, NAME, POSES
 
 MINUTES = 15
@@ -58,11 +57,7 @@ def step(bench: Bench, what: str) -> Iterator[None]:
 
 
 def test_files_become_a_sensor(bench: Bench) -> None:
-    folder = bench.home / "Documents"
-    for place in (bench.home, folder):
-        place.mkdir(exist_ok=True)
-        for name in FILES:
-            shutil.copy(PARTS / name, place)
+    copy_parts(bench)
     bench.greet()
     bench.open_tab()
     with step(bench, "1, the files are chosen"):
