@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -130,27 +130,17 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
             counts[verdict] += 1
         counts_text = ", ".join(_counted(verdicts.count(v), v) for v in counts if v in verdicts)
         rows.append(f"| [{experiment.title}](#{_anchor(experiment.title)}) | {counts_text} |")
+    # Wall times are not reported, as they depend on what else the machine did.
+    processor = sum(seconds for _, seconds, _ in spent.values())
     head = [
         "# The paper's tables and figures",
         "The command `python -m paper all --page FILE` writes this page; do not edit it.",
         INTRODUCTION,
         "\n".join(["| experiment | statements of the paper |", "| --- | --- |", *rows]),
         f"In total: {', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
-        _took(spent.values()),
+        f"The {len(spent)} evaluations take {processor / 60:.0f} processor minutes.",
     ]
     write_text(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")
-
-
-def _took(spent: Iterable[Sequence[float]]) -> str:
-    """Return the sentence on the cost of all evaluations, each of which counts once.
-
-    Args:
-        spent: wall seconds, processor seconds, and whether the evaluation ran alone. Wall seconds
-            depend on what else the machine did, and are not reported.
-    """
-    rows = list(spent)
-    processor = sum(seconds for _, seconds, _ in rows)
-    return f"The {len(rows)} evaluations take {processor / 60:.0f} processor minutes."
 
 
 def _counted(number: int, verdict: str) -> str:

@@ -40,9 +40,9 @@ INTERREFLECTION_WIDTH = 1.0 / 107.0
 lobes, as a fraction of the image width: 3 pixels of 320. In a contact of GelSight Mini of
 specularity 0.6, where interreflection is a tenth of the light, this reduces the noise of the camera
 samples from 3.0 to 1.1 % of the mean. As the blur is undone by twicing, the error over patches is
-0.1 instead of 0.5 %. Pixels of small contacts have
-more samples, so that averages over a smaller width have about as many. In contacts of a ball on
-GelSight Svelte, 14 pixels wide, the error is 1.1 % instead of the 2.3 % of the full width."""
+0.1 instead of 0.5 %. Pixels of small contacts have more samples, so that averages over a smaller
+width have about as many. In contacts of a ball on GelSight Svelte, 14 pixels wide, the error is 1.1
+% instead of the 2.3 % of the full width."""
 
 PixelImportance = Callable[[ChiefRays], NDArray[np.bool_] | NDArray[np.floating]]
 """A function of the chief rays that gives the importance (h, w) of each contact pixel to a score,
