@@ -52,9 +52,9 @@ def irradiance_table(moments: mi.Float, cells: int, bins: mi.UInt32, groups: int
     sums = [mi.Float(0) for _ in range(9)]
     mean = mi.Vector3f(0)
     k = mi.UInt32(0)
-    while k < bins:
+    while dr.hint(k < bins, exclude=[moments, bins, groups, cell, group]):
         value = dr.gather(mi.Vector4f, moments, (cell * bins + k) * groups + group)
-        if value.w != 0:
+        if dr.hint(value.w != 0, exclude=[value]):
             flux = mi.Vector3f(value.x, value.y, value.z)
             mean += flux
             basis = harmonics(dr.normalize(flux) * dr.sign(value.w))

@@ -179,11 +179,11 @@ def occluder_horizon(
     highest = mi.Float(-1)
     inside = mi.UInt32(0)
     n = mi.UInt32(0)
-    while n < ball_count:
+    while dr.hint(n < ball_count, exclude=[balls, ball_count, point, upright, own]):
         ball = dr.gather(mi.Vector4f, balls, n)
         offset = mi.Vector3f(ball.x, ball.y, ball.z) - mi.Vector3f(point)
         distance = dr.norm(offset)
-        if distance < ball.w * 1.0001:
+        if dr.hint(distance < ball.w * 1.0001, exclude=[ball, offset, distance, upright, own]):
             inside += 1
             highest = dr.select(own, highest, 1)
         else:

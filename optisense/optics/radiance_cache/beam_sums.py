@@ -34,7 +34,7 @@ def sum_beams(
     totals = [mi.Color3f(0) for _ in range(groups)]
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
-    while j < end:
+    while dr.hint(j < end, exclude=[beams, groups, at, end]):
         towards, cosine, flux, tag = beam_at(beams, j)
         group = tag & GROUP_MASK
         reflected = flux * evaluate_coating(
@@ -91,7 +91,9 @@ def sum_hidden(
     running = unit_float(random)
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
-    while j < end:
+    while dr.hint(
+        j < end, exclude=[beams, indenters, at, axis, steps, groups, random, shadow_rays, end]
+    ):
         towards, cosine, flux, tag = beam_at(beams, j)
         group = tag & GROUP_MASK
         reflected = flux * evaluate_coating(
@@ -109,7 +111,21 @@ def sum_hidden(
         # change the rays of the others.
         state = random + tag * GOLDEN_BITS
         height = dr.gather(mi.Float, beams.heights, j, times > 0)
-        while times > 0:
+        while dr.hint(
+            times > 0,
+            exclude=[
+                indenters,
+                at,
+                axis,
+                towards,
+                cosine,
+                height,
+                weight,
+                group,
+                groups,
+                reflected,
+            ],
+        ):
             state = next_random(state)
             beam = angular_variance(axis, towards, cosine, height)
             blocked = indenters.ray_test(

@@ -140,7 +140,7 @@ def _total(moments: mi.Float, used: mi.UInt32, groups: int, lane: mi.UInt32) -> 
     cell, group = lane // groups, lane % groups
     total = mi.Float(0)
     k = mi.UInt32(0)
-    while k < used:
+    while dr.hint(k < used, exclude=[moments, used, groups, cell, group]):
         total += dr.gather(mi.Float, moments, ((cell * used + k) * groups + group) * 4 + 3)
         k += 1
     return total
@@ -155,7 +155,7 @@ def _collect(light: BlocksOfBins, lane: mi.UInt32, beams: Beams, write: bool) ->
     first = dr.gather(mi.UInt32, beams.starts, lane)
     slot = mi.UInt32(first)
     k = mi.UInt32(0)
-    while k < light.blocks:
+    while dr.hint(k < light.blocks, exclude=[light, beams, groups, used, total, cell, group]):
         values = []
         tall = []
         inks = []
@@ -266,13 +266,13 @@ def _mark_near(
     count = mi.UInt32(0)
     j = dr.gather(mi.UInt32, beams.starts, lane)
     end = dr.gather(mi.UInt32, beams.starts, lane + 1)
-    while j < end:
+    while dr.hint(j < end, exclude=[beams, place, point, end]):
         way = dr.gather(mi.Vector4f, beams.ways, j)
         height = dr.gather(mi.Float, beams.heights, j)
         light = angular_variance(place.axis, mi.Vector3f(way.x, way.y, way.z), way.w, height)
         touches = mi.Bool(False)
         n = mi.UInt32(0)
-        while n < place.count:
+        while dr.hint(n < place.count, exclude=[place, point, light]):
             ball = dr.gather(mi.Vector4f, place.balls, n)
             ball.w += place.margin
             touches |= passes_near(ball, point, light)

@@ -47,7 +47,7 @@ MIN_STEP = 1e-20
 avoids a division by zero where there is none."""
 
 
-@dr.syntax
+@dr.syntax(recursive=True)
 def sum_bins(
     light: BinnedLight,
     scenes: ContactScenes,
@@ -99,64 +99,77 @@ def sum_bins(
         above = sampled_plane(points, rise, raised)
         level = dr.select(above, RAISED_HEIGHT, 0)
         first = dr.select(above, dr.opaque(mi.UInt32, light.cells.cells), 0)
-    k = mi.UInt32(0)
-    while active & (k < bins):
-        there = mi.UInt32(at.cell)
-        if upper is None:
-            there = _place(light, scenes.fixed, at, k, level, first)
-        for g in range(groups):
-            entry = (there * bins + k) * groups + g
-            value = dr.gather(mi.Vector4f, moments, entry, active)
-            counts = value.w != 0
-            if upper is not None:
-                above_it = dr.gather(mi.Vector4f, upper[0], entry, active & raised)
-                # Extrapolation never turns positive light negative.
-                negative = dr.minimum(value.w, above_it.w) < 0
-                value = dr.lerp(value, above_it, up)
-                counts = (value.w > 0) | (negative & (value.w < 0))
-            if counts:
-                towards, cosine = mean_direction(value)
-                height = dr.gather(mi.Float, heights, entry)
-                if upper is not None:
-                    height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
-                height = dr.maximum(height / value.w, 0)
-                beam = angular_variance(axis, towards, cosine, height)
-                # On the undeformed surface the sum over bins already has the right mean cosine.
-                half_width = dr.select(raised, cosine_half_width(beam, points.normal, upright), 0)
-                reflected = _reflected(light, at, beam, cosine, half_width)
-                sine = dr.dot(upright, towards)
-                doubtful = sine - dr.sqrt(squared_radius(cosine)) < horizon
-                weight = dr.select(doubtful, mi.Float(0), 1)
-                share = dr.abs(value.w) * grey(reflected) / steps[g]
-                before = dr.floor(running[g])
-                running[g] += dr.select(doubtful, share, 0)
-                times = dr.floor(running[g]) - before
-                if times > 0:
-                    # Each bin has random bits of its own, so that a ray or a bin added or dropped
-                    # by rounding does not change the others.
-                    number = dr.reinterpret_array(
-                        mi.UInt32, dr.gather(mi.Float, light.centres, k * 4 + 3)
+
+    # The loop's state holds only what it changes (see docs/architecture.md).
+    def over_bins(
+        k: mi.UInt32, running: list[mi.Float], totals: list[mi.Color3f]
+    ) -> list[mi.Color3f]:
+        while active & (k < bins):
+            there = mi.UInt32(at.cell)
+            if dr.hint(upper is None, mode="scalar"):
+                there = _place(light, scenes.fixed, at, k, level, first)
+            for g in range(groups):
+                entry = (there * bins + k) * groups + g
+                value = dr.gather(mi.Vector4f, moments, entry, active)
+                counts = value.w != 0
+                if dr.hint(upper is not None, mode="scalar"):
+                    assert upper is not None
+                    above_it = dr.gather(mi.Vector4f, upper[0], entry, active & raised)
+                    # Extrapolation never turns positive light negative.
+                    negative = dr.minimum(value.w, above_it.w) < 0
+                    value = dr.lerp(value, above_it, up)
+                    counts = (value.w > 0) | (negative & (value.w < 0))
+                if counts:
+                    towards, cosine = mean_direction(value)
+                    height = dr.gather(mi.Float, heights, entry)
+                    if dr.hint(upper is not None, mode="scalar"):
+                        assert upper is not None
+                        height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
+                    height = dr.maximum(height / value.w, 0)
+                    beam = angular_variance(axis, towards, cosine, height)
+                    # On the undeformed surface the sum over bins already has the right mean cosine.
+                    half_width = dr.select(
+                        raised, cosine_half_width(beam, points.normal, upright), 0
                     )
-                    state = next_random(points.random + (number * groups + g) * GOLDEN_BITS)
-                    way = mirrored_above(sample_direction(beam, state), points.face_normal)
-                    blocked = indenters.ray_test(
-                        mi.Ray3f(at.start, way),
-                        coherent=False,
-                        active=mi.Bool(True),
-                    )
-                    weight = dr.select(blocked, 0.0, times / share)
-                if dr.hint(light.coloured, mode="scalar"):
-                    flux = dr.gather(mi.Vector4f, colours, entry)
-                    if upper is not None:
-                        flux = dr.lerp(flux, dr.gather(mi.Vector4f, upper[2], entry, raised), up)
-                    reflected *= mi.Color3f(flux.x, flux.y, flux.z)
-                else:
-                    reflected *= value.w
-                if dr.hint(scenes.absorption is not None and upper is None, mode="scalar"):
-                    reflected *= _shorter_path_factor(scenes, rise, dr.dot(upright, towards))
-                totals[g] += reflected * weight
-        k += 1
-    return totals
+                    reflected = _reflected(light, at, beam, cosine, half_width)
+                    sine = dr.dot(upright, towards)
+                    doubtful = sine - dr.sqrt(squared_radius(cosine)) < horizon
+                    weight = dr.select(doubtful, mi.Float(0), 1)
+                    share = dr.abs(value.w) * grey(reflected) / steps[g]
+                    before = dr.floor(running[g])
+                    running[g] += dr.select(doubtful, share, 0)
+                    times = dr.floor(running[g]) - before
+                    if times > 0:
+                        # Each bin has random bits of its own, so that a ray or a bin added or
+                        # dropped by rounding does not change the others.
+                        number = dr.reinterpret_array(
+                            mi.UInt32, dr.gather(mi.Float, light.centres, k * 4 + 3)
+                        )
+                        state = next_random(points.random + (number * groups + g) * GOLDEN_BITS)
+                        way = mirrored_above(sample_direction(beam, state), points.face_normal)
+                        blocked = indenters.ray_test(
+                            mi.Ray3f(at.start, way),
+                            coherent=False,
+                            active=mi.Bool(True),
+                        )
+                        weight = dr.select(blocked, 0.0, times / share)
+                    if dr.hint(light.coloured, mode="scalar"):
+                        flux = dr.gather(mi.Vector4f, colours, entry)
+                        if dr.hint(upper is not None, mode="scalar"):
+                            assert upper is not None
+                            flux = dr.lerp(
+                                flux, dr.gather(mi.Vector4f, upper[2], entry, raised), up
+                            )
+                        reflected *= mi.Color3f(flux.x, flux.y, flux.z)
+                    else:
+                        reflected *= value.w
+                    if dr.hint(scenes.absorption is not None and upper is None, mode="scalar"):
+                        reflected *= _shorter_path_factor(scenes, rise, dr.dot(upright, towards))
+                    totals[g] += reflected * weight
+            k += 1
+        return totals
+
+    return over_bins(mi.UInt32(0), running, totals)
 
 
 def _reflected(

@@ -92,7 +92,7 @@ def follow(
     branch_origin = mi.Point3f(0)
     branch_direction = mi.Vector3f(0, 0, 1)
     branch_absorption = ray.absorption
-    while ray.active:
+    while dr.hint(ray.active, exclude=[scene, ray_kind]):
         sample = None
         if dr.hint(ray_kind.draws or scene.rough, mode="scalar"):
             sample = LobeSample(rng.next_float32())

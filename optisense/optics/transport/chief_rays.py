@@ -84,7 +84,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
     face = mi.UInt32(0)
     mirrors = mi.UInt32(0)
     path = mi.UInt32(0)
-    while ray.active:
+    while dr.hint(ray.active, exclude=[scene, patches]):
         step = interact(scene, ray, RayKind.CHIEF)
         hit = step.hit
         outcome = dr.select(ray.active & ~hit.valid, int(RayOutcome.ESCAPED), outcome)
@@ -94,7 +94,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
         normal = dr.select(step.sensed, hit.shading_normal * step.side, normal)
         region = dr.select(step.sensed, step.region, region)
         face = dr.select(step.sensed, hit.face, face)
-        if patches is not None:
+        if dr.hint(patches is not None, mode="scalar"):
             patch = dr.gather(mi.UInt32, patches, hit.face, hit.valid)
             code = patch * 2 + dr.select(step.totally, mi.UInt32(1), mi.UInt32(0))
             path = dr.select(hit.valid, (path ^ code) * HASH_FACTOR + 1, path)

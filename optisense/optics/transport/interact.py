@@ -206,7 +206,9 @@ def interact(
     if dr.hint(ray_kind.carries_radiance, mode="scalar"):
         weight = mi.Color3f(dr.select(through, passed / (relative * relative), passed))
     if dr.hint(scene.rough and ray_kind is not RayKind.CHIEF, mode="scalar"):  # noqa: SIM102
-        if interface & (alpha > SMOOTH_ALPHA):
+        if dr.hint(
+            interface & (alpha > SMOOTH_ALPHA), exclude=[ray, ray_kind, hit, eta, alpha, drawn]
+        ):
             outgoing, kept, _through, ratio = sample_rough_interface(
                 ray.direction, hit.shading_normal, eta, alpha, drawn.pick, drawn.place
             )
@@ -214,7 +216,7 @@ def interact(
                 kept = kept / (ratio * ratio)
             weight = mi.Color3f(kept)
     if dr.hint(ray_kind is not RayKind.CHIEF, mode="scalar"):  # noqa: SIM102
-        if scattered:
+        if dr.hint(scattered, exclude=[scene, ray, ray_kind, hit, side, mirror, drawn, scattered]):
             coating = coating_of(scene.table, hit.surface, scattered)
             cosine = dr.abs(dr.dot(ray.direction, hit.shading_normal))
             weight = fresnel_metal(cosine, coating.metal_eta, coating.metal_k)

@@ -170,11 +170,12 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
     # and one photon that ended earlier would change the paths of all photons after it. A small
     # change of the design therefore changes few paths.
     rng = mi.PCG32(initstate=seed, initseq=mi.UInt64(flight.number))
-    while ray.active:
+    while dr.hint(ray.active, exclude=[scene, flight, seed]):
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
         step = interact(scene, ray, RayKind.PHOTON, sample)
         hit = step.hit
-        if recording.flux_layer is not None:
+        if dr.hint(recording.flux_layer is not None, mode="scalar"):
+            assert recording.flux_layer is not None
             # Light that leaves an opaque surface and meets no other is handled by
             # interreflection.py.
             passes = ray.active & (step.opaque | ~scattered)
@@ -182,11 +183,17 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
             # The bits are hashed, as neighbouring photons have neighbouring bits.
             chance = unit_float(mi.sample_tea_32(bits, mi.UInt32(0))[0])
             piece = mi.UInt32(0)
-            while passes & (piece < SAMPLES_PER_SEGMENT):
+            while dr.hint(
+                passes & (piece < SAMPLES_PER_SEGMENT),
+                exclude=[scene, ray, flight, step, hit, chance, scattered, passes],
+            ):
                 spot, share, crosses = sample_segment(
                     recording.flux_layer, ray, hit, chance, piece, step.opaque, scattered
                 )
-                if crosses:
+                if dr.hint(
+                    crosses,
+                    exclude=[scene, ray, flight, step, hit, spot, share, throughput, crosses],
+                ):
                     power = mi.Color3f(throughput)
                     if dr.hint(scene.absorbing, mode="scalar"):
                         part = dr.norm(spot - ray.origin) / hit.distance
@@ -196,18 +203,19 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
                 piece += 1
             scattered = step.opaque
         throughput *= step.transmittance
-        if step.opaque:
+        if dr.hint(step.opaque, exclude=[scene, ray, flight, step, hit, throughput]):
             cosine = dr.abs(dr.dot(ray.direction, hit.normal))
             bits = flight.group | (hit.surface << SURFACE_SHIFT)
             landing = Landing(hit.point, ray.direction, cosine, throughput, bits)
             recording.landings.write(landing, step.opaque)
-        if recording.target is not None:
+        if dr.hint(recording.target is not None, mode="scalar"):
             target = recording.target
+            assert target is not None
             cell, found = cell_at(target.cells, hit.point, step.opaque)
             landed |= found & (dr.gather(mi.UInt32, target.flags, cell, found) != 0)
         throughput *= step.lobe.weight
         ray = step.ray
-        if step.scattered:
+        if dr.hint(step.scattered, exclude=[step]):
             survival = dr.minimum(dr.max(step.lobe.weight), MAX_SURVIVAL)
             ray.active &= rng.next_float32() < survival
             throughput /= dr.maximum(survival, 1e-6)
