@@ -56,6 +56,10 @@ variance 1/12; the variance of Epanechnikov's kernel is 1/6 of its squared radiu
 MAX_SHARPENING = 0.25
 """Largest relative change of a cell's light by the sharpening. Kernels of `MAX_RADIUS_RATIO` need
 5 % (see `varies_over`); more is due to noise or to the edge of a shadow."""
+LEAST_SHARED_PRODUCT = 1e8
+"""Number of multiplications of a matrix product from which on threads share it: about 10 ms of one
+processor, several times what it takes to start threads. A draft of GelSight Mini needs 8 million,
+which take 1 ms, or 5 ms with threads."""
 
 
 @dataclass
@@ -237,13 +241,13 @@ def _pairs_within(
 def product(matrix: csr_matrix, table: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the product (m, k) of a sparse matrix (m, n) and a table (n, k).
 
-    The rows are shared among as many threads as the renderer uses. The result does not depend on
-    their number. For a table in which most bins of directions are empty, as those of few photons
-    are, this takes half the time of a loop of Dr.Jit on the same processors, which gathers numbers
-    one by one.
+    The rows of a large product are shared among as many threads as the renderer uses. The result
+    does not depend on their number. For a table in which most bins of directions are empty, as
+    those of few photons are, this takes half the time of a loop of Dr.Jit on the same processors,
+    which gathers numbers one by one.
     """
     threads = min(dr.thread_count(), matrix.shape[0])
-    if threads < 2:
+    if threads < 2 or matrix.nnz * table.shape[1] < LEAST_SHARED_PRODUCT:
         return np.asarray(matrix @ table)
     # Each thread gets about as many weights as the others.
     starts = np.searchsorted(matrix.indptr, np.linspace(0, matrix.nnz, threads + 1))
