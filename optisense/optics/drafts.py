@@ -202,7 +202,9 @@ class DraftModel(OpticalModel):
             return None
         camera = self.camera(resolution)
         mesh = mesh.carried(now)
-        scenes = self.scenes.deformed(mesh, pressed)
+        # Behind the pressed skin, rays meet the undeformed skin before any interface. The scene of
+        # the photons thus serves as that of the opaque surfaces, which saves building it.
+        scenes = self.scenes.deformed(mesh, pressed, self.scenes.full)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
             raise sees_nothing(rays)

@@ -166,7 +166,11 @@ class _Shading:
         return self.film.layers(*self.size)
 
     def reflections(self) -> NDArray[np.float32]:
-        """Return the layers of the light that interfaces reflect to the camera."""
+        """Return the layers of the light that interfaces reflect to the camera; zero if it is
+        known as faint light.
+        """
+        if self.faint_known:
+            return np.zeros((len(self.film.sums), *self.size[::-1], 3), dtype=np.float32)
         specks_spread = self.glints.without_specks(*self.size, self.regions.near)
         return self.mirrored.layers(*self.size) + specks_spread
 

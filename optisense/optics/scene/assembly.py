@@ -80,6 +80,8 @@ class AssemblyCache:
     finishes: ShapeCache = field(default_factory=ShapeCache)
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
+    in_front: dict[str, str | None] = field(default_factory=dict)
+    """Name of the solid in front of each sheet; None for air."""
 
     def merge(self, mesh: TriangleMesh, before: AssemblyCache, bend: bool = False) -> TriangleMesh:
         """Return a part's mesh with its flat faces merged; unchanged if ``bend`` and an earlier
@@ -109,7 +111,8 @@ class AssemblyCache:
             before: the cache of the assembly before.
             merge: whether flat faces are merged, as on a flat side of a curved solid.
         """
-        known = next((piece for old, piece in before.pieces if old is mesh), None)
+        pieces = (piece for old, piece in (*before.pieces, *self.pieces) if old is mesh)
+        known = next(pieces, None)
         if known is None or (known.name, known.surface) != (name, surface):
             known = _piece(name, _merged(mesh) if merge else mesh, surface)
         self.pieces.append((mesh, known))
@@ -173,8 +176,13 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         for frost, face in frosted(whole, frosts, solids, kept.finishes, old.finishes):
             name = "/".join(face.names) + "|" + face.outside + (frost and f":{frost}")
             pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old, merge=True))
+    named: dict[str | None, Solid] = {solid.name: solid for solid in solids}
     for sheet in sheets:
-        before_it = _solid_before(sheet.mesh, solids)
+        if media.bent and sheet.name in old.in_front:
+            before_it = named.get(old.in_front[sheet.name])
+        else:
+            before_it = _solid_before(sheet.mesh, solids)
+        kept.in_front[sheet.name] = None if before_it is None else before_it.name
         ior = 1.0 if before_it is None else before_it.ior
         if sheet.kind == Role.SENSING_SURFACE.value:
             indices.append(ior)

@@ -219,16 +219,20 @@ class SensorScenes:
             self._absorption(),
         )
 
-    def deformed(self, mesh: SkinMesh, pressed: PressedSkin) -> ContactScenes:
+    def deformed(
+        self, mesh: SkinMesh, pressed: PressedSkin, fixed: RayScene | None = None
+    ) -> ContactScenes:
         """Return the scenes of an image with a deformed skin in place of the sensing surface.
 
         Args:
             mesh: the deformed skin.
             pressed: the contacts that deform it.
+            fixed: the scene in which rays are traced behind the deformed skin; that of the opaque
+                surfaces if None.
         """
         pieces = self._sensor_pieces
         skin = self._shapes.skin(mesh, pressed, pieces.skin_surfaces)
-        return pieces.with_skin(skin, self.fixed, self._absorption())
+        return pieces.with_skin(skin, fixed or self.fixed, self._absorption())
 
     @property
     def _sensor_pieces(self) -> SensorPieces:
