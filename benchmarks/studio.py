@@ -81,6 +81,7 @@ def main() -> None:
     from studio.engine import session
     from studio.scene import cages
     from studio.scene.collections import objects_of
+    from studio.sensor import opening
     from studio.sensor.warming import warm_up
     from studio.simulate import drafts, relight, stored_drafts
 
@@ -174,18 +175,21 @@ def main() -> None:
             drafts._ask()
             time.sleep(session._tick() or 0.0)
 
-    def kept_draft(_: int) -> None:
-        assert stored_drafts.show_kept(bpy.context.scene)
+    def stored_draft(_: int) -> None:
+        scene = bpy.context.scene
+        if not stored_drafts.show_kept(scene):
+            assert stored_drafts.show_built_in(scene, opening.draft)
 
     place = Path(tempfile.mkdtemp())
     stored_drafts.folder = lambda: place
     sensors = ("gelsight-svelte", "digit", "gelsight-mini-ideal")
     for name in sensors:
         bpy.ops.optisense.new(sensor=name)
-        measured(f"first draft of {name}, opened", 1, "0.5 s", first_draft, pid)
+        measured(f"stored draft of {name}, opened", 1, "0.5 s", stored_draft, pid)
+        measured(f"first draft of {name}, opened", 1, "", first_draft, pid)
     for name in sensors:
         bpy.ops.optisense.new(sensor=name)
-        measured(f"kept draft of {name}, opened again", 1, "0.5 s", kept_draft, pid)
+        measured(f"stored draft of {name}, opened again", 1, "0.5 s", stored_draft, pid)
     shutil.rmtree(place)
     scene = bpy.context.scene
     cage = _caged_sheet(scene)

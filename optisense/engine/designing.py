@@ -24,7 +24,7 @@ from optisense.engine.failures import ProtocolError, problem_row
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
-from optisense.engine.rendering import DesignFields, design_of
+from optisense.engine.rendering import DesignFields, blender_pixels, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 from optisense.errors import DesignError, MeshError
@@ -32,6 +32,7 @@ from optisense.geometry import TriangleMesh, cage_weights
 from optisense.library import with_own_lights
 from optisense.near import suggestion
 from optisense.sensors.registry import SENSORS
+from optisense.sensors.stored_drafts import stored_draft
 
 SAME_PLACE = 1e-6
 """Largest distance, mm, between a vertex of a bent part and its place at rest that counts as rest:
@@ -109,11 +110,13 @@ def open_design(session: Session, fields: DesignFields, job: Job) -> dict[str, A
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
     warnings = [p for p in session.designs.problems(design) if p.severity == "warning"]
+    draft = stored_draft(design)
     return {
         "data": design.model_dump(mode="json"),
         "meshes": files.meshes(design.meshes),
         "shapes": bent_shapes(design, files),
         "warnings": [problem_row(each, design) for each in warnings],
+        "draft": None if draft is None else files.array("draft.npy", blender_pixels(draft)),
     }
 
 

@@ -22,6 +22,10 @@ when_opened: list[Callable[[bpy.types.Scene], None]] = []
 """Callbacks for a sensor being opened: a built-in one, a folder of the user, or CAD files."""
 
 
+draft: str | None = None
+"""File of the engine's draft of the sensor that was opened last, if it is a built-in one."""
+
+
 def tell_opened(scene: bpy.types.Scene) -> None:
     """Call these callbacks."""
     for each in when_opened:
@@ -88,9 +92,11 @@ def open_stage(
     name = scene.name
 
     def opened(result: dict[str, Any]) -> None:
+        global draft
         scene = bpy.data.scenes.get(name)
         if scene is None:
             return
+        draft = result.get("draft")
         document = design_transfer.without_nulls(result["data"])
         parts = document["parts"].items()
         clear_startup(scene)

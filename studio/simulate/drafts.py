@@ -108,13 +108,14 @@ def _ask() -> None:
 
 
 def _first(scene: bpy.types.Scene) -> None:
-    """Show the stored draft of an opened sensor, and schedule its first draft.
+    """Show a stored draft of an opened sensor, and schedule its first draft.
 
     The first draft is made even if drafts are switched off. Scripts ask for what they need.
     """
     global _opened
     if not bpy.app.background:
-        stored_drafts.show_kept(scene)
+        if not stored_drafts.show_kept(scene):
+            stored_drafts.show_built_in(scene, opening.draft)
         _opened = True
 
 

@@ -1,6 +1,7 @@
-"""Stored drafts of sensors, which are shown as soon as such a sensor is opened again.
+"""Stored drafts of sensors, which are shown as soon as such a sensor is opened.
 
-They are kept in the folder that Blender gives the extension for its own files.
+Those of sensors that were open before are kept in the folder that Blender gives the extension for
+its own files. Those of the built-in sensors come with the engine.
 """
 
 from __future__ import annotations
@@ -55,9 +56,27 @@ def keep(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
 def show_kept(scene: bpy.types.Scene) -> bool:
     """Show the stored draft of the scene's sensor; return whether there is one."""
     try:
-        file = _file(scene)
+        return _show(scene, _file(scene))
+    except EngineError:
+        return False
+
+
+def show_built_in(scene: bpy.types.Scene, file: str | None) -> bool:
+    """Show the draft of the built-in sensor that the scene has just got; return whether there is
+    one for the scene's exposure.
+
+    Args:
+        scene: the scene, without contacts.
+        file: file of the draft, from the engine; None for other sensors.
+    """
+    return exposure(scene) == "auto" and _show(scene, None if file is None else Path(file))
+
+
+def _show(scene: bpy.types.Scene, file: Path | None) -> bool:
+    """Show the draft in a file; return whether there is one."""
+    try:
         pixels = None if file is None else np.load(file)
-    except (OSError, ValueError, EngineError):  # there is none, or it is damaged
+    except (OSError, ValueError):  # there is none, or it is damaged
         pixels = None
     if pixels is None or pixels.ndim != 3 or pixels.shape[2] != 4:
         return False

@@ -11,7 +11,8 @@ import pytest
 from shown_picture import shown
 from waiting import until
 
-from studio.simulate import drafts, picture, stored_drafts
+from studio.sensor import opening
+from studio.simulate import drafts, exposure, picture, stored_drafts
 
 
 def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
@@ -41,3 +42,21 @@ def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
     file = next(place.glob("*.npy"))
     file.write_bytes(b"damaged")
     assert not stored_drafts.show_kept(mini)
+
+
+def test_a_built_in_sensor_shows_the_draft_of_the_engine_at_once(mini: Any, tmp_path: Path) -> None:
+    now = bpy.context.window_manager.optisense_picture
+    assert bpy.ops.optisense.new(sensor="digit") == {"FINISHED"}
+    picture.show(np.zeros((4, 4, 4), dtype=np.float32))
+    assert opening.draft is not None and stored_drafts.show_built_in(mini, opening.draft)
+    assert now.is_stored and not now.is_before
+    pixels = picture.enlarged(np.load(opening.draft), exposure.shown_size(mini) or (0, 0))
+    assert np.allclose(shown(), pixels, atol=1e-6)
+    mini.optisense_simulation.auto_exposure = False
+    assert not stored_drafts.show_built_in(mini, opening.draft), "it has the automatic exposure"
+    mini.optisense_simulation.auto_exposure = True
+
+    mini.optisense.light_groups[0].flux *= 2.0
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "own")) == {"FINISHED"}
+    assert bpy.ops.optisense.open(filepath=str(tmp_path / "own")) == {"FINISHED"}
+    assert not stored_drafts.show_built_in(mini, opening.draft), "it is another sensor"
