@@ -88,7 +88,7 @@ def _of_sampling() -> list[Ablation]:
         home, found = shading_points.cell_at(cells, base, active)
         return home, mi.Vector3f(0), found
 
-    def with_specks(film: Any, width: int, height: int, near: Any) -> Any:
+    def with_specks(film: Any, width: int, height: int, near: Any, steady: Any) -> Any:
         return film.layers(width, height)
 
     coherent = property(lambda kind: False)

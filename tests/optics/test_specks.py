@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from optisense import sensors
-from optisense.design import Light, SensorDesign
-from optisense.geometry import TriangleMesh
+from optisense.design import AreaEmitter, Dielectric, Light, SensorDesign
+from optisense.geometry import Contact, Sphere, TriangleMesh
 from optisense.optics import OpticalModel
 from optisense.optics.imaging._film import Film
 
@@ -66,6 +66,50 @@ class TestLonePixels:
         values[20:24, 30:33] = 5.0
         (layer,) = film_of(values).without_specks(WIDTH, HEIGHT, NOWHERE)
         np.testing.assert_allclose(layer[..., 1], values)
+
+
+class TestMirroredLamp:
+    """A lamp beside the camera, which the near face of the light guide mirrors.
+
+    Its mirror image is behind that face, as far as the lamp is in front of it, and its radiance is
+    that of the lamp times the Fresnel reflectance at normal incidence (the angle is 5 degrees).
+    """
+
+    SIDE = 0.15
+    """Side (mm) of the lamp: its mirror image is half a pixel wide and high."""
+    NOISE = 0.25
+    """Relative noise, three standard errors, of the samples of four images."""
+
+    def test_is_seen_where_it_is(self) -> None:
+        design = sensors.gelsight_mini_ideal()
+        lamp = (1.89, 0.145, -20.0)  # its image lies within one pixel
+        group = design.lights["green"]
+        group.emitter = AreaEmitter(shape="rectangle", size=(self.SIDE, self.SIDE))
+        group.lights = [Light(position=lamp, direction=(0.0, 0.0, 1.0))]
+        model = OpticalModel(design)
+        face = float(design.meshes["guide"].bounds[0, 2])
+        eye = np.array(design.camera.position)
+        away = np.array([lamp[0], lamp[1], 2 * face - lamp[2]]) - eye
+        focal = WIDTH / 2 / np.tan(np.radians(design.camera.fov / 2))
+        # The camera looks along +z with +y at the top, so that +x is at the left.
+        film = WIDTH / 2 - focal * away[0] / away[2], HEIGHT / 2 - focal * away[1] / away[2]
+        contact = Contact(Sphere(radius=1.5), at=(-1.8, 0.1), depth=0.5)
+        images = [
+            model.render([contact], (WIDTH, HEIGHT), 100_000, seed=seed, skin="conforming")
+            for seed in range(4)
+        ]
+        assert images[0].contact_mask[int(film[1]), int(film[0])]
+        image = np.mean([each.unit_layers["green"][..., 1] for each in images], axis=0)
+        guide = design.materials["acrylic"]
+        assert isinstance(guide, Dielectric)
+        index = guide.ior
+        reflectance = ((index - 1) / (index + 1)) ** 2
+        pixels = (self.SIDE * focal / away[2]) ** 2
+        light = reflectance / (np.pi * self.SIDE**2) * pixels
+        rows, columns = np.indices(image.shape) + 0.5
+        close = np.hypot(rows - film[1], columns - film[0]) < 2.0
+        assert image[close].sum() == pytest.approx(light, rel=self.NOISE)
+        assert image[~close].max() < 0.05 * image[close].max()
 
 
 def steep() -> SensorDesign:

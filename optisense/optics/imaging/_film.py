@@ -18,7 +18,7 @@ tactile picture."""
 
 LONE_WINDOW, LONE_RANK = 5, 4
 """Side (pixels) of the square around a bright pixel, and the number of its pixels, itself included,
-that must be bright for the pixel to count as real: the visible reflection of a lamp has more."""
+that must be bright for the pixel not to count as lone."""
 
 LONE_RATIO = 2.0
 """Ratio of a pixel's light to that of the `LONE_RANK`-th brightest pixel in its square above which
@@ -89,8 +89,22 @@ class Film:
             np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
         return out
 
+    def lone_pixels(self, width: int, height: int) -> NDArray[np.bool_]:
+        """Return a mask (h, w) of the pixels that are much brighter than the pixels around them in
+        any layer.
+        """
+        lone = np.zeros((height, width), dtype=bool)
+        for layer in self.layers(width, height):
+            bright = layer.sum(axis=-1)
+            lone |= _left_of_lone(bright) < bright
+        return lone
+
     def without_specks(
-        self, width: int, height: int, near: NDArray[np.bool_]
+        self,
+        width: int,
+        height: int,
+        near: NDArray[np.bool_],
+        steady: NDArray[np.bool_] | None = None,
     ) -> NDArray[np.float32]:
         """Return the layers with the light of lone bright pixels spread over sampled pixels around
         them.
@@ -101,6 +115,7 @@ class Film:
         Args:
             width, height: size of the image, pixels.
             near: (height, width) mask of the pixels in contacts or at their rims.
+            steady: (height, width) mask of the pixels that keep their light; none by default.
         """
         layers = self.layers(width, height)
         sampled = (np.asarray(self.counts) > 0).reshape(height, width)
@@ -116,8 +131,9 @@ class Film:
             bright = layer.sum(axis=-1)
             if not bright.any():
                 continue
-            company = ndimage.rank_filter(bright, -LONE_RANK, size=LONE_WINDOW, mode="constant")
-            left = np.minimum(bright, LONE_RATIO * company)
+            left = _left_of_lone(bright)
+            if steady is not None:
+                left = np.where(steady, bright, left)
             kept = np.divide(left, bright, out=np.ones_like(bright), where=bright > 0)[..., None]
             lone = layer * (1.0 - kept)
             layer *= kept
@@ -191,3 +207,9 @@ def _average(
                 if deblurred:
                     mean = np.maximum(2 * mean - around(mean * counts) * share, 0)
                 layer[*part, k] = np.where(where, mean, values)
+
+
+def _left_of_lone(bright: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Return an image (h, w) in which lone bright pixels are limited by those around them."""
+    company = ndimage.rank_filter(bright, -LONE_RANK, size=LONE_WINDOW, mode="constant")
+    return np.asarray(np.minimum(bright, LONE_RATIO * company))
