@@ -69,12 +69,15 @@ class Smoothing:
     Attributes:
         kernel: matrix (cells, cells) that smooths, from mW on cells to mW/mm^2.
         blur: the kernel with the blur of the cells themselves added.
+        strength: factor (cells,) on the difference that ``blur`` makes, which gives the difference
+            that kernel and cells make.
         correction: matrix (cells, cells) that undoes the blur of kernel and cells in smoothed
             light, in cells in or near the camera's view; None without this correction.
     """
 
     kernel: csr_matrix
     blur: csr_matrix
+    strength: FloatArray
     correction: csr_matrix | None
 
 
@@ -134,24 +137,33 @@ class Kernels:
             corrected: whether the blur is undone in each direction bin by itself. With K the kernel
                 and B the blur, light L becomes 2 K L - B K L ("twicing", Stuetzle and Mittal 1979):
                 the remaining blur grows with the fourth power of the radius, and the noise is 1.2
-                times that of K.
+                times that of K. (Where the second moment of B is not that of kernel and cells, as
+                both hold few cells, the difference K L - B K L is scaled by their ratio.)
         """
         key = photons, corrected
         if key not in self._known:
             radii = self.radii(photons)
             matrix = kernel_matrix(self.cells, radii)
-            blur = self._blur(radii)
-            twice = self._twice(blur) if corrected else None
-            self._known = {key: Smoothing(matrix, blur, twice)}
+            blur = kernel_matrix(self.cells, np.sqrt(radii**2 + CELL_BLUR * self._size**2))
+            wanted = self._second_moment(matrix) + CELL_BLUR * self._size**2 / 3
+            strength = wanted / np.maximum(self._second_moment(blur), 1e-30)
+            twice = self._twice(blur, strength) if corrected else None
+            self._known = {key: Smoothing(matrix, blur, strength, twice)}
         return self._known[key]
 
-    def _twice(self, blur: csr_matrix) -> csr_matrix:
-        near = diags(self.near.astype(np.float64))
-        again = near @ blur @ diags(self.cells.areas)
-        return (identity(self.cells.cells) + near - again).tocsr()
+    def _twice(self, blur: csr_matrix, strength: FloatArray) -> csr_matrix:
+        scale = diags(np.where(self.near, strength, 0.0))
+        return (identity(self.cells.cells) + scale - scale @ blur @ diags(self.cells.areas)).tocsr()
 
-    def _blur(self, radii: FloatArray) -> csr_matrix:
-        return kernel_matrix(self.cells, np.sqrt(radii**2 + CELL_BLUR * self._size**2))
+    def _second_moment(self, kernel: csr_matrix) -> FloatArray:
+        """Return the mean squared distance (cells,), mm^2, over which a kernel spreads light. That
+        of Epanechnikov's kernel is a third of its squared radius if it holds many cells.
+        """
+        centres, areas = self.cells.centres - self.cells.centres.mean(axis=0), self.cells.areas
+        means = kernel @ (centres * areas[:, None])
+        squares = kernel @ ((centres**2).sum(axis=1) * areas)
+        cross = 2 * np.einsum("ij,ij->i", means, centres)
+        return np.asarray(squares - cross + (centres**2).sum(axis=1))
 
     def sharpening(self, landed: FloatArray, photons: int) -> FloatArray:
         """Return factors (cells, groups) that undo most of the blur of the kernel and the cells.
@@ -168,8 +180,9 @@ class Kernels:
         smooth = kernel.kernel @ landed
         again = kernel.blur @ (smooth * self.cells.areas[:, None])
         sharpened = (again > 0) & self.near[:, None]
-        factor = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened)
-        return np.clip(factor, 1 - MAX_SHARPENING, 1 + MAX_SHARPENING)
+        change = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened) - 1
+        change *= kernel.strength[:, None]
+        return 1 + np.clip(change, -MAX_SHARPENING, MAX_SHARPENING)
 
 
 def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> FloatArray:
