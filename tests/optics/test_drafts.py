@@ -196,6 +196,19 @@ def test_the_flat_side_of_a_bent_gel_has_few_triangles(mini: SensorDesign) -> No
     assert area == pytest.approx(sides[0] * sides[1])
 
 
+def test_what_a_bent_skin_lies_on_has_the_optical_data_of_media_resolved_anew() -> None:
+    digit = ots.load("digit")
+    drafts = DraftModel(digit)
+    bent = ots.set_value(digit, "cages.skin.points[14].z", digit.cages["skin"].points[14].z + 0.2)
+    drafts.set_design(bent)
+    assert drafts.scenes.assembly.media.bent
+    anew = OpticalModel(bent)
+    moved, own = (model.scenes.assembly for model in (drafts, anew))
+    assert [piece.name for piece in moved.pieces] == [piece.name for piece in own.pieces]
+    assert [piece.surface for piece in moved.pieces] == [piece.surface for piece in own.pieces]
+    assert (moved.ior_before, moved.absorption_before) == (own.ior_before, own.absorption_before)
+
+
 def test_bent_media_are_resolved_when_the_draft_is_asked_for_again(
     draft: DraftModel, mini: SensorDesign
 ) -> None:

@@ -86,6 +86,9 @@ class Bending:
         for face in self._faces:
             places = []
             for name in face.names:
+                if new[name].mesh is self._solids[name].mesh:
+                    places.append(face.mesh.vertices)
+                    continue
                 anchors, found = self._anchors(face.mesh, name)
                 if not found.all():
                     return None
