@@ -27,10 +27,8 @@ picture contains too few independent errors of a larger extent to tell it, and w
 model that is wrong everywhere would not be fitted to the background at all.
 """
 
-LEAST_ERROR = 1.0
-"""Smallest error by which residuals are divided, in levels: the noise of a photograph that is
-averaged to half its width.
-"""
+PHOTOGRAPH_NOISE = 1.0
+"""Expected noise of a photograph that is averaged to half its width, levels."""
 
 TO_DEVIATION = 1.4826
 """Ratio of the standard deviation of a normal distribution to the median of its absolute values,
@@ -48,10 +46,10 @@ change by less than a fifth, and another descent hardly changes the fit."""
 
 @dataclass(frozen=True)
 class ErrorScale:
-    """Errors of a set of pictures.
+    """Errors of a set of pictures, relative to those that are expected from noise.
 
     Attributes:
-        size: robust estimate of their standard deviation, levels.
+        size: robust estimate of their standard deviation, at least 1.
         pixels: number of pixels for which there is one independent error.
     """
 
@@ -108,13 +106,13 @@ def error_scale(
     """Return the scale of errors, unaffected by dust.
 
     Args:
-        errors: errors (h, w, 3) of each picture, levels.
+        errors: errors (h, w, 3) of each picture, relative to the expected ones.
         masks: pixels (h, w) of each picture that count.
         limit: largest error, in standard deviations, in the estimate of their correlation.
         pixels: number of pixels for which there is one independent error; estimated if None.
     """
     inside = np.concatenate([error[mask] for error, mask in zip(errors, masks, strict=True)])
-    size = max(TO_DEVIATION * float(np.median(np.abs(inside))), LEAST_ERROR)
+    size = max(TO_DEVIATION * float(np.median(np.abs(inside))), 1.0)
     if pixels is None:
         limited = [np.clip(error, -limit * size, limit * size) for error in errors]
         pixels = max(correlated_pixels(limited, masks), LEAST_PIXELS)

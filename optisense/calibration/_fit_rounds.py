@@ -17,7 +17,7 @@ from optisense.calibration._contact_placing import (
 )
 from optisense.calibration._covered_view import CoveredView
 from optisense.calibration._gauss_newton import LayeredFit, RoughFit
-from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
+from optisense.calibration._layered_pictures import LayeredPictures, averaged, layered_pictures
 from optisense.calibration._solution import Solution
 from optisense.calibration._view_slopes import view_changes, with_view
 from optisense.calibration.kept_renderings import KeptRenderings
@@ -61,6 +61,9 @@ ROUGH_SHARE, ROUGH_PIXELS = 0.5, 36.0
 of each picture. The errors of the start extend over the whole picture: weights estimated from them
 would neglect the background, and its errors would remain.
 """
+
+AGAIN = 1000
+"""Number added to a seed for a second rendering, with other noise; above the number of rounds."""
 
 OUTLYING = 1.7
 """Ratio of a press's error to the median from which on it is named as an outlier."""
@@ -108,7 +111,8 @@ class FitRounds:
 
         Difference quotients of two renderings are taken in the first round only; later rounds start
         from new renderings, and their corrections are small. Those of the camera's view cost no
-        rendering, and each round has its own.
+        rendering, and each round has its own. Rounds that are not rough render everything twice, to
+        know the noise of the light.
         """
         steps = np.zeros(len(self._chosen))
         small = self._small.subset(self._used)
@@ -116,15 +120,18 @@ class FitRounds:
         slopes: dict[int, list[NDArray[np.float32]]] = {}
         for number in range(self._settings.rounds):
             seen = [self._seen[index] for index in self._used]
+            rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
             self.report_step("rendering")
-            layers = self._layers(small, seen, steps, number)
+            layers, noise = self._layers(small, seen, steps, number), None
+            if not rough:
+                again = self._layers(small, seen, steps, number, layers, AGAIN)
+                layers, noise = averaged(layers, again)
             if number == 0:
                 total = layers.background.sum(axis=0)
                 self.exposure = matched_exposure(total, layers.chain, small.background)
                 slopes = self._slopes(small, seen, steps, layers)
             self.report_step("fitting")
-            rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
-            found = self._solution(small, seen, layers, steps, slopes, rough)
+            found = self._solution(small, seen, layers, steps, slopes, noise)
             if number:
                 found = found.with_changes(found.steps - steps)
             solution, steps = found, found.steps
@@ -140,17 +147,23 @@ class FitRounds:
         layers: LayeredPictures,
         steps: FloatArray,
         slopes: dict[int, list[NDArray[np.float32]]],
-        rough: bool,
+        noise: LayeredPictures | None,
     ) -> Solution:
         """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
         displaced to it and fitted again.
+
+        Args:
+            small, seen, layers, slopes: see `LayeredFit`.
+            steps: (n,) start of the fit.
+            noise: sample of the noise of the layers; None in a rough round.
         """
+        rough = noise is None
         views = [number for number in self._rendering if self._chosen[number].views]
         contacts = np.zeros((len(seen), 3))
         if not views:
             fit = LayeredFit(
                 small, seen, layers, self._chosen, self.exposure, steps, slopes,
-                RoughFit(ROUGH_PIXELS) if rough else None,
+                RoughFit(ROUGH_PIXELS) if rough else None, noise,
             )  # fmt: skip
             return fit.solve(steps, contacts)
         rendered = self._view(small, steps)
@@ -159,7 +172,7 @@ class FitRounds:
             every = slopes | self._view_slopes(small, seen, start, shown, view)
             fit = LayeredFit(
                 small, seen, shown, self._chosen, self.exposure, start, every,
-                RoughFit(ROUGH_PIXELS, blur) if rough else None,
+                RoughFit(ROUGH_PIXELS, blur) if rough else None, noise,
             )  # fmt: skip
             found = fit.solve(steps, contacts)
             steps, contacts = found.steps, found.contacts
@@ -208,15 +221,23 @@ class FitRounds:
         steps: FloatArray,
         number: int,
         contacts: LayeredPictures | None = None,
+        more: int = 0,
     ) -> LayeredPictures:
         """Return layers of a round, with light of its own noise, at the current values of numbers
         that need a rendering; all others are those of the design.
+
+        Args:
+            small, seen: see `layered_pictures`.
+            steps: (n,) current values.
+            number: number of the round.
+            contacts: layers whose contacts are pressed in.
+            more: number that is added to the seed.
         """
         moved = [self._chosen[number] for number in self._rendering]
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
         return layered_pictures(
             self._model, small, seen, self._settings.photons_of(number),
-            self._settings.seed + number,
+            self._settings.seed + number + more,
             None if contacts is None else contacts.contacts, self._kept,
         )  # fmt: skip
 

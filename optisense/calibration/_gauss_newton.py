@@ -1,15 +1,18 @@
 """Fit of a layered model to photographs by damped Gauss-Newton steps.
 
-The residuals are those of the background, divided by its usual error, and of each press's response
-near its contact, divided by the usual error of all responses. Each set counts as many times as it
-contains independent errors. Both are estimated anew before each descent. So the background, whose
-errors are larger and smoother, does not outweigh the contacts. Priors of the plausible ranges are
-added. Huber's weights limit the influence of dust and scratches.
+The residuals are those of the background and of each press's response near its contact. Each is
+divided by the error that is expected at its pixel from the noise of the photographs and of the
+model's light, and by the usual ratio of the errors of its set, background or responses, to the
+expected ones. Each set counts as many times as it contains independent errors. All these are
+estimated anew before each descent. So the background, whose errors are larger and smoother, does
+not outweigh the contacts, and neither do dark places, where a tone curve amplifies the noise of the
+light. Priors of the plausible ranges are added. Huber's weights limit the influence of dust and
+scratches.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
-from optisense.calibration._correlated_errors import ErrorScale, error_scale
+from optisense.calibration._correlated_errors import PHOTOGRAPH_NOISE, ErrorScale, error_scale
 from optisense.calibration._far_field import without_drift
 from optisense.calibration._layered_pictures import LayeredPictures, contact_slopes
-from optisense.calibration._solution import Solution
+from optisense.calibration._solution import Solution, jackknife_covariance
 from optisense.calibration.model_pictures import levels_of
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.quantities import chain_with, power_factors
@@ -54,11 +57,17 @@ CONTACT_SPREAD = (2.0, 2.0, 0.1)
 of its radius: the errors of hand labels.
 """
 
-TILE = 2.0
-"""Side of tiles, relative to the side of the square that contains one independent error, whose
-errors are regarded as independent of each other in the estimate of uncertainties. Errors at one
-place of all pictures are not: those of the light are the same in all, and those of the background
-are in each response.
+BLOCKS = 4
+"""Number of square blocks across a picture whose errors are regarded as independent of each other
+in the estimate of uncertainties: with smaller blocks, over which the errors of the light are
+correlated, hidden numbers of simulated photographs are up to twice as many standard deviations
+off. Errors at one place of all pictures are not regarded as independent: those of the light are the
+same in all, and those of the background are in each response.
+"""
+
+NOISE_EXTENT = 6.0
+"""Standard deviation, pixels, of the neighbourhood over which squares of the noise of the light are
+averaged: there is only one sample of it, and shadows, where it changes, are about as wide.
 """
 
 MOST_STEPS = 20
@@ -80,8 +89,29 @@ TRUST = 2.5
 ranges; the next round renders them anew.
 """
 
-Scales = tuple[ErrorScale, ErrorScale]
-"""Errors of the background and of the responses."""
+
+@dataclass(frozen=True)
+class Scales:
+    """Sizes of the errors.
+
+    Attributes:
+        expected: errors (h, w, 3) of the background and of each response that are expected from
+            noise, levels.
+        ground, pressed: ratio of the errors of the background and of the responses to the expected
+            ones, and the extent over which they are correlated.
+    """
+
+    expected: list[FloatArray]
+    ground: ErrorScale
+    pressed: ErrorScale
+
+    def of(self, index: int) -> ErrorScale:
+        """Return the scale of the background (index -1) or of a press."""
+        return self.ground if index < 0 else self.pressed
+
+    def like(self, other: Scales) -> bool:
+        """Return whether the scales are close to others."""
+        return self.ground.like(other.ground) and self.pressed.like(other.pressed)
 
 
 @dataclass(frozen=True)
@@ -112,6 +142,7 @@ class LayeredFit:
         start: FloatArray,
         slopes: dict[int, list[NDArray[np.float32]]],
         rough: RoughFit | None = None,
+        noise: LayeredPictures | None = None,
     ) -> None:
         """Prepare a round.
 
@@ -125,7 +156,10 @@ class LayeredFit:
             slopes: slopes of quantities that need a rendering, by index: changes of the layers of
                 the background and of each press per plausible range.
             rough: how pictures are compared in a rough round; None in the others.
+            noise: errors of the layers by the noise of the light, a sample of them; None if they
+                are not known.
         """
+        self._noise = noise
         self._pixels = None if rough is None else rough.pixels
         self._blur = 0.0 if rough is None else rough.blur
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
@@ -164,10 +198,16 @@ class LayeredFit:
             self._shown(index, steps, contacts[index]) for index in range(len(self._masks))
         ]
 
-    def _shown(self, index: int, steps: FloatArray, contact: FloatArray | None) -> FloatArray:
-        """Return the levels of a press, or of the background (index -1)."""
-        layers = self._layers.background if index < 0 else self._layers.presses[index]
-        moved = layers
+    def _shown(
+        self,
+        index: int,
+        steps: FloatArray,
+        contact: FloatArray | None,
+        noise: LayeredPictures | None = None,
+    ) -> FloatArray:
+        """Return the levels of a press, or of the background (index -1), with added noise."""
+        layers = _picture(self._layers, index)
+        moved = layers if noise is None else layers + _picture(noise, index)
         for number, slopes in self._slopes.items():
             off = float(np.clip(steps[number] - self._start[number], -TRUST, TRUST))
             if off:
@@ -204,15 +244,9 @@ class LayeredFit:
         for _ in range(MOST_DESCENTS):
             steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
             # The errors are smaller now, and so are the scales of the residuals.
-            if all(
-                now.like(used) for now, used in zip(self._scales(pictures), scales, strict=True)
-            ):
+            if self._scales(pictures, steps, contacts).like(scales):
                 break
-        matrix, _, tiles = self._normal(pictures, steps, contacts, scales)
-        inverse = np.linalg.inv(matrix)
-        # The first term comes from noise and priors, the second from errors correlated within
-        # tiles.
-        spread = np.asarray(inverse + inverse @ tiles @ inverse, dtype=np.float64)
+        spread = self._covariance(pictures, steps, contacts, scales)
         return Solution(
             steps,
             contacts,
@@ -228,12 +262,12 @@ class LayeredFit:
         cost.
         """
         pictures = self.pictures(steps, contacts)
-        scales = self._scales(pictures)
+        scales = self._scales(pictures, steps, contacts)
         cost = self._cost(pictures, steps, contacts, scales)
         damping = 1e-3
         for _ in range(MOST_STEPS):
             progress()
-            matrix, gradient, _ = self._normal(pictures, steps, contacts, scales)
+            matrix, gradient = self._normal(pictures, steps, contacts, scales)
             fell = False
             free = self._free(steps, gradient)
             for _ in range(6):
@@ -264,6 +298,26 @@ class LayeredFit:
         stuck = (steps <= self._low) & (slope > 0.0) | (steps >= self._high) & (slope < 0.0)
         return np.concatenate([~stuck, np.ones(len(gradient) - self.count, dtype=bool)])
 
+    def _expected(
+        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
+    ) -> list[FloatArray]:
+        """Return the expected errors (h, w, 3) of the background and of the responses, in levels.
+
+        They come from the noise of the photographs and of the light.
+        """
+        noise = [np.zeros_like(shown) for shown in pictures]
+        if self._noise is not None:
+            for index, shown in enumerate(pictures[1:]):
+                noise[index + 1] = self._shown(index, steps, contacts[index], self._noise) - shown
+            noise[0] = self._shown(-1, steps, None, self._noise) - pictures[0]
+            noise[1:] = [each - noise[0] for each in noise[1:]]
+        return [
+            np.sqrt(
+                PHOTOGRAPH_NOISE**2 + gaussian_filter(each**2, (NOISE_EXTENT, NOISE_EXTENT, 0.0))
+            )
+            for each in noise
+        ]
+
     def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:
         ground = float(np.sqrt(((pictures[0] - self._real) ** 2).mean()))
         pressed = self._press_errors(pictures)
@@ -279,15 +333,19 @@ class LayeredFit:
             ]
         )
 
-    def _scales(self, pictures: list[FloatArray]) -> Scales:
-        """Return the errors of the background and of responses, unaffected by dust."""
-        ground = pictures[0] - self._real
+    def _scales(
+        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
+    ) -> Scales:
+        """Return the sizes of the errors, unaffected by dust."""
+        expected = self._expected(pictures, steps, contacts)
+        ground = (pictures[0] - self._real) / expected[0]
         pressed = [
-            shown - pictures[0] - real
-            for shown, real in zip(pictures[1:], self._responses, strict=True)
+            (shown - pictures[0] - real) / own
+            for shown, real, own in zip(pictures[1:], self._responses, expected[1:], strict=True)
         ]
         everywhere = np.ones(ground.shape[:2], dtype=bool)
-        return (
+        return Scales(
+            expected,
             error_scale([ground], [everywhere], HUBER, self._pixels),
             error_scale(pressed, self._masks, HUBER, self._pixels),
         )
@@ -296,10 +354,12 @@ class LayeredFit:
         """Return the residuals (k, 3) of the background (index -1), or of a press's pixels near its
         contact.
         """
+        size = scales.of(index).size * scales.expected[index + 1]
         if index < 0:
-            return ((pictures[0] - self._real) / scales[0].size).reshape(-1, 3)
+            return np.asarray(((pictures[0] - self._real) / size).reshape(-1, 3))
         error = pictures[index + 1] - pictures[0] - self._responses[index]
-        return np.asarray(error[self._masks[index]] / scales[1].size)
+        mask = self._masks[index]
+        return np.asarray(error[mask] / size[mask])
 
     def _cost(
         self,
@@ -312,7 +372,7 @@ class LayeredFit:
         for index in range(-1, len(self._masks)):
             size = np.abs(self._residuals(pictures, index, scales))
             loss = np.where(size < HUBER, size**2, HUBER * (2.0 * size - HUBER))
-            total += float(loss.sum()) / scales[min(index + 1, 1)].pixels
+            total += float(loss.sum()) / scales.of(index).pixels
         return total
 
     def _normal(
@@ -321,48 +381,75 @@ class LayeredFit:
         steps: FloatArray,
         contacts: FloatArray,
         scales: Scales,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return matrix and gradient of the normal equations, and the covariance of the tiles'
-        gradients.
-        """
-        n, count = self.count, len(self._masks)
-        size = n + 3 * count
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return matrix and gradient of the normal equations."""
+        size = self.count + 3 * len(self._masks)
         matrix, gradient = np.zeros((size, size)), np.zeros(size)
-        tiles = self._tiles(scales)
-        sums = np.zeros((int(tiles.max()) + 1, size))
+        for unknowns, jacobian, weight, residual, _ in self._linear(
+            pictures, steps, contacts, scales
+        ):
+            flat = jacobian.reshape(-1, len(unknowns))
+            weighted = flat * weight.reshape(-1, 1)
+            matrix[np.ix_(unknowns, unknowns)] += weighted.T @ flat
+            gradient[unknowns] += weighted.T @ residual.ravel()
+        prior = np.concatenate([steps, (contacts / self._contact_spread).ravel()])
+        return matrix + np.eye(size), gradient + prior
+
+    def _linear(
+        self,
+        pictures: list[FloatArray],
+        steps: FloatArray,
+        contacts: FloatArray,
+        scales: Scales,
+    ) -> Iterator[tuple[list[int], FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]]:
+        """Yield the linear equations of the background and of each press.
+
+        They are: the indices of the n unknowns on which they depend, the derivatives (k, 3, n) of
+        the residuals, their weights (k, 3), the residuals (k, 3), and the mask (h, w) of the k
+        pixels.
+        """
+        n = self.count
+        masks = [np.ones(self._real.shape[:2], dtype=bool), *self._masks]
         moved = [self._moved(steps, contacts, k) for k in range(n)]
-        for index in range(-1, count):
+        for index in range(-1, len(self._masks)):
             residual = self._residuals(pictures, index, scales)
-            columns = list(range(n))
-            if not columns and index < 0:
+            unknowns = list(range(n))
+            if not unknowns and index < 0:
                 continue
             slopes = [(self._residuals(m, index, scales) - residual) / by for by, m in moved]
             if index >= 0:
-                columns += range(n + 3 * index, n + 3 * index + 3)
+                unknowns += range(n + 3 * index, n + 3 * index + 3)
                 slopes += [
                     (self._residuals(m, index, scales) - residual) / STEP
                     for m in self._contact_moved(pictures, steps, contacts, index)
                 ]
-            jacobian = np.stack(slopes, axis=-1)  # (k, 3, columns)
             weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
-            weight /= scales[min(index + 1, 1)].pixels
-            flat = jacobian.reshape(-1, len(columns))
-            weighted = flat * weight.reshape(-1, 1)
-            place = np.ix_(columns, columns)
-            matrix[place] += weighted.T @ flat
-            scores = (jacobian * (weight * residual)[..., None]).sum(axis=1)
-            gradient[columns] += scores.sum(axis=0)
-            where = tiles.ravel() if index < 0 else tiles[self._masks[index]]
-            np.add.at(sums, (where[:, None], np.array(columns)[None, :]), scores)
-        prior = np.concatenate([steps, (contacts / self._contact_spread).ravel()])
-        return matrix + np.eye(size), gradient + prior, sums.T @ sums
+            weight /= scales.of(index).pixels
+            yield unknowns, np.stack(slopes, axis=-1), weight, residual, masks[index + 1]
 
-    def _tiles(self, scales: Scales) -> NDArray[np.int64]:
-        """Return the number of the tile of each pixel, (h, w)."""
+    def _covariance(
+        self,
+        pictures: list[FloatArray],
+        steps: FloatArray,
+        contacts: FloatArray,
+        scales: Scales,
+    ) -> FloatArray:
+        """Return the covariance of the unknowns, from the errors of blocks of the pictures."""
         height, width = self._real.shape[:2]
-        side = round(TILE * np.sqrt(max(scale.pixels for scale in scales)))
-        rows, columns = np.mgrid[:height, :width] // side
-        return np.asarray(rows * (width // side + 1) + columns, dtype=np.int64)
+        rows, columns = (BLOCKS * np.mgrid[:height, :width] / width).astype(np.int64)
+        blocks = BLOCKS * rows + columns
+        count, size = int(blocks.max()) + 1, self.count + 3 * len(self._masks)
+        matrices, scores = np.zeros((count, size, size)), np.zeros((count, size))
+        for unknowns, jacobian, weight, residual, mask in self._linear(
+            pictures, steps, contacts, scales
+        ):
+            for block in np.unique(blocks[mask]):
+                own = blocks[mask] == block
+                flat = jacobian[own].reshape(-1, len(unknowns))
+                weighted = flat * weight[own].reshape(-1, 1)
+                matrices[block][np.ix_(unknowns, unknowns)] += weighted.T @ flat
+                scores[block, unknowns] += weighted.T @ residual[own].ravel()
+        return jackknife_covariance(matrices, scores)
 
     def _moved(
         self, steps: FloatArray, contacts: FloatArray, number: int
@@ -384,3 +471,8 @@ class LayeredFit:
             changed[index + 1] = self._shown(index, steps, other)
             found.append(changed)
         return found
+
+
+def _picture(layers: LayeredPictures, index: int) -> NDArray[np.float32]:
+    """Return the layers (groups, h, w, 3) of a press, or of the background (index -1)."""
+    return layers.background if index < 0 else layers.presses[index]

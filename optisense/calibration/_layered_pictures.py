@@ -10,7 +10,7 @@ slope of a ball's surface grows with the distance from its middle.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -109,6 +109,24 @@ def _rendered(
         pressed, resolution=size, photons=photons, seed=seed, partial=False, skin=ELASTIC
     )
     return {name: np.asarray(layer, dtype=np.float32) for name, layer in image.layers.items()}
+
+
+def averaged(
+    one: LayeredPictures, other: LayeredPictures
+) -> tuple[LayeredPictures, LayeredPictures]:
+    """Return the mean of two renderings with independent noise, and half of their difference, which
+    is a sample of the noise of the mean.
+    """
+    half = np.float32(0.5)
+    pairs = list(
+        zip((one.background, *one.presses), (other.background, *other.presses), strict=True)
+    )
+    mean = [half * (a + b) for a, b in pairs]
+    noise = [half * (a - b) for a, b in pairs]
+    return (
+        replace(one, background=mean[0], presses=tuple(mean[1:])),
+        replace(one, background=noise[0], presses=tuple(noise[1:])),
+    )
 
 
 def contact_slopes(layers: LayeredPictures, index: int, seen: SeenContact) -> FloatArray:

@@ -120,6 +120,7 @@ def print_calibration(found: Calibration) -> None:
             each.unit if each.determined else f"{each.unit} (not determined)".strip(),
         )
     output.print(table)
+    output.print("± is one standard deviation", style="dim")
     for one, other, value in found.alike:
         output.print(
             f"strongly correlated: {one}, and {other} (correlation {value:.2f})", style="dim"

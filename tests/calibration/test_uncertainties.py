@@ -1,0 +1,97 @@
+"""Stated uncertainties of fits, against the scatter of repeated fits and against hidden numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+import optisense as ots
+from optisense.calibration import Photographs
+from optisense.calibration._gauss_newton import LayeredFit
+from optisense.calibration._layered_pictures import (
+    LayeredPictures,
+    averaged,
+    layered_pictures,
+)
+from optisense.calibration._solution import jackknife_covariance
+from optisense.calibration.quantities import quantities_of
+from optisense.calibration.seen_contacts import seen_contacts
+from optisense.optics import OpticalModel
+
+CLUSTERS, ROWS, UNKNOWNS = 12, 200, 5
+"""Size of a linear fit: as many clusters as there are blocks in a picture of 4 to 3."""
+
+LIGHT_NOISE = 0.02
+"""Standard deviation of the noise of the light, as a share of it: that of some million photons."""
+
+
+def test_the_jackknife_states_the_scatter_of_fits_with_correlated_errors() -> None:
+    rng = np.random.default_rng(2)
+    slopes = 5.0 * rng.standard_normal((CLUSTERS, ROWS, UNKNOWNS))
+    slopes += 10.0 * rng.standard_normal((CLUSTERS, 1, UNKNOWNS))  # smooth, as of pictures
+    matrices = np.einsum("cri,crj->cij", slopes, slopes)
+    total = matrices.sum(axis=0) + np.eye(UNKNOWNS)
+    found, stated = [], []
+    for _ in range(400):
+        errors = rng.standard_normal((CLUSTERS, ROWS)) + rng.standard_normal((CLUSTERS, 1))
+        unknowns = np.linalg.solve(total, np.einsum("cri,cr->i", slopes, errors))
+        residuals = errors - slopes @ unknowns
+        scores = np.einsum("cri,cr->ci", slopes, residuals)
+        found.append(unknowns)
+        stated.append(np.diag(jackknife_covariance(matrices, scores)))
+    scatter = np.var(found, axis=0)
+    independent = 2.0 * np.diag(np.linalg.inv(total))  # as if each error were independent
+    assert (independent < 0.25 * scatter).all()
+    ratio = np.mean(stated, axis=0) / scatter
+    assert (ratio > 0.9).all(), ratio
+    assert (ratio < 1.8).all(), ratio  # the jackknife overestimates for few clusters
+
+
+def test_the_priors_are_the_uncertainty_without_information() -> None:
+    found = jackknife_covariance(np.zeros((3, 2, 2)), np.zeros((3, 2)))
+    assert found == pytest.approx(np.eye(2))
+
+
+def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
+    mini: OpticalModel, photographs: Photographs
+) -> None:
+    """The tone curve is steep in the dark, and makes errors of the light large there."""
+    seen = [place for place in seen_contacts(photographs) if place is not None]
+    layers = layered_pictures(mini, photographs, seen, 100_000, 5)
+    rng = np.random.default_rng(4)
+
+    def noisy() -> LayeredPictures:
+        shape = layers.background.shape
+        white = rng.standard_normal(shape)
+        smooth = gaussian_filter(white, (0.0, 4.0, 4.0, 0.0))
+        factor = (1.0 + LIGHT_NOISE * smooth / smooth.std()).astype(np.float32)
+        return replace(
+            layers,
+            background=factor * layers.background,
+            presses=tuple(factor * each for each in layers.presses),
+        )
+
+    chosen = quantities_of(ots.load("gelsight-mini-ideal"), ("colours", "tone", "black"))
+    truth = np.array([-0.8, 0.3, 1.0, -0.2, -0.8, 0.9, 0.4, 0.6, 0.4, 0.9])
+    still = np.zeros((len(seen), 3))
+    made = LayeredFit(photographs, seen, layers, chosen, 250.0, truth, {})
+    pictures = [np.round(levels).astype(np.uint8) for levels in made.pictures(truth, still)]
+    assert (pictures[0] < 60).mean() > 0.02  # some places are dark
+    presses = [
+        replace(press, picture=picture)
+        for press, picture in zip(photographs.presses, pictures[1:], strict=True)
+    ]
+    real = replace(photographs, background=pictures[0], presses=tuple(presses))
+    mean, noise = averaged(noisy(), noisy())
+    errors = []
+    for known in (None, noise):
+        fit = LayeredFit(real, seen, mean, chosen, 250.0, truth, {}, None, known)
+        found = fit.solve(truth, still)
+        errors.append(found.steps - truth)
+        deviations = np.sqrt(np.diag(found.covariance))
+    without, with_noise = (float(np.sqrt((error**2).mean())) for error in errors)
+    assert with_noise < 0.7 * without, (without, with_noise)
+    assert (np.abs(errors[1]) < 3.0 * deviations).all(), errors[1] / deviations
