@@ -57,7 +57,7 @@ MAX_SHARPENING = 0.25
 """Largest relative change of a cell's light by the sharpening. Kernels of `MAX_RADIUS_RATIO` need
 5 % (see `varies_over`); more is due to noise or to the edge of a shadow."""
 LEAST_SHARED_PRODUCT = 1e8
-"""Number of multiplications of a matrix product from which on threads share it: about 10 ms of one
+"""Number of multiplications of a matrix product from which on threads share it: about 30 ms of one
 processor, several times what it takes to start threads. A draft of GelSight Mini needs 8 million,
 which take 1 ms, or 5 ms with threads."""
 
