@@ -48,8 +48,13 @@ QUARTERS = 4
 """Number of sectors of azimuth, of 90 degrees each: GelSight Mini has a light on each side."""
 RING = 12
 """Width (pixels) of the ring of skin around the contact, beyond the rim."""
+CHANNELS = "red", "green", "blue"
+"""Names of the channels."""
 MARGIN = RING + 2
 """Width (pixels) of the margin around the contact in the reference: the ring and the rim."""
+
+SPECULARITIES = 0.0, 0.3, 0.6, 1.0
+"""Specularities of the coating, from diffuse to mirroring."""
 
 
 @dataclass(frozen=True)
@@ -103,23 +108,24 @@ class PatchCase:
 
 
 CASES = [
-    *(PatchCase("gelsight-mini-ideal", s, referee=Referee.PATH) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal", s, referee=Referee.PATH) for s in SPECULARITIES),
     *(PatchCase("gelsight-mini-ideal", s) for s in (0.0, 0.3, 0.6, 0.8, 1.0)),
-    *(PatchCase("gelsight-mini-ideal", s, place=0) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal", s, place=0) for s in SPECULARITIES),
     *(
         PatchCase("gelsight-mini-ideal-cylindrical", s, depth=0.3, batches=24, images=6)
-        for s in (0.0, 0.3, 0.6, 1.0)
+        for s in SPECULARITIES
     ),
-    *(PatchCase("gelsight-mini-ideal-spherical", s, batches=16) for s in (0.0, 0.3, 0.6, 1.0)),
-    *(PatchCase("gelbelt", s) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-mini-ideal-spherical", s, batches=16, images=4) for s in SPECULARITIES),
+    *(PatchCase("gelbelt", s, batches=16, images=4) for s in SPECULARITIES),
     *(PatchCase("gelbelt", s, place=0) for s in (0.0, 0.6)),
-    *(PatchCase("gelsight-svelte", s) for s in (0.0, 0.3, 0.6, 1.0)),
-    *(PatchCase("gelsight360", s) for s in (0.0, 0.3, 0.6, 1.0)),
+    *(PatchCase("gelsight-svelte", s) for s in SPECULARITIES),
+    *(PatchCase("gelsight360", s, images=4) for s in SPECULARITIES),
 ]
-"""Cases: flat and curved gels, the middle of the view and its corner (place 0), and coatings of a
-specularity (0 to 1) from diffuse to mirroring. The cylindrical gel is pressed by 0.3 mm, the depth
-of scores; reference and images need three times as many photons, as its contact is small and gets
-little red and blue light."""
+"""Cases: flat and curved gels, the middle of the view and its corner (place 0), and coatings from
+diffuse to mirroring. The cylindrical gel is pressed by 0.3 mm, the depth of scores. Its reference
+and images need three times as many photons as others, as its contact is small and gets little red
+and blue light. Those of the spherical gel and GelBelt need twice as many photons, and GelSight360
+twice as many images."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +186,8 @@ def compare(
         both subtracted in quadrature. limit: upper limit of this error, two standard errors of its
         square above it. worst: error of the worst patch. noise: RMS noise of the reference.
         image_noise: RMS noise of the mean of the images. red, green, blue: relative error of the
-        mean over all patches.
+        mean over all patches. red_noise, green_noise, blue_noise: standard error of this error,
+        from the noise of both.
     """
     (whole, noise), (mean, image_noise) = (
         _mean_and_variance(np.array([means(picture, patch) for picture in pictures]) / scale)
@@ -188,9 +195,17 @@ def compare(
     )
     off = mean - whole
     everywhere = truth.mean(axis=0)[patch >= 0].mean(axis=0)
-    ratio = images.mean(axis=0)[patch >= 0].mean(axis=0)
     # Some sensors have no light of a colour.
-    ratio = np.where(everywhere > 0, ratio / np.where(everywhere > 0, everywhere, 1.0) - 1, 0.0)
+    divisor = np.where(everywhere > 0, everywhere, 1.0)
+    ratio = np.where(
+        everywhere > 0, images.mean(axis=0)[patch >= 0].mean(axis=0) / divisor - 1, 0.0
+    )
+    ratio_noise = np.sqrt(
+        sum(
+            (pictures[:, patch >= 0].mean(axis=1) / divisor).var(axis=0, ddof=1) / len(pictures)
+            for pictures in (truth, images)
+        )
+    )
     noises = noise + image_noise
     square = max(float((off**2).mean() - noises.mean()), 0.0)
     # The square of a normally distributed value of mean x and variance v has the variance
@@ -202,7 +217,8 @@ def compare(
         "worst": float(off.ravel()[np.abs(off).argmax()]),
         "noise": float(np.sqrt(noise.mean())),
         "image_noise": float(np.sqrt(image_noise.mean())),
-        **dict(zip(("red", "green", "blue"), ratio.tolist(), strict=True)),
+        **dict(zip(CHANNELS, ratio.tolist(), strict=True)),
+        **dict(zip((f"{name}_noise" for name in CHANNELS), ratio_noise.tolist(), strict=True)),
     }
     return {key: round(value, 5) for key, value in found.items()}
 
@@ -262,7 +278,8 @@ def table(found: dict[str, Any]) -> str:
         f"are {TILTS} bands of tilt times {QUARTERS} quarters of azimuth in the contact, and "
         "quarters of the skin around it and of the row of pixels between both. The noise of the "
         "images is that of their mean; where it is not given, it is not subtracted. The last three "
-        "columns are the errors of the means of the channels. Rows by `sppm` are earlier "
+        "columns are the errors of the means of the channels and their standard errors, which "
+        "earlier measurements lack. Rows by `sppm` are earlier "
         "measurements against progressive photon mapping with a gather radius of 0.08 mm, which is "
         "2 to 3 % too dark in the row of pixels between contact and skin.", "",
         "| sensor, specularity, place, depth | effort | images | region | RMS | limit | noise of "
@@ -276,7 +293,7 @@ def table(found: dict[str, Any]) -> str:
                 f"{100 * of[key]:.1f}" if key in of else ""
                 for key in ("rms", "limit", "noise", "image_noise")
             ]
-            numbers += [f"{100 * of[key]:+.1f}" for key in ("red", "green", "blue")]
+            numbers += [_with_error(of, key) for key in CHANNELS]
             effort = f"{row['effort']:g} | {row['images']}"
             lines.append(f"| {name} | {effort} | {where} | " + " | ".join(numbers) + " |")
     measured = {name.rsplit(",", 1)[0] for name in found}
@@ -284,6 +301,13 @@ def table(found: dict[str, Any]) -> str:
     if missing:
         lines += ["", "Not measured:", "", *(f"- {name}" for name in sorted(missing))]
     return "\n".join(lines) + "\n"
+
+
+def _with_error(row: dict[str, float], channel: str) -> str:
+    """Return the error of the mean of a channel, per cent, with its standard error if known."""
+    error = f"{100 * row[channel]:+.1f}"
+    noise = row.get(f"{channel}_noise")
+    return error if noise is None else f"{error} ± {100 * noise:.1f}"
 
 
 if __name__ == "__main__":
