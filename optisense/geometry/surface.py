@@ -22,6 +22,19 @@ KEPT_POINTS = 256
 several times, and the walk to it takes some milliseconds on a curved surface."""
 
 
+WALL_ANGLE = 60.0
+"""Angle (degrees) between the normal at the origin and those of the wall of a fingertip. It is well
+above the 40 degrees of a spherical pad, and below the 90 degrees of a finger's wall."""
+
+WALL_SHARE = 0.5
+"""Share of the area from which on a wall makes the surface that of a fingertip. The sides of a flat
+pad have less."""
+
+WALL_SECTORS = 8
+"""Number of sectors of azimuth that must all contain a wall. A cylindrical skin has walls in two
+opposite directions only."""
+
+
 class SurfacePoint(NamedTuple):
     """A place on the sensing surface.
 
@@ -73,6 +86,10 @@ class SensingSurface:
         are therefore similar all over a dome, except where the surface has turned by 180 degrees.
         Projections of `u_axis` would change their sign where the surface faces its direction.
 
+        On a fingertip, whose wall surrounds its axis, the first tangent is that of the meridian
+        instead, away from the tip: what surrounds the wall, such as rows of lights, then has the
+        same direction all around. The frame of the origin is used at the tip itself only.
+
         Args:
             inward: (..., 3) unit normals into the gel.
         """
@@ -80,7 +97,22 @@ class SensingSurface:
         halfway = normals + self._inward
         cosine = np.maximum(1.0 + normals @ self._inward, 1e-12)
         first = self.u_axis - ((normals @ self.u_axis) / cosine)[..., None] * halfway
+        if self._has_wall:
+            meridian = self._inward - (normals @ self._inward)[..., None] * normals
+            length = np.linalg.norm(meridian, axis=-1, keepdims=True)
+            first = np.where(length > 1e-6, meridian / np.maximum(length, 1e-6), first)
         return first, np.cross(first, normals)
+
+    @cached_property
+    def _has_wall(self) -> bool:
+        """Whether a wall surrounds the axis, which is the normal at the origin."""
+        normals, areas = self.mesh.face_normals, self.mesh.face_areas
+        is_wall = normals @ self._inward < np.cos(np.radians(WALL_ANGLE))
+        if areas[is_wall].sum() < WALL_SHARE * areas.sum():
+            return False
+        azimuth = np.arctan2(normals[is_wall] @ self.v_axis, normals[is_wall] @ self.u_axis)
+        sectors = np.floor((azimuth / (2.0 * np.pi) + 0.5) * WALL_SECTORS).astype(int)
+        return len(np.unique(sectors % WALL_SECTORS)) == WALL_SECTORS
 
     def point_at(self, u: float, v: float) -> SurfacePoint:
         """Return the place with surface coordinates (u, v), mm.

@@ -68,6 +68,25 @@ def test_tangents_turn_with_the_surface_without_a_jump_on_a_dome() -> None:
         assert np.linalg.norm(step, axis=-1).max() < 0.05
 
 
+def test_tangents_on_a_fingertip_follow_its_meridians() -> None:
+    """A dome of radius 5 mm on a round wall; at the wall, they point along the axis."""
+    mesh = TriangleMesh.grid((24.0, 24.0), (80, 80)).flipped()
+    distance = np.maximum(np.hypot(*mesh.vertices[:, :2].T), 1e-9)
+    polar = np.minimum(distance / 5.0, math.pi / 2)
+    across = 5.0 * np.sin(polar) / distance
+    down = 5.0 * (np.cos(polar) - 1.0) - np.maximum(distance - 5.0 * math.pi / 2, 0.0)
+    vertices = np.column_stack([mesh.vertices[:, :2] * across[:, None], down])
+    surface = SensingSurface(TriangleMesh(vertices, mesh.faces), (0, 0, 1), (1, 0, 0), (0, 1, 0))
+    azimuth = np.linspace(0.0, 6.0, 20)
+    for polar in (1.0, math.pi / 2):
+        out = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=-1)
+        normals = np.column_stack([-np.sin(polar) * out, np.full(20, -np.cos(polar))])
+        first, second = surface.tangents(normals)
+        meridian = np.column_stack([np.cos(polar) * out, np.full(20, -np.sin(polar))])
+        np.testing.assert_allclose(first, meridian, atol=0.06)
+        np.testing.assert_allclose(np.cross(normals, first), -second, atol=1e-9)
+
+
 def test_tangents_of_a_flat_surface_are_its_axes() -> None:
     mesh = TriangleMesh.grid((20.0, 16.0), (7, 6), height=0.3).flipped()
     surface = SensingSurface(mesh, (1, 2, 5), (1, 0, 0.2), (0.3, 1, 0))
