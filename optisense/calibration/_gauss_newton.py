@@ -43,14 +43,16 @@ HUBER = 2.0
 (Huber 1964): 5 % of normally distributed residuals are larger.
 """
 
-LEVELS = 2.0, 253.0
-"""Smallest and largest level that is compared; beyond, pictures are clipped and noise is cut off,
-so that they do not show how dark or bright it is.
+LEVELS = 12.0, 253.0
+"""Smallest and largest level that is compared. Above, pictures are clipped. Below, a usual tone
+curve is ten times as steep as in the middle of its range, so that the noise of the light outweighs
+everything else, and cuts off negative light.
 """
 
-STEP = 0.02
-"""Step of a number's difference quotient, in plausible ranges: small enough for pictures to change
-linearly, and, as they are not rounded, far above the rounding of their levels."""
+STEP = 0.002
+"""Step of a number's difference quotient, in plausible ranges: far above the rounding of pictures,
+which are not rounded to levels, and small enough for the levels of dark places to change linearly.
+With ten times this step, fits to dark pictures stop before the minimum."""
 
 CONTACT_SPREAD = (2.0, 2.0, 0.1)
 """Plausible ranges of a contact's column and row, in pixels at a width of 320, and of the logarithm

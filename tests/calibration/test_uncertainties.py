@@ -87,9 +87,10 @@ def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
     real = replace(photographs, background=pictures[0], presses=tuple(presses))
     mean, noise = averaged(noisy(), noisy())
     errors = []
+    start = truth + 0.15 * rng.standard_normal(len(truth))
     for known in (None, noise):
-        fit = LayeredFit(real, seen, mean, chosen, 250.0, truth, {}, None, known)
-        found = fit.solve(truth, still)
+        fit = LayeredFit(real, seen, mean, chosen, 250.0, start, {}, None, known)
+        found = fit.solve(start, still)
         errors.append(found.steps - truth)
         deviations = np.sqrt(np.diag(found.covariance))
     without, with_noise = (float(np.sqrt((error**2).mean())) for error in errors)
