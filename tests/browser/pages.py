@@ -140,7 +140,7 @@ def verified() -> Verification:
     angles = np.full((60, 80), np.nan, np.float32)
     angles[20:30, 30:45] = 12.0
     seen = PressPictures(np.full((60, 80, 3), 90, np.uint8), normals, normals, angles)
-    view = SensorView(coverage=0.5, detail=0.06, stretching=1.02)
+    view = SensorView(coverage=0.5, area=200.0, detail=0.06, stretching=1.02)
     return Verification(
         names=(EVIL, EVIL),
         settings=VerificationSettings(names, places=2, readers=1),

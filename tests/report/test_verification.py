@@ -35,7 +35,7 @@ def pictures() -> PressPictures:
 def found() -> Verification:
     settings = VerificationSettings(NAMES, places=2, readers=1)
     before = np.random.default_rng(0).uniform(8.0, 16.0, (len(NAMES), 2, 1))
-    view = SensorView(coverage=0.5, detail=0.06, stretching=1.02)
+    view = SensorView(coverage=0.5, area=200.0, detail=0.06, stretching=1.02)
     return Verification(
         names=("the start", "trial 7"),
         settings=settings,
@@ -79,6 +79,19 @@ def test_notes_are_told(found: Verification) -> None:
     assert "notice" not in re.sub(
         r"<style>.*?</style>", "", render_verification(found, AXES), flags=re.S
     )
+
+
+def test_few_balls_for_a_large_skin_are_told_where_a_verdict_lacks(found: Verification) -> None:
+    """The noise of the second sensor's errors hides the difference; there are 40 balls."""
+    noise = np.random.default_rng(1).normal(0.0, 4.0, found.normals[0].shape)
+    unclear = replace(found, normals=(found.normals[0], found.normals[0] + noise))
+    assert unclear.verdict == "inconclusive"
+    assert not unclear.notes()
+    large = tuple(replace(view, area=2000.0) for view in found.views)
+    (note,) = replace(unclear, views=large).notes()
+    assert "50 mm^2" in note
+    assert "--presses 100" in note
+    assert not replace(found, views=large).notes()
 
 
 def test_the_figure_marks_the_mean_change(found: Verification) -> None:
