@@ -10,7 +10,14 @@
 from optisense.search._run_search import run_study, search
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
-from optisense.search.space.parameters import Around, CagePoints, Choice, Continuous, Integer
+from optisense.search.space.parameters import (
+    Around,
+    CagePoints,
+    Choice,
+    Continuous,
+    Integer,
+    Together,
+)
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchProgress, SearchResult
@@ -31,6 +38,7 @@ __all__ = [
     "SearchResult",
     "SearchSpace",
     "Study",
+    "Together",
     "ToleranceDistribution",
     "Trial",
     "run_study",

@@ -9,7 +9,15 @@ from optisense import library, sensors
 from optisense.design import Role, SensorDesign, add_cage, get_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError, OptiSenseError, SearchError
-from optisense.search import Around, CagePoints, Choice, Integer, SearchSpace
+from optisense.search import (
+    Around,
+    CagePoints,
+    Choice,
+    Continuous,
+    Integer,
+    SearchSpace,
+    Together,
+)
 from optisense.search.space._expansion import expand
 from optisense.search.space.search_space import BoundSpace
 
@@ -179,6 +187,51 @@ class TestPoses:
         with pytest.raises(SearchError, match="moved by the cage 'M1'") as told:
             SearchSpace({"parts.M1.shift.x": (-1.0, 1.0)}).bind(svelte)
         assert told.value.hint == "Vary cages.M1.points"
+
+
+class TestTogether:
+    def test_one_number_sets_or_moves_all_groups(self, mini: SensorDesign) -> None:
+        space = SearchSpace(
+            {
+                "lights.*.flux": Together(Continuous(1.0, 9.0)),
+                "lights.*.shift.z": Together(Around(0.2)),
+                "lights.*.colour": Together(Choice(["R", "G"])),
+            }
+        ).bind(mini)
+        assert space.names == ["lights.*.flux", "lights.*.shift.z", "lights.*.colour"]
+        assert space.start[0] == next(iter(mini.lights.values())).flux
+        design = space.apply([5.0, -0.1, 1.0])
+        assert {group.flux for group in design.lights.values()} == {5.0}
+        assert {tuple(group.colour) for group in design.lights.values()} == {(0.0, 1.0, 0.0)}
+        for name, group in mini.lights.items():
+            for before, after in zip(group.lights, design.lights[name].lights, strict=True):
+                moved = np.subtract(after.position, before.position)
+                np.testing.assert_allclose(moved, [0.0, 0.0, -0.1], atol=1e-9)
+
+    def test_it_is_kept_with_a_study(self) -> None:
+        space = SearchSpace({"lights.*.flux": Together(Continuous(1.0, 9.0, 3))})
+        assert SearchSpace.from_plain(space.to_plain()).parameters == space.parameters
+
+    @pytest.mark.parametrize(
+        ("path", "spec", "said"),
+        [
+            ("lights.red.flux", Continuous(1.0, 2.0), "path with a"),
+            ("cages.*.points", Around(1.0), "one by one|no name like"),
+            ("lights.*.model", Choice(["smd-3528", "ws2812b"]), "can't be varied together"),
+        ],
+    )
+    def test_what_can_not_vary_together(
+        self, mini: SensorDesign, path: str, spec: Continuous | Around | Choice, said: str
+    ) -> None:
+        with pytest.raises(SearchError, match=said):
+            SearchSpace({path: Together(spec)}).bind(mini)
+
+    def test_no_value_is_set_twice(self, mini: SensorDesign) -> None:
+        space = SearchSpace(
+            {"lights.*.shift.z": Together(Around(0.2)), "lights.red.shift.z": Around(0.1)}
+        )
+        with pytest.raises(SearchError, match="varied twice"):
+            space.bind(mini)
 
 
 class TestChoices:

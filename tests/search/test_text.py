@@ -5,7 +5,14 @@ from __future__ import annotations
 import pytest
 
 from optisense.errors import SearchError
-from optisense.search import Around, CagePoints, Choice, Continuous, ToleranceDistribution
+from optisense.search import (
+    Around,
+    CagePoints,
+    Choice,
+    Continuous,
+    Together,
+    ToleranceDistribution,
+)
 from optisense.search.space.text import parse_errors, parse_space, parse_vary
 
 
@@ -25,6 +32,8 @@ from optisense.search.space.text import parse_errors, parse_space, parse_vary
             "a.b=+-2/points=0,2,6-8/axes=xz",
             CagePoints(Around(2.0), points=(0, 2, 6, 7, 8), axes="xz"),
         ),
+        ("a.b=0:1:5/together", Together(Continuous(0.0, 1.0, 5))),
+        ("a.b=R,G / together", Together(Choice(["R", "G"]))),
     ],
 )
 def test_reads(text: str, meaning: object) -> None:

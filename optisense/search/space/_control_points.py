@@ -16,6 +16,7 @@ from optisense.search.space.parameters import (
     Parameter,
     Specification,
     Target,
+    Together,
     within,
 )
 
@@ -33,7 +34,7 @@ def as_points(spec: Specification) -> CagePoints:
     """
     if isinstance(spec, CagePoints):
         return spec
-    if isinstance(spec, Choice | Integer):
+    if isinstance(spec, Choice | Integer | Together):
         raise SearchError("control points take a range of numbers", hint="Give LOW:HIGH")
     return CagePoints(spec)
 

@@ -36,8 +36,10 @@ from optisense.search.space.parameters import (
     Parameter,
     Specification,
     Target,
+    Together,
     within,
 )
+from optisense.search.space.rigid_moves import GroupAim, GroupShift, GroupTurn, LightMoves
 
 RGB_FIELDS = (
     "colour", "reflectance", "eta", "k", "dispersion", "absorption", "extinction", "transmittance",
@@ -57,6 +59,8 @@ def expand(
         DesignError: the path names nothing in the design; the message suggests a similar name.
         SearchError: the path can't be varied like this.
     """
+    if isinstance(spec, Together):
+        return _together(design, path, spec)
     if "*" in path:
         found: list[Parameter] = []
         for each in starred(design, path):
@@ -118,6 +122,44 @@ def starred(design: SensorDesign, path: str) -> list[str]:
     return [f"{section}.{name}.{leaf}" for name in chosen]
 
 
+def _together(
+    design: SensorDesign, path: str, spec: Together
+) -> tuple[SensorDesign, list[Parameter]]:
+    """Return parameters that each set the same number of all names that a star stands for.
+
+    Raises:
+        SearchError: the path has no star, or the values can't be varied together.
+    """
+    if "*" not in path:
+        raise SearchError(
+            "only values of a path with a * vary together", where=path, hint="Remove /together"
+        )
+    members: list[list[Parameter]] = []
+    for each in starred(design, path):
+        design, added = expand(design, each, spec.range)
+        members.append(added)
+    section, pattern = path.split(".")[:2]
+    found = []
+    for same in zip(*members, strict=False):
+        first = same[0]
+        moves = tuple(each.variable for each in same if each.variable is not None)
+        alike = all(each.kind == first.kind for each in same) and len(set(map(len, members))) == 1
+        movable = all(isinstance(each, GroupShift | GroupTurn | GroupAim) for each in moves)
+        if not (alike and movable) or section == "cages":
+            raise SearchError(
+                "these values have different ranges, or can't be varied together",
+                where=path,
+                hint="Give LOW:HIGH or options for values or moves of lights, or vary them one "
+                "by one",
+            )
+        leaf = first.name.split(".", 2)[2]
+        name = f"{section}.{pattern}.{leaf}"
+        targets = tuple(target for each in same for target in each.targets)
+        variable = LightMoves(name, moves) if moves else None
+        found.append(replace(first, name=name, targets=targets, variable=variable, asked=path))
+    return design, found
+
+
 def _of_variable(
     design: SensorDesign, variable: DesignVariable, spec: Specification, asked: str
 ) -> Parameter:
@@ -166,7 +208,7 @@ def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
 
 def _bounds(value: float, spec: Specification) -> Continuous | Integer:
     """Return bounds for a number; integer bounds for an integer."""
-    assert not isinstance(spec, Choice | CagePoints)
+    assert not isinstance(spec, Choice | CagePoints | Together)
     whole = isinstance(value, int)
     if isinstance(spec, Around):
         spec = spec.about(float(value))

@@ -33,6 +33,11 @@ class DesignVariable(ABC):
     numeric: ClassVar[bool] = False
     shapes: ClassVar[bool] = False
 
+    @property
+    def paths(self) -> list[str]:
+        """Paths of all that it changes."""
+        return [self.path]
+
     @abstractmethod
     def start(self, design: SensorDesign) -> float | str | None:
         """Return the value in a design: 0 for moves, else a name."""

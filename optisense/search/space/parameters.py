@@ -158,7 +158,19 @@ class CagePoints:
 Single = Continuous | Integer | Choice
 """Specification of one parameter of a bound space."""
 
-Specification = Single | Around | CagePoints
+
+@dataclass(frozen=True)
+class Together:
+    """One parameter for all values that a path with a star stands for, as on a symmetric sensor.
+
+    Attributes:
+        range: bounds or options that the values share, or the distance by which lights may move.
+    """
+
+    range: Single | Around
+
+
+Specification = Single | Around | CagePoints | Together
 """Specification that a user gives for one path; some stand for many parameters."""
 
 
@@ -168,7 +180,7 @@ def as_specification(value: object) -> Specification:
     Raises:
         SearchError: the value has another form, or its bounds are empty, reversed or not finite.
     """
-    if isinstance(value, Continuous | Integer | Choice | Around | CagePoints):
+    if isinstance(value, Continuous | Integer | Choice | Around | CagePoints | Together):
         return value
     if isinstance(value, tuple) and len(value) in (2, 3) and all(map(_is_number, value)):
         return Continuous(float(value[0]), float(value[1]), *value[2:])
@@ -176,7 +188,8 @@ def as_specification(value: object) -> Specification:
         return Choice(value)
     raise SearchError(
         f"{value!r} is not a specification of a parameter",
-        hint="Give (low, high), Integer(low, high), Choice([...]), Around(reach) or CagePoints",
+        hint="Give (low, high), Integer(low, high), Choice([...]), Around(reach), CagePoints or "
+        "Together",
     )
 
 
@@ -210,6 +223,8 @@ def to_plain(spec: Specification) -> dict[str, Any]:
         return {"kind": "around", "reach": spec.reach, "steps": spec.steps}
     if isinstance(spec, Continuous):
         return {"kind": "continuous", "low": spec.low, "high": spec.high, "steps": spec.steps}
+    if isinstance(spec, Together):
+        return {"kind": "together", "range": to_plain(spec.range)}
     points = None if spec.points is None else list(spec.points)
     return {
         "kind": "cage-points",
@@ -229,6 +244,11 @@ def from_plain(data: Mapping[str, Any]) -> Specification:
     try:
         fields = dict(data)
         kind = fields.pop("kind")
+        if kind == "together":
+            shared = from_plain(fields.pop("range"))
+            if isinstance(shared, CagePoints | Together):
+                raise SearchError("what varies together needs bounds, options or a reach")
+            return Together(shared, **fields)
         if kind == "cage-points":
             inner = from_plain(fields.pop("range"))
             if not isinstance(inner, Continuous | Around):
@@ -284,6 +304,13 @@ class Parameter:
     targets: tuple[Target, ...] = ()
     variable: DesignVariable | None = None
     asked: str = ""
+
+    @property
+    def paths(self) -> list[str]:
+        """Paths of all that the parameter sets."""
+        if self.variable is not None:
+            return self.variable.paths
+        return [target.path for target in self.targets]
 
 
 def within(value: float, kind: Single) -> float:

@@ -98,6 +98,30 @@ class CameraTurn(_Move):
         return design.model_copy(update={"camera": camera})
 
 
+@dataclass(frozen=True)
+class LightMoves(DesignVariable):
+    """The same move of several lights or groups of lights."""
+
+    members: tuple[DesignVariable, ...]
+    stage: ClassVar[int] = 2
+    numeric: ClassVar[bool] = True
+
+    @property
+    def paths(self) -> list[str]:
+        """Paths of all moves."""
+        return [each.path for each in self.members]
+
+    def start(self, design: SensorDesign) -> float:
+        """Return 0, the value of every move in the starting design."""
+        return 0.0
+
+    def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
+        """Return the design with all moved by `value`."""
+        for each in self.members:
+            design = each.apply(design, value)
+        return design
+
+
 class PartShift(_Move):
     """Shift of a part along an axis of the design."""
 

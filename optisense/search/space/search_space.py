@@ -290,7 +290,7 @@ class BoundSpace:
         """Refuse two parameters that set the same value."""
         seen: dict[str, str] = {}
         for parameter in self.parameters:
-            for path in [target.path for target in parameter.targets] or [parameter.name]:
+            for path in parameter.paths:
                 if path in seen:
                     raise SearchError(f"'{path}' is varied twice", where=parameter.asked)
                 seen[path] = parameter.name

@@ -1,14 +1,14 @@
 """Parser of parameters and errors in one line, as the command line takes them.
 
 ```text
-vary  = PATH "=" range [ "/" NAME "=" VALUE ]...
+vary  = PATH "=" range [ "/" NAME "=" VALUE ]... [ "/together" ]
 range = LOW ":" HIGH [ ":" STEPS ]      between two bounds
       | "+-" REACH [ ":" STEPS ]        a distance to either side of the present value
       | NAME "," NAME [ "," NAME ]...   one of several
 ```
 
-For the points of a cage: `/symmetry=x`, `/axes=xz`, `/points=0,2,6-8`. Manufacturing errors are
-written PATH=SIZE (see `parse_errors`).
+For the points of a cage: `/symmetry=x`, `/axes=xz`, `/points=0,2,6-8`. For a path with a star:
+`/together`. Manufacturing errors are written PATH=SIZE (see `parse_errors`).
 """
 
 from __future__ import annotations
@@ -20,11 +20,19 @@ from optisense.design.yaml_reader import parse_yaml
 from optisense.errors import SearchError
 from optisense.near import suggestion
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
-from optisense.search.space.parameters import Around, CagePoints, Choice, Continuous, Specification
+from optisense.search.space.parameters import (
+    Around,
+    CagePoints,
+    Choice,
+    Continuous,
+    Specification,
+    Together,
+)
 from optisense.text import brief
 
 EXAMPLE = "Write PATH=LOW:HIGH, such as coating.specularity=0:1, or PATH=NAME,NAME"
 OPTIONS = ("symmetry", "axes", "points")
+TOGETHER = "together"
 
 
 def parse_vary(text: str) -> tuple[str, Specification]:
@@ -39,6 +47,8 @@ def parse_vary(text: str) -> tuple[str, Specification]:
     given, *extra = (part.strip() for part in rest.split("/"))
     try:
         spec = _range(given)
+        if extra == [TOGETHER] and not isinstance(spec, CagePoints | Together):
+            return path, Together(spec)
         return path, (_points(spec, extra) if extra else spec)
     except SearchError as error:
         raise SearchError(error.message, where=path, hint=error.hint or EXAMPLE) from None

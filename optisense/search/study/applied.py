@@ -29,9 +29,9 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
     before = study.space.design
     # A cage is marked as a whole; other numbers are marked one by one.
     varied = {
-        p.asked if p.name.startswith("cages.") else p.name
+        p.asked if p.name.startswith("cages.") else target.path
         for p in study.space.parameters
-        if p.targets
+        for target in p.targets
     }
     known = {path: each for path, each in design.provenance.items() if _value(design, path)}
     for path in {**known, **dict.fromkeys(sorted(varied))}:
