@@ -21,14 +21,13 @@ KEPT_POINTS = 256
 """Number of places that a surface keeps with their coordinates: a press asks for the same place
 several times, and the walk to it takes some milliseconds on a curved surface."""
 
-
 WALL_ANGLE = 60.0
-"""Angle (degrees) between the normal at the origin and those of the wall of a fingertip. It is well
-above the 40 degrees of a spherical pad, and below the 90 degrees of a finger's wall."""
+"""Smallest angle (degrees) between the normal at the origin and the normals of a fingertip's wall. It
+is well above the 40 degrees of a spherical pad, and below the 90 degrees of a finger's wall."""
 
 WALL_SHARE = 0.5
-"""Share of the area from which on a wall makes the surface that of a fingertip. The sides of a flat
-pad have less."""
+"""Smallest share of a fingertip's area that belongs to its wall. The sides of a flat pad have a
+smaller share."""
 
 WALL_SECTORS = 8
 """Number of sectors of azimuth that must all contain a wall. A cylindrical skin has walls in two
@@ -86,9 +85,9 @@ class SensingSurface:
         are therefore similar all over a dome, except where the surface has turned by 180 degrees.
         Projections of `u_axis` would change their sign where the surface faces its direction.
 
-        On a fingertip, whose wall surrounds its axis, the first tangent is that of the meridian
-        instead, away from the tip: what surrounds the wall, such as rows of lights, then has the
-        same direction all around. The frame of the origin is used at the tip itself only.
+        On a fingertip, whose wall surrounds its axis, the first tangent points along the meridian
+        instead, away from the tip. Lights around the axis then have similar directions in the
+        frames of all places on the wall. The frame of the origin is used at the tip itself only.
 
         Args:
             inward: (..., 3) unit normals into the gel.

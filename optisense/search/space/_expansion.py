@@ -39,7 +39,7 @@ from optisense.search.space.parameters import (
     Together,
     within,
 )
-from optisense.search.space.rigid_moves import GroupAim, GroupShift, GroupTurn, LightMoves
+from optisense.search.space.rigid_moves import GroupAim, GroupMoves, GroupShift, GroupTurn
 
 RGB_FIELDS = (
     "colour", "reflectance", "eta", "k", "dispersion", "absorption", "extinction", "transmittance",
@@ -139,23 +139,23 @@ def _together(
         design, added = expand(design, each, spec.range)
         members.append(added)
     section, pattern = path.split(".")[:2]
+    one_by_one = SearchError(
+        "these values have different ranges, or can't be varied together",
+        where=path,
+        hint="Give LOW:HIGH or options for values or moves of lights, or vary them one by one",
+    )
+    if section == "cages" or len({len(each) for each in members}) > 1:
+        raise one_by_one
     found = []
-    for same in zip(*members, strict=False):
+    for same in zip(*members, strict=True):
         first = same[0]
         moves = tuple(each.variable for each in same if each.variable is not None)
-        alike = all(each.kind == first.kind for each in same) and len(set(map(len, members))) == 1
         movable = all(isinstance(each, GroupShift | GroupTurn | GroupAim) for each in moves)
-        if not (alike and movable) or section == "cages":
-            raise SearchError(
-                "these values have different ranges, or can't be varied together",
-                where=path,
-                hint="Give LOW:HIGH or options for values or moves of lights, or vary them one "
-                "by one",
-            )
-        leaf = first.name.split(".", 2)[2]
-        name = f"{section}.{pattern}.{leaf}"
+        if not movable or any(each.kind != first.kind for each in same):
+            raise one_by_one
+        name = f"{section}.{pattern}.{first.name.split('.', 2)[2]}"
         targets = tuple(target for each in same for target in each.targets)
-        variable = LightMoves(name, moves) if moves else None
+        variable = GroupMoves(name, moves) if moves else None
         found.append(replace(first, name=name, targets=targets, variable=variable, asked=path))
     return design, found
 

@@ -99,8 +99,8 @@ class CameraTurn(_Move):
 
 
 @dataclass(frozen=True)
-class LightMoves(DesignVariable):
-    """The same move of several lights or groups of lights."""
+class GroupMoves(DesignVariable):
+    """The same move of several groups of lights."""
 
     members: tuple[DesignVariable, ...]
     stage: ClassVar[int] = 2
@@ -116,7 +116,7 @@ class LightMoves(DesignVariable):
         return 0.0
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
-        """Return the design with all moved by `value`."""
+        """Return the design with all groups moved by `value`, mm or degrees."""
         for each in self.members:
             design = each.apply(design, value)
         return design
