@@ -49,11 +49,11 @@ them."""
 
 AT_PLACES = (
     "--objective reading.mean_of_places --set together=true "
-    f"--set 'places={FINGERTIP_PLACES}' --no-verify"
+    f"--set 'places={FINGERTIP_PLACES}' --set photons=500000 --no-verify"
 )
 
-COLOURINGS = f"--method light-colours {AT_PLACES} --set photons=500000 --budget 200"
-"""Two hundred colourings: the search changes one group after another until no change helps."""
+COLOURINGS = f"--vary 'lights.*.colour=R,G,B' --method light-colours {AT_PLACES} --budget 200"
+"""Up to 200 colourings: the search changes one group after another until no change helps."""
 
 CASES = {
     "cylinder": CaseStudy(
@@ -109,12 +109,12 @@ CASES = {
     "gelsight360": CaseStudy(
         "GelSight360: colours of its LEDs and the coating",
         (
-            f"search gelsight360 --vary 'lights.*.colour=R,G,B' {COLOURINGS} --out colours",
+            f"search gelsight360 {COLOURINGS} --out colours",
             "apply colours --trial best --out coloured",
             "search coloured --vary coating.specularity=0:0.8:9 --method grid --budget 9 "
-            f"{AT_PLACES} --set photons=500000 --out coating",
+            f"{AT_PLACES} --out coating",
             "apply coating --trial best --out coated",
-            f"search coated --vary 'lights.*.colour=R,G,B' {COLOURINGS} --out again",
+            f"search coated {COLOURINGS} --out again",
             "apply again --trial best --out better",
             "make best-of-paper",
             "verify best-of-paper better --presses 150 --places 2 --resolution 320x240 "
