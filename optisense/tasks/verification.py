@@ -89,8 +89,8 @@ class VerificationSettings:
 
 LARGEST_AREA_A_BALL = 20.0
 """Largest area of skin (mm^2) for each calibrating ball with which an inconclusive verdict needs no
-remark. `--quick` has 13 mm^2 on GelSight Mini. On GelSight360, with 110 mm^2, a change of colours
-and coating is inconclusive that lowers the error by a quarter with 14 mm^2."""
+remark. `--quick` has 13 mm^2 on GelSight Mini. On GelSight360, networks that are fitted to 20 balls
+(110 mm^2 each) have errors on other balls that are a tenth larger than those fitted to 115."""
 
 
 @dataclass(frozen=True)
@@ -203,9 +203,9 @@ class Verification:
         area = max(view.area for view in self.views)
         if self.verdict == INCONCLUSIVE and area > LARGEST_AREA_A_BALL * balls:
             found.append(
-                f"each of the {balls} balls calibrated {area / balls:.0f} mm^2 of skin, so that "
-                "both readers are poor; use more balls (--presses "
-                f"{math.ceil(area / LARGEST_AREA_A_BALL)})"
+                f"each of the {balls} balls calibrated {area / balls:.0f} mm^2 of skin; more balls "
+                f"(--presses {math.ceil(area / LARGEST_AREA_A_BALL)}) reduce the errors of both "
+                "readers"
             )
         return found
 
