@@ -22,8 +22,8 @@ KEPT_POINTS = 256
 several times, and the walk to it takes some milliseconds on a curved surface."""
 
 WALL_ANGLE = 60.0
-"""Smallest angle (degrees) between the normal at the origin and the normals of a fingertip's wall. It
-is well above the 40 degrees of a spherical pad, and below the 90 degrees of a finger's wall."""
+"""Smallest angle (degrees) between the normal at the origin and the normals of a fingertip's wall.
+It is well above the 40 degrees of a spherical pad, and below the 90 degrees of a finger's wall."""
 
 WALL_SHARE = 0.5
 """Smallest share of a fingertip's area that belongs to its wall. The sides of a flat pad have a
