@@ -22,6 +22,7 @@ from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
+from optisense.optics.imaging._lamp_images import LampImages
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.image_layers import ImageLayers
 from optisense.optics.imaging.known_view import KnownView
@@ -107,6 +108,9 @@ class OpticalModel(RayModel):
     _caches: CacheStore | None = None
     """The radiance caches, once they are used."""
 
+    _lamps: LampImages | None = None
+    """The mirror images of the lamps, once an image has been rendered."""
+
     @property
     def _store(self) -> CacheStore:
         if self._caches is None:
@@ -118,8 +122,11 @@ class OpticalModel(RayModel):
         return self.store_type(LitScene.of(self.scenes), rays.points[rays.hit])
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
+        is_same = scenes.assembly is self.scenes.assembly and view is self._view
+        if not is_same:
+            self._lamps = None
         if self._caches is not None:
-            if scenes.assembly is not self.scenes.assembly or view is not self._view:
+            if not is_same:
                 self._caches = None
             elif scenes is not self.scenes:
                 self._caches = self._caches.coated(LitScene.of(scenes))
@@ -134,6 +141,14 @@ class OpticalModel(RayModel):
         if self._caches is not None:
             self._caches = None if guide else self._caches.coated(LitScene.of(self.scenes))
             dr.flush_malloc_cache()
+
+    @property
+    def _lamp_images(self) -> LampImages:
+        if self._lamps is None:
+            scenes = self.scenes
+            groups = scenes.emitter_table.groups
+            self._lamps = LampImages(scenes.full, scenes.assembly.emitters, groups)
+        return self._lamps
 
     def guide(self) -> EmissionGuide:
         """Return the emission guide, which is learned from a pilot pass on first use."""
@@ -220,6 +235,7 @@ class OpticalModel(RayModel):
                 seed,
                 SamplingPlan(only_contacts, pixel_importance, self.is_draft),
                 view.known if self.is_draft else None,
+                None if self.is_draft else self._lamp_images,
             )
             layers.light_seconds = lit - built
         ended = time.perf_counter()

@@ -16,20 +16,6 @@ REFERENCE_WIDTH = 320
 """Image width (pixels) for which the numbers of samples per pixel are stated: the usual width of a
 tactile picture."""
 
-LONE_WINDOW, LONE_RANK = 5, 4
-"""Side (pixels) of the square around a bright pixel, and the number of its pixels, itself included,
-that must be bright for the pixel not to count as lone."""
-
-LONE_RATIO = 2.0
-"""Ratio of a pixel's light to that of the `LONE_RANK`-th brightest pixel in its square above which
-the excess light is spread over the pixels around it. A factor of two is more than the noise between
-neighbouring pixels of a real reflection. Of the built-in sensors, only GelSight360 shows such
-pixels: without the spreading, its picture of 160x120 pixels differs by 6 % (RMS)."""
-
-SPECK_WIDTH = 1.0 / 8.0
-"""Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the
-light around it then adds 3 % to its middle."""
-
 
 def repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]:
     """Return the index of each pixel of a non-empty mask (h, w) ``times`` times, and the number of
@@ -88,61 +74,6 @@ class Film:
         for layer, total in zip(out, self.sums, strict=True):
             np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
         return out
-
-    def lone_pixels(self, width: int, height: int) -> NDArray[np.bool_]:
-        """Return a mask (h, w) of the pixels that are much brighter than the pixels around them in
-        any layer.
-        """
-        lone = np.zeros((height, width), dtype=bool)
-        for layer in self.layers(width, height):
-            bright = layer.sum(axis=-1)
-            lone |= _left_of_lone(bright) < bright
-        return lone
-
-    def without_specks(
-        self,
-        width: int,
-        height: int,
-        near: NDArray[np.bool_],
-        steady: NDArray[np.bool_] | None = None,
-    ) -> NDArray[np.float32]:
-        """Return the layers with the light of lone bright pixels spread over sampled pixels around
-        them.
-
-        The sum over the pixels in contacts does not change, and neither does the sum over the
-        others.
-
-        Args:
-            width, height: size of the image, pixels.
-            near: (height, width) mask of the pixels in contacts or at their rims.
-            steady: (height, width) mask of the pixels that keep their light; none by default.
-        """
-        layers = self.layers(width, height)
-        sampled = (np.asarray(self.counts) > 0).reshape(height, width)
-        regions = [where for where in (sampled & near, sampled & ~near) if where.any()]
-        side = round(SPECK_WIDTH * width) | 1  # an odd side: a symmetric square loses no light
-
-        def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
-            for _ in range(2):
-                image = ndimage.uniform_filter(image, side, mode="constant")
-            return image
-
-        for layer in layers:
-            bright = layer.sum(axis=-1)
-            if not bright.any():
-                continue
-            left = _left_of_lone(bright)
-            if steady is not None:
-                left = np.where(steady, bright, left)
-            kept = np.divide(left, bright, out=np.ones_like(bright), where=bright > 0)[..., None]
-            lone = layer * (1.0 - kept)
-            layer *= kept
-            for where in regions:
-                share = where / np.maximum(around(where.astype(np.float64)), 1e-12)
-                for k in range(3):
-                    spread = around(lone[..., k].astype(np.float64) * share) * where
-                    layer[..., k] += np.maximum(spread, 0.0)  # rounding gives -1e-17
-        return layers
 
     def averaged_layers(
         self,
@@ -207,9 +138,3 @@ def _average(
                 if deblurred:
                     mean = np.maximum(2 * mean - around(mean * counts) * share, 0)
                 layer[*part, k] = np.where(where, mean, values)
-
-
-def _left_of_lone(bright: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return an image (h, w) in which lone bright pixels are limited by those around them."""
-    company = ndimage.rank_filter(bright, -LONE_RANK, size=LONE_WINDOW, mode="constant")
-    return np.asarray(np.minimum(bright, LONE_RATIO * company))

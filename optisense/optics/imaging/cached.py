@@ -19,6 +19,7 @@ from optisense.optics.imaging._contact_light import (
 )
 from optisense.optics.imaging._film import Film, repeated
 from optisense.optics.imaging._grain import GRAIN_SAMPLES, grainy
+from optisense.optics.imaging._lamp_images import LampImages
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
@@ -61,14 +62,6 @@ AVERAGED_ROUGHNESS = 0.18
 contacts (see `INTERREFLECTION_WIDTH`). At 0.2 this reduces the noise of the camera samples in a
 contact of GelSight Mini from 2.6 to 1.1 % of the mean, with an error of 0.5 % (RMS over patches);
 the error grows as lobes become narrower."""
-GLINT_PATHS = 16
-"""Number of further paths through a lone bright pixel that decide whether an interface mirrors a
-lamp there. There are few such pixels."""
-STEADY_SHARE = 1 / 8
-"""Share of these paths that meet a lamp, from which on its mirror image keeps its place. Around a
-contact of GelSight360 with a perspective camera, where interfaces mirror the ring of blue lamps, 22
-of 25 lone pixels have this share. One path in a thousand causes a speck; the probability that two
-of 16 further paths meet the lamp there is 0.01 %."""
 BESIDE_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which the skin is shaded with
 light that the contact reflects to it: 2 mm on GelSight Mini. This is half a per cent of a diffuse
@@ -84,6 +77,7 @@ def render_cached(
     seed: int,
     plan: SamplingPlan = FULL_SAMPLING,
     known: KnownView | None = None,
+    lamps: LampImages | None = None,
 ) -> ImageLayers:
     """Shade an image from a radiance cache: one sample per pixel, more in and around contacts.
 
@@ -96,6 +90,7 @@ def render_cached(
         seed: seed of the camera samples.
         plan: the pixels that are shaded, and their samples.
         known: parts of an earlier draft that are reused, to which those that are missing are added.
+        lamps: mirror images of lamps, which are added to the image; none by default.
     """
     began = time.perf_counter()
     cache, interrupted = light
@@ -120,6 +115,11 @@ def render_cached(
             known.keep_faint(main, layers - main)
     if regions.near.any() and not plan.draft:
         layers = image.with_light_of_contacts(layers)
+    mirrored = None if lamps is None else lamps.layers(camera, seed)
+    if mirrored is not None:
+        layers = layers + (
+            mirrored * regions.contacts[..., None] if plan.only_contacts else mirrored
+        )
     return ImageLayers(
         radiance=layers,
         normals=masked(rays.normals, rays.hit),
@@ -139,8 +139,7 @@ class _Shading:
     """The camera samples of one image, which are added to films as they are shaded.
 
     Interfaces reflect little light towards the camera, so their reflections are sampled once in a
-    pixel or in its neighbours (``mirrored``). Lamps are so bright that the rare path (one in a
-    thousand) that meets one would be a speck (``glints``).
+    pixel or in its neighbours (``mirrored``). The lamps among them are left to `LampImages`.
     """
 
     def __init__(
@@ -159,8 +158,8 @@ class _Shading:
         self.size = camera.width, camera.height
         self.faint_known = known is not None and known.faint is not None
         self.effort = DRAG_EFFORT if self.faint_known else FULL_EFFORT
-        self.film, self.between, self.mirrored, self.glints = (
-            Film(camera.width * camera.height, cache.binned.groups) for _ in range(4)
+        self.film, self.between, self.mirrored = (
+            Film(camera.width * camera.height, cache.binned.groups) for _ in range(3)
         )
         self.culled_beams = cache.beams
         if scenes.indenters is not None:
@@ -179,29 +178,7 @@ class _Shading:
         """
         if self.faint_known:
             return np.zeros((len(self.film.sums), *self.size[::-1], 3), dtype=np.float32)
-        steady = self._steady_glints(self.glints.lone_pixels(*self.size))
-        specks_spread = self.glints.without_specks(*self.size, self.regions.near, steady)
-        return self.mirrored.layers(*self.size) + specks_spread
-
-    def _steady_glints(self, lone: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return the mask (h, w) of the pixels of ``lone`` in which an interface mirrors a lamp to
-        the camera, as further paths show, and not only one rare path.
-        """
-        if not lone.any():
-            return lone
-        pixel, number = repeated(lone, GLINT_PATHS)
-        spots = film_samples(pixel, self.camera.width, number, seed_of(self.seed, 11))
-        meetings = np.zeros(lone.size)
-        scene = self.scenes.full
-        for channel in scene.channels:
-            _, reflected = find_visible_points(
-                scene, self.camera, pixel, number, spots, seed_of(self.seed, 12), channel=channel
-            )
-            if reflected is not None:
-                lit = np.asarray(reflected.light) > 0
-                meetings += np.bincount(np.asarray(reflected.pixel), lit, lone.size)
-        share = meetings.reshape(lone.shape) / (GLINT_PATHS * len(scene.channels))
-        return lone & (share >= STEADY_SHARE)
+        return self.mirrored.layers(*self.size)
 
     def interreflection(self) -> NDArray[np.float32]:
         """Return the layers of the light that skin and contacts reflect to contacts."""
@@ -234,7 +211,6 @@ class _Shading:
             self.between.count(pixel)
         if not again:
             self.mirrored.count(pixel)
-            self.glints.count(pixel)
         for channel in self.scenes.full.channels:
             main, reflected = self._visible_points(
                 pixel, number, spots, in_contacts, again, channel
@@ -251,7 +227,6 @@ class _Shading:
             self.film.add_light(main, self.emitters)
             if reflected is not None:
                 self.mirrored.add(reflected, self._shade(reflected, True))
-                self.glints.add_light(reflected, self.emitters)
 
     def _visible_points(
         self,
