@@ -19,6 +19,7 @@ from optisense.optics.radiance_cache.bin_sums import sum_bins
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.shading_points import (
     ShadingPoints,
+    foot_of,
     interpolating_cell,
     may_be_cached,
 )
@@ -184,8 +185,7 @@ def shading_points(
     normal.
     """
     points = seen.points
-    upright, offset = plane_of(cache.binned.cells, seen.near, points.valid)
-    foot = points.point - upright * (dr.dot(upright, points.point) - offset)
+    foot = foot_of(cache.binned.cells, seen.near, points.point, points.valid)
     base = dr.select(seen.raised, foot, points.point)
     cell, shift, found = interpolating_cell(
         cache.binned.cells, base, points.valid, points.series, points.number

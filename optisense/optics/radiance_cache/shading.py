@@ -21,11 +21,15 @@ from optisense.optics.radiance_cache.bin_sums import sum_bins
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.glossy_interreflection import glossy_interreflection
 from optisense.optics.radiance_cache.interreflection import interreflected
-from optisense.optics.radiance_cache.shading_points import ShadingPoints, interpolating_cell
+from optisense.optics.radiance_cache.shading_points import (
+    ShadingPoints,
+    foot_of,
+    interpolating_cell,
+)
 from optisense.optics.scene.bsdf import coating_of, surface_region
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
-from optisense.optics.scene.surface_cells import bin_axis, plane_of
+from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at, plane_of
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
 
@@ -86,11 +90,10 @@ def shade_in_contacts(
     table = scenes.full.table
     region = surface_region(table, points.surface, points.valid)
     raised = points.valid & (region >= int(Region.INDENTER))
-    # The line of sight continues behind an indenter to the undeformed surface.
-    onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))
-    base = dr.select(raised & onward.valid, onward.point, points.point)
+    cells = cache.binned.cells
+    base = _place_below(cells, scenes, points, raised)
     cell, shift, active = interpolating_cell(
-        cache.binned.cells, base, points.valid, points.series, points.number
+        cells, base, points.valid, points.series, points.number
     )
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, cache.metallic)
@@ -99,7 +102,7 @@ def shade_in_contacts(
         scenes.balls,
         dr.opaque(mi.UInt32, dr.width(scenes.balls) // 4),
         points.point,
-        plane_of(cache.binned.cells, cell, active)[0],
+        plane_of(cells, cell, active)[0],
         raised & dr.opaque(mi.Bool, scenes.convex),
     )
     shadow_rays = dr.opaque(mi.Float, effort.contact_shadow_rays)
@@ -108,6 +111,24 @@ def shade_in_contacts(
         return far, None
     between = glossy_interreflection if cache.metallic else interreflected
     return far, between(cache, scenes, at)
+
+
+def _place_below(
+    cells: SurfaceCells, scenes: ContactScenes, points: VisiblePoints, raised: mi.Bool
+) -> mi.Point3f:
+    """Return the place (3, n), mm, on the undeformed surface below each of the ``raised`` points,
+    and the other points unchanged.
+
+    It is the foot of the perpendicular, as the light above a place does not depend on the eye.
+    Beyond an edge of the surface, it is the place where the line of sight, continued behind the
+    indenter, meets the surface.
+    """
+    onward = scenes.fixed.intersect(Ray(points.point, -points.towards_eye, raised))
+    behind = dr.select(raised & onward.valid, onward.point, points.point)
+    cell, found = cell_at(cells, behind, raised)
+    foot = foot_of(cells, cell, points.point, found)
+    _, exists = cell_at(cells, foot, found)
+    return dr.select(exists, foot, behind)
 
 
 def shade(

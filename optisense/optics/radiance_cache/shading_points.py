@@ -59,6 +59,12 @@ def interpolating_cell(
     return dr.select(exists, beside, home), shift, found
 
 
+def foot_of(cells: SurfaceCells, cell: mi.UInt32, point: mi.Point3f, active: mi.Bool) -> mi.Point3f:
+    """Return the foot (3, n), mm, of the perpendicular from points to the planes of cells."""
+    upright, offset = plane_of(cells, cell, active)
+    return point - upright * (dr.dot(upright, point) - offset)
+
+
 def may_be_cached(
     light: BinnedLight, cell: mi.UInt32, way: mi.Vector3f, active: mi.Bool
 ) -> mi.Bool:
