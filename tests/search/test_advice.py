@@ -50,6 +50,9 @@ def test_rays_and_brightness_do_not_go_together(objectives: list[str]) -> None:
 def test_nothing_is_said_against_what_may_succeed() -> None:
     assert advice(["coating.specularity", "camera.fov"], ["aoap"]) is None
     assert advice(["coating.specularity"], ["rgb2normal"]) is None
+    assert advice(["lights.red.flux"], ["power"]) is None
+    assert advice(["lights.*.flux"], ["aoap - 0.01*power"]) is None
+    assert advice(["lights.red.colour"], ["power"]) is not None
     assert advice(["coating.specularity"], ["aoap", "normdiff"]) is None
     assert advice(["coating.specularity"], ["mine.py:own"]) is None
     assert advice(["coating.specularity"], ["no-such-objective"]) is None  # told by others

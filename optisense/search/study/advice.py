@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from optisense.errors import OptiSenseError
-from optisense.objectives.named import are_rays_only
+from optisense.objectives.named import are_rays_only, named_in
 
 _NO_RAY_TURNS = re.compile(
     r"coating\..+"
@@ -16,6 +16,9 @@ _NO_RAY_TURNS = re.compile(
 """Paths of numbers that change brightness, but no path of a ray: colours and powers of lights,
 coatings, and how much a material reflects or absorbs.
 """
+
+_FLUX = re.compile(r"lights\.[^.]+\.flux(\..+|\[.+)?")
+"""Paths of the powers of lights, which the objective "power" sums."""
 
 LIGHT_OBJECTIVES = ("rgb2normal", "normdiff")
 """Objectives of this package that read pictures."""
@@ -41,6 +44,8 @@ def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
         return None
     try:
         if not are_rays_only(named):
+            return None
+        if "power" in named_in(named) and any(_FLUX.fullmatch(each.strip()) for each in varied):
             return None
     except OptiSenseError:  # the parser of objectives reports it
         return None
