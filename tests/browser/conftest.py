@@ -23,7 +23,7 @@ FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL by t
 Open = Callable[..., Visit]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     named = os.environ.get("OPTISENSE_BROWSER")
     program = named or next(filter(None, map(which, PROGRAMS)), None)
@@ -35,7 +35,7 @@ def browser() -> Iterator[Browser]:
         running.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def pages(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """One page of each kind; nothing is rendered where there is no browser."""
     return write_pages(tmp_path_factory.mktemp("pages"))
