@@ -185,14 +185,14 @@ def test_a_transparent_part_that_moves_is_climbed_by_differences() -> None:
 
 
 def test_gelsight360_by_gradient_ends_at_a_narrow_view() -> None:
-    """A wide one is a lower hill. CMA-ES ends at 0.935 and 108 degrees."""
+    """A wide one is a lower hill: 0.909. CMA-ES ends at 0.935 and 108 degrees."""
     space = {"camera.position.z": (0.0, 8.0), "camera.fov": Around(20.0)}
     result = search(
         load("gelsight360"), space, "aoap", method="gradient", budget=40,
-        options={"resolution": 96},
+        settings=SETTINGS, options={"resolution": 96},
     )  # fmt: skip
     best = result.best
-    assert best.outcome.scores["aoap"] > 0.934
+    assert best.outcome.scores["aoap"] > 0.933
     assert best.values["camera.fov"] == pytest.approx(108.0, abs=0.5)
     assert any("differences of scores" in note for note in result.notes)
 
