@@ -21,6 +21,9 @@ PHOTONS = 100_000
 SIZE = (160, 120)
 """Size (pixels) of the photographs."""
 
+SMALL = (100, 75)
+"""Size (pixels) of photographs that show the contacts well enough for a fit."""
+
 
 @pytest.fixture(scope="session")
 def mini() -> OpticalModel:
@@ -33,3 +36,10 @@ def photographs(mini: OpticalModel) -> Photographs:
     """Three presses of it, as a camera with noise would take them."""
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
     return photograph_model(mini, balls, resolution=SIZE, photons=PHOTONS, seed=5)
+
+
+@pytest.fixture(scope="session")
+def small_photographs(mini: OpticalModel) -> Photographs:
+    """The same presses in small photographs, which are compared and fitted in less time."""
+    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
+    return photograph_model(mini, balls, resolution=SMALL, photons=PHOTONS, seed=5)

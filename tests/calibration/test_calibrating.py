@@ -29,7 +29,7 @@ from optisense.cli import app
 from optisense.design import Status, get_value, set_value
 from optisense.errors import CalibrationError
 
-from .conftest import PHOTONS, PLACES, SIZE
+from .conftest import PHOTONS, PLACES, SMALL
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -214,8 +214,8 @@ def test_too_few_photographs_are_refused_before_the_work(photographs: Photograph
     assert "press-01.png" in (raised.value.hint or "")
 
 
-def test_a_design_is_fitted_and_marked(photographs: Photographs, tmp_path: Path) -> None:
-    save_photographs(tmp_path / "photos", photographs)
+def test_a_design_is_fitted_and_marked(small_photographs: Photographs, tmp_path: Path) -> None:
+    save_photographs(tmp_path / "photos", small_photographs)
     design = ots.load("gelsight-mini-ideal")
     start = set_value(design, "lights.red.flux", 0.5 * design.lights["red"].flux)
     ots.save_design(start, tmp_path / "start")
@@ -255,7 +255,7 @@ def test_a_design_is_fitted_and_marked(photographs: Photographs, tmp_path: Path)
 
 
 def test_an_interrupted_calibration_goes_on_where_it_was(
-    mini: OpticalModel, photographs: Photographs, tmp_path: Path
+    mini: OpticalModel, small_photographs: Photographs, tmp_path: Path
 ) -> None:
     """The renderings of the first round are taken again, and the fit is the same."""
     settings = CalibrationSettings(families=("powers",), rounds=1, photons=20_000)
@@ -267,7 +267,7 @@ def test_an_interrupted_calibration_goes_on_where_it_was(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        calibrate(design, photographs, settings, kept=kept, progress=stop)
+        calibrate(design, small_photographs, settings, kept=kept, progress=stop)
     files = sorted((tmp_path / "renderings").iterdir())
     assert len(files) == 3  # the background and two presses
     times = [file.stat().st_mtime_ns for file in files]
@@ -275,14 +275,14 @@ def test_an_interrupted_calibration_goes_on_where_it_was(
     files[0].write_bytes(whole[:1000])  # as of a disk that was full
     seen: list[str] = []
     found = calibrate(
-        design, photographs, settings, kept=kept, progress=lambda what, *_: seen.append(what)
+        design, small_photographs, settings, kept=kept, progress=lambda what, *_: seen.append(what)
     )
     assert "comparing" in seen
     assert [file.stat().st_mtime_ns for file in files][1:] == times[1:]
     assert files[0].stat().st_size == len(whole)
     kept.remove()
     assert not (tmp_path / "renderings").exists()
-    again = calibrate(design, photographs, settings)
+    again = calibrate(design, small_photographs, settings)
     for one, other in zip(found.numbers, again.numbers, strict=True):
         assert one.after == pytest.approx(other.after, rel=1e-5)  # sums of threads are rounded
 
@@ -291,7 +291,7 @@ def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
     design = with_single_lights(mini.design)
     real = ots.OpticalModel(set_value(design, "lights.red-2.flux", 1.0))
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES[:2]]
-    shown = photograph_model(real, balls, resolution=SIZE, photons=200_000, seed=5)
+    shown = photograph_model(real, balls, resolution=SMALL, photons=200_000, seed=5)
     kept = ["colours", "tone", "black", "shading", "view", "place"]
     settings = CalibrationSettings(
         families=chosen_families(kept, ["leds"]), rounds=1, photons=200_000, held_out=()

@@ -31,7 +31,7 @@ from optisense.cli import app
 from optisense.design import set_value
 from optisense.errors import CalibrationError
 
-from .conftest import PHOTONS, PLACES, SIZE
+from .conftest import PHOTONS, PLACES, SIZE, SMALL
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -300,7 +300,7 @@ def test_seven_presses_tell_what_readers_of_the_photographs_alone_achieve(
 ) -> None:
     places = [(x, y) for x in (-4.0, 0.0, 4.0) for y in (-3.0, 3.0)] + [(1.0, 0.0)]
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in places]
-    taken = photograph_model(mini, balls, resolution=SIZE, photons=PHOTONS, seed=5, noise=1.0)
+    taken = photograph_model(mini, balls, resolution=SMALL, photons=PHOTONS, seed=5, noise=1.0)
     found = compare(mini, taken, photons=PHOTONS, seed=5).realism
     assert len(found.readings) == len(places)
     assert found.median_reading("radius_alone") == pytest.approx(1.0, abs=0.15)

@@ -21,7 +21,7 @@ from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 
-from .conftest import PHOTONS, PLACES, SIZE
+from .conftest import PHOTONS, PLACES, SIZE, SMALL
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -114,7 +114,9 @@ def test_a_displacement_does_not_average_the_noise_of_layers(mini: OpticalModel)
 def test_a_hidden_view_is_found() -> None:
     real = seen_from(HIDDEN)
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
-    photographs = photograph_model(real, balls, resolution=SIZE, photons=PHOTONS, seed=7, noise=1.0)
+    photographs = photograph_model(
+        real, balls, resolution=SMALL, photons=PHOTONS, seed=7, noise=1.0
+    )
     settings = CalibrationSettings(families=("powers", "view", "place"), rounds=1, photons=PHOTONS)
     found = calibrate(ots.load("gelsight-mini-ideal"), photographs, settings)
     field, right, up = found.numbers[-3:]
