@@ -22,10 +22,10 @@ from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
-from optisense.optics.imaging._lamp_images import LampImages
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.image_layers import ImageLayers
 from optisense.optics.imaging.known_view import KnownView
+from optisense.optics.imaging.lamp_images import LampImages
 from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
 from optisense.optics.imaging.sampling import PixelImportance, SamplingPlan
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage

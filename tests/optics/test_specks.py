@@ -11,7 +11,7 @@ from optisense import sensors
 from optisense.design import AreaEmitter, Dielectric, Light, SensorDesign
 from optisense.geometry import Contact, Sphere, TriangleMesh
 from optisense.optics import OpticalModel
-from optisense.optics.imaging._lamp_images import without_specks
+from optisense.optics.imaging.lamp_images import without_specks
 
 WIDTH, HEIGHT = 80, 60
 NOWHERE = np.zeros((HEIGHT, WIDTH), dtype=bool)

@@ -19,10 +19,10 @@ from optisense.optics.imaging._contact_light import (
 )
 from optisense.optics.imaging._film import Film, repeated
 from optisense.optics.imaging._grain import GRAIN_SAMPLES, grainy
-from optisense.optics.imaging._lamp_images import LampImages
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
+from optisense.optics.imaging.lamp_images import LampImages
 from optisense.optics.imaging.sampling import FULL_SAMPLING, PixelRegions, SamplingPlan
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
