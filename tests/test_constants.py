@@ -7,6 +7,8 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
+from syntax_trees import syntax_tree
+
 ROOT = Path(__file__).parents[1]
 LEAST_WORDS = 5
 """A docstring of fewer words names no meaning, unit and reason."""
@@ -94,8 +96,7 @@ def constants(root: Path, *folders: str) -> list[tuple[str, str]]:
     """Place and name, and docstring, of each numeric constant of modules and classes."""
     found = []
     for path in sorted(path for folder in folders for path in (root / folder).rglob("*.py")):
-        module = ast.parse(path.read_text(encoding="utf-8"))
-        for body in bodies(module):
+        for body in bodies(syntax_tree(path)):
             for number, node in enumerate(body):
                 name = numeric_constant(node)
                 if name is not None:

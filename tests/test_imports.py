@@ -8,6 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
+from syntax_trees import syntax_tree
 
 ROOT = Path(__file__).parents[1]
 
@@ -33,7 +34,7 @@ def imports(node: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
 def imported(name: str, path: Path, known: dict[str, Path]) -> set[str]:
     """The modules of the package that a module imports."""
     found = set()
-    for node in imports(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in imports(syntax_tree(path)):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
             continue

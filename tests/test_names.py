@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from syntax_trees import syntax_tree
 
 ROOT = Path(__file__).parents[1]
 
@@ -15,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 def modules(*folders: str) -> Iterator[tuple[str, ast.Module]]:
     """Path and syntax tree of each Python file."""
     for path in sorted(path for folder in folders for path in (ROOT / folder).rglob("*.py")):
-        yield str(path.relative_to(ROOT)), ast.parse(path.read_text(encoding="utf-8"))
+        yield str(path.relative_to(ROOT)), syntax_tree(path)
 
 
 @pytest.mark.parametrize("package", ["optisense", "paper"])
