@@ -71,7 +71,7 @@ def _of_sampling() -> list[Ablation]:
     import mitsuba as mi
 
     from optisense.optics.backend import sequences
-    from optisense.optics.imaging import _grain, _lamp_images, cached, sampling
+    from optisense.optics.imaging import _grain, cached, lamp_images, sampling
     from optisense.optics.radiance_cache import bin_sums, shading, shading_points
     from optisense.optics.transport import camera_paths, interact
 
@@ -103,7 +103,7 @@ def _of_sampling() -> list[Ablation]:
         _shading("low-discrepancy samples of a pixel",
                  Change(bin_sums, "richtmyer", random_richtmyer),
                  Change(shading_points, "richtmyer", random_richtmyer)),
-        _shading("spread of specks", Change(_lamp_images, "without_specks", _first)),
+        _shading("spread of specks", Change(lamp_images, "without_specks", _first)),
         _shading("coherent camera rays", Change(interact.RayKind, "is_coherent", coherent)),
     ]  # fmt: skip
 
