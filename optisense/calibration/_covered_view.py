@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-COVERAGE_RAYS = 4
-"""Number of chief rays across a pixel by which its coverage is determined: in steps of a sixteenth,
-which resolve displacements of an edge by a tenth of a pixel."""
+COVERAGE_RAYS = 8
+"""Number of chief rays across a pixel by which its coverage is determined. Where an edge of a
+mirror runs along a column of pixels, the coverage changes in steps of an eighth."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,5 @@
-"""Grain: pixels that differ from their neighbours because each of their samples reads one cell of
-the radiance cache.
+"""Pixels outside contacts for which one sample is too few: those at the outline of the skin, and
+grain, which differs from its neighbours because each sample reads one cell of the radiance cache.
 """
 
 from __future__ import annotations
@@ -13,6 +13,10 @@ GRAIN_SAMPLES = 4
 halves the grain; they are limited to half of the image's samples. A sample reads one cell of the
 cache, so that neighbouring cells that differ much show as grain. Without them, the error outside
 the contact of GelSight Svelte is 26 % larger (benchmarks/ablation.md)."""
+OUTLINE_SAMPLES = 8
+"""Number of further camera samples per pixel at the outline of the skin, such as the edge of a
+mirror, so that it is smooth, as in photographs. On GelSight Svelte, 1,200 of 76,800 pixels lie
+there."""
 GRAIN_THRESHOLD = 0.03
 """Threshold of the relative RMS deviation of pixels from the mean of their neighbours above which a
 place is grainy: three times a camera's own noise, which is about 0.01."""
@@ -42,3 +46,8 @@ def grainy(image: NDArray[np.float32], where: NDArray[np.bool_]) -> NDArray[np.b
     share = ndimage.uniform_filter(inner.astype(np.float32), GRAIN_WINDOW)
     square = ndimage.uniform_filter((off**2).astype(np.float32), GRAIN_WINDOW)
     return where & (square > GRAIN_THRESHOLD**2 * np.maximum(share, 1e-6))
+
+
+def outline(hit: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a mask (h, w) of the pixels on both sides of the outline of a mask ``hit`` (h, w)."""
+    return np.asarray(ndimage.binary_dilation(hit) & ndimage.binary_dilation(~hit))

@@ -18,7 +18,7 @@ from optisense.optics.imaging._contact_light import (
     mirrored_contact_layers,
 )
 from optisense.optics.imaging._film import Film, repeated
-from optisense.optics.imaging._grain import GRAIN_SAMPLES, grainy
+from optisense.optics.imaging._grain import GRAIN_SAMPLES, OUTLINE_SAMPLES, grainy, outline
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
@@ -280,7 +280,7 @@ class _Shading:
         interreflection, and those of its reflections.
 
         If there are many beams to sum, only every second pixel is shaded where its neighbours are
-        similar.
+        similar. Pixels in grainy places and at the outline of the skin get further samples.
         """
         far = ~self.regions.near
         rays = self.regions.rays
@@ -301,9 +301,14 @@ class _Shading:
             layers[:, ::step, ::step].sum(axis=0) @ np.ones(3, dtype=np.float32),
             (far & rays.hit & (not self.plan.draft))[::step, ::step],
         )
+        edge = first & outline(rays.hit) if not self.plan.draft else np.zeros_like(far)
+        grain &= ~edge
+        again = [repeated(edge, OUTLINE_SAMPLES)] if edge.any() else []
         if grain.any():
             affordable = int(first.sum()) // (2 * int(grain.sum()))
-            pixel, number = repeated(grain, min(GRAIN_SAMPLES, max(1, affordable)))
+            again.append(repeated(grain, min(GRAIN_SAMPLES, max(1, affordable))))
+        if again:
+            pixel, number = (dr.concat(each) for each in zip(*again, strict=True))
             dr.eval(pixel, number)
             self.sample(pixel, number, False, again=True)
             layers = self.main_layers() + reflections
