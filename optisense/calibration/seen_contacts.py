@@ -57,8 +57,10 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
     Args:
         photographs: photographs with labels or without.
         refine: whether labelled contacts are also searched, near their labels; hand labels are off
-            by pixels. A label beside which the picture does not look like a ball, while it does
-            elsewhere, is ignored.
+            by pixels. If the picture beside a label does not look like a ball, while it does at
+            another place, that place is taken; if it does nowhere, the label is kept. A place at
+            which other photographs show the same is not taken, as it is a blemish of the
+            background, such as dust.
 
     Returns:
         Contacts, with None for a photograph that shows no contact.
@@ -72,10 +74,31 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
         seen = find_contact(press.picture, photographs.background, centre, radius)
         if centre is not None and seen is not None and seen.asymmetry > DOUBTFUL:
             free = find_contact(press.picture, photographs.background)
-            if free is not None and free.asymmetry < DOUBTFUL:
+            looks_right = free is not None and free.asymmetry < DOUBTFUL
+            if free is not None and looks_right and not _is_blemish(photographs, press, free):
                 seen = free
+            elif radius is not None:
+                found.append(SeenContact(centre, radius))
+                continue
         found.append(None if seen is None else SeenContact(seen.centre, seen.radius))
     return found
+
+
+def _is_blemish(photographs: Photographs, press: PhotographedPress, found: FoundContact) -> bool:
+    """Return whether two or more other photographs have their strongest response where one is found
+    in a press, but no label there.
+    """
+    same = 0
+    for other in photographs.presses:
+        if other is press or other.centre is None:
+            continue
+        seen = find_contact(other.picture, photographs.background)
+        if seen is None:
+            continue
+        size = max(seen.radius, found.radius)
+        is_near = math.dist(seen.centre, found.centre) < size
+        same += is_near and math.dist(other.centre, found.centre) > size
+    return same >= 2
 
 
 def doubts(photographs: Photographs) -> list[str]:
@@ -84,7 +107,13 @@ def doubts(photographs: Photographs) -> list[str]:
     twice = 0
     denied: list[FoundContact] = []
     for press in photographs.presses:
-        seen = find_contact(press.picture, photographs.background)
+        seen = free = find_contact(press.picture, photographs.background)
+        if press.centre is not None:
+            labelled = find_contact(
+                press.picture, photographs.background, press.centre, press.radius
+            )
+            if labelled is not None and labelled.asymmetry < DOUBTFUL:
+                seen = labelled
         if seen is not None:
             wide = replace(seen, radius=max(seen.radius, press.radius or 0.0))
             other = find_another(press.picture, photographs.background, wide)
@@ -105,11 +134,14 @@ def doubts(photographs: Photographs) -> list[str]:
                     f"{press.name}: its label is {off:.0f} pixels away from the contact that the "
                     "picture shows; check whether it is that of another photograph"
                 )
-        labelled = seen.radius if press.radius is None else press.radius
-        if not 1.0 / (1.0 + LABEL_OFF) < labelled / max(seen.radius, 1e-9) < 1.0 + LABEL_OFF:
+        shown = seen.radius  # that of a contact at the label depends on the label's radius
+        if free is not None and math.dist(free.centre, seen.centre) < seen.radius:
+            shown = free.radius
+        size = shown if press.radius is None else press.radius
+        if not 1.0 / (1.0 + LABEL_OFF) < size / max(shown, 1e-9) < 1.0 + LABEL_OFF:
             found.append(
-                f"{press.name}: its label has a radius of {labelled:.0f} pixels, and the contact "
-                f"in the picture one of {seen.radius:.0f}"
+                f"{press.name}: its label has a radius of {size:.0f} pixels, and the contact "
+                f"in the picture one of {shown:.0f}"
             )
     common = _common_place(denied)
     if 2 * twice > len(photographs.presses):

@@ -198,6 +198,25 @@ def test_wrong_labels_and_missing_contacts_are_told(photographs: Photographs) ->
     assert math.dist(used.centre, true.centre) < 0.1 * true.radius
 
 
+def test_a_blemish_of_the_background_replaces_no_label() -> None:
+    """A press that the camera hardly shows keeps its label; all photographs show the blemish."""
+    rng = np.random.default_rng(4)
+    plain = np.full((120, 160, 3), 120.0)
+    places = [(100.0, 40.0), (60.0, 50.0), (110.0, 80.0), (80.0, 60.0)]
+    presses = []
+    for place, strength in zip(places, (0.5, 0.5, 0.5, 0.0), strict=True):
+        shown = plain + strength * cone(place, 10.0) + rng.standard_normal(plain.shape)
+        picture = np.round(shown).astype(np.uint8)
+        presses.append(PhotographedPress("a.png", picture, 6.0, place, 10.0))
+    background = np.round(plain - cone((30.0, 90.0), 8.0)).astype(np.uint8)
+    photographs = Photographs(background, tuple(presses))
+    found = seen_contacts(photographs)
+    for seen, place in zip(found, places, strict=True):
+        assert seen is not None and math.dist(seen.centre, place) < 1.0
+    alone = seen_contacts(photographs.subset([3]))[0]
+    assert alone is not None and math.dist(alone.centre, (30.0, 90.0)) < 1.0
+
+
 def test_a_background_with_a_contact_is_told(photographs: Photographs) -> None:
     assert doubts(photographs) == []
     first, *others = photographs.presses
