@@ -2,13 +2,15 @@
 
 A rendered pixel shows what its chief ray meets. Photographs are averages of smaller pixels, so that
 the outline of the skin, such as the edge of a small mirror, is smooth, and shows displacements of a
-fraction of a pixel.
+fraction of a pixel. Photographs that were reduced in size are averages of levels, not of light. If
+half of a pixel sees a bright skin beside darkness, a tone curve of exponent 1/1.8 gives it 0.5 of
+the skin's level then, and 0.68 if its light was averaged.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
 
 FloatArray = NDArray[np.float64]
+FloatType = TypeVar("FloatType", np.float32, np.float64)
 
 COVERAGE_RAYS = 8
 """Number of chief rays across a pixel by which its coverage is determined. Where an edge of a
@@ -68,7 +71,7 @@ class SkinOutline:
         """Return layers (groups, h, w, 3) in which the nearest skin replaces all other pixels."""
         return layers[:, self.skin[0], self.skin[1]]
 
-    def contrast(self, layers: NDArray[np.float32]) -> NDArray[np.float32]:
+    def contrast(self, layers: NDArray[FloatType]) -> NDArray[FloatType]:
         """Return the difference (groups, n, 3) between skin and rest at the pixels of `where`."""
         (row, column), (other_row, other_column) = (
             each[:, self.where] for each in (self.skin, self.rest)
@@ -86,13 +89,21 @@ def outline_of(*coverages: FloatArray) -> SkinOutline | None:
     return SkinOutline(~inside & ~outside, outside, _nearest(inside), _nearest(outside))
 
 
-def with_smooth_outline(layers: NDArray[np.float32], coverage: FloatArray) -> NDArray[np.float32]:
-    """Return layers (groups, h, w, 3) whose pixels at the outline are averages of skin and rest."""
-    outline = outline_of(coverage)
+def with_smooth_outline(
+    layers: NDArray[FloatType], coverage: FloatArray, outline: SkinOutline | None = None
+) -> NDArray[FloatType]:
+    """Return layers (groups, h, w, 3) whose pixels at the outline are averages of skin and rest.
+
+    Args:
+        layers: radiance, or levels of a picture.
+        coverage: share (h, w) of each pixel that sees skin.
+        outline: the outline; that of `coverage` by default.
+    """
+    outline = outline or outline_of(coverage)
     if outline is None:
         return layers
     found = layers.copy()
-    share = coverage[outline.where, None].astype(np.float32)
+    share = coverage[outline.where, None].astype(layers.dtype)
     row, column = outline.rest[:, outline.where]
     rest = layers[:, row, column]
     found[:, outline.where] = rest + share * outline.contrast(layers)

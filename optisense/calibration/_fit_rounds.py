@@ -17,7 +17,12 @@ from optisense.calibration._contact_placing import (
 )
 from optisense.calibration._covered_view import CoveredView
 from optisense.calibration._gauss_newton import LayeredFit, RoughFit
-from optisense.calibration._layered_pictures import LayeredPictures, averaged, layered_pictures
+from optisense.calibration._layered_pictures import (
+    LayeredPictures,
+    PictureSlopes,
+    averaged,
+    layered_pictures,
+)
 from optisense.calibration._solution import Solution
 from optisense.calibration._view_slopes import view_changes, with_view
 from optisense.calibration.kept_renderings import KeptRenderings
@@ -117,7 +122,7 @@ class FitRounds:
         steps = np.zeros(len(self._chosen))
         small = self._small.subset(self._used)
         solution: Solution | None = None
-        slopes: dict[int, list[NDArray[np.float32]]] = {}
+        slopes: dict[int, PictureSlopes] = {}
         for number in range(self._settings.rounds):
             seen = [self._seen[index] for index in self._used]
             rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
@@ -146,7 +151,7 @@ class FitRounds:
         seen: Sequence[SeenContact],
         layers: LayeredPictures,
         steps: FloatArray,
-        slopes: dict[int, list[NDArray[np.float32]]],
+        slopes: dict[int, PictureSlopes],
         noise: LayeredPictures | None,
     ) -> Solution:
         """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
@@ -248,15 +253,19 @@ class FitRounds:
         steps: FloatArray,
         layers: LayeredPictures,
         view: CoveredView,
-    ) -> dict[int, list[NDArray[np.float32]]]:
+    ) -> dict[int, PictureSlopes]:
         """Return the slopes of the numbers of the view, by index, at layers with this view."""
-        found: dict[int, list[NDArray[np.float32]]] = {}
+        found: dict[int, PictureSlopes] = {}
         for number in self._rendering:
             if self._chosen[number].views:
                 other = self._other(number, steps, VIEW_DIFFERENCE)
                 size = np.float32(other[number] - steps[number])
-                changes = view_changes(layers, seen, view, self._view(small, other))
-                found[number] = [change / size for change in changes]
+                after = self._view(small, other)
+                changes = view_changes(layers, seen, view, after)
+                found[number] = PictureSlopes(
+                    [change / size for change in changes],
+                    None if layers.coverage is None else (after.coverage - view.coverage) / size,
+                )
         return found
 
     def _view(self, small: Photographs, steps: FloatArray) -> CoveredView:
@@ -279,8 +288,8 @@ class FitRounds:
         seen: Sequence[SeenContact],
         steps: FloatArray,
         layers: LayeredPictures,
-    ) -> dict[int, list[NDArray[np.float32]]]:
-        found: dict[int, list[NDArray[np.float32]]] = {}
+    ) -> dict[int, PictureSlopes]:
+        found: dict[int, PictureSlopes] = {}
         for number in self._rendering:
             each = self._chosen[number]
             if each.views:
@@ -294,5 +303,7 @@ class FitRounds:
                 [moved.background, *moved.presses], [layers.background, *layers.presses],
                 strict=True,
             )  # fmt: skip
-            found[number] = [((one - two) / size).astype(np.float32) for one, two in pairs]
+            found[number] = PictureSlopes(
+                [((one - two) / size).astype(np.float32) for one, two in pairs]
+            )
         return found

@@ -21,8 +21,13 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from optisense.calibration._correlated_errors import PHOTOGRAPH_NOISE, ErrorScale, error_scale
+from optisense.calibration._covered_view import outline_of, with_smooth_outline
 from optisense.calibration._far_field import without_drift
-from optisense.calibration._layered_pictures import LayeredPictures, contact_slopes
+from optisense.calibration._layered_pictures import (
+    LayeredPictures,
+    PictureSlopes,
+    contact_slopes,
+)
 from optisense.calibration._solution import Solution, jackknife_covariance
 from optisense.calibration.model_pictures import levels_of
 from optisense.calibration.photographs import Photographs
@@ -142,7 +147,7 @@ class LayeredFit:
         chosen: Sequence[FitQuantity],
         exposure: float,
         start: FloatArray,
-        slopes: dict[int, list[NDArray[np.float32]]],
+        slopes: dict[int, PictureSlopes],
         rough: RoughFit | None = None,
         noise: LayeredPictures | None = None,
     ) -> None:
@@ -155,8 +160,7 @@ class LayeredFit:
             chosen: quantities to fit.
             exposure: factor on the radiance.
             start: steps (n,) of the quantities at which the layers were rendered.
-            slopes: slopes of quantities that need a rendering, by index: changes of the layers of
-                the background and of each press per plausible range.
+            slopes: slopes of quantities that need a rendering, by index.
             rough: how pictures are compared in a rough round; None in the others.
             noise: errors of the layers by the noise of the light, a sample of them; None if they
                 are not known.
@@ -166,6 +170,10 @@ class LayeredFit:
         self._blur = 0.0 if rough is None else rough.blur
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
         self._start, self._slopes = start, slopes
+        self._outline = None
+        if layers.coverage is not None:
+            others = [each.coverage for each in slopes.values() if each.coverage is not None]
+            self._outline = outline_of(layers.coverage, *(layers.coverage + d for d in others))
         limits = np.array([each.limits() for each in chosen]).reshape(-1, 2)
         self._low, self._high = limits[:, 0], limits[:, 1]
         self._real = self._compared(photographs.background)
@@ -210,10 +218,13 @@ class LayeredFit:
         """Return the levels of a press, or of the background (index -1), with added noise."""
         layers = _picture(self._layers, index)
         moved = layers if noise is None else layers + _picture(noise, index)
+        coverage = self._layers.coverage
         for number, slopes in self._slopes.items():
             off = float(np.clip(steps[number] - self._start[number], -TRUST, TRUST))
             if off:
-                moved = moved + off * slopes[index + 1]
+                moved = moved + off * slopes.layers[index + 1]
+                if coverage is not None and slopes.coverage is not None:
+                    coverage = coverage + off * slopes.coverage
         if contact is not None and index >= 0:
             for amount, slope in zip(contact, self._contact_slopes[index], strict=True):
                 if amount:
@@ -222,6 +233,9 @@ class LayeredFit:
         radiance = np.tensordot(factors.astype(np.float32), moved, axes=1)
         chain = chain_with(self._layers.chain, self._chosen, steps)
         levels = levels_of(np.maximum(radiance, 0.0), chain, self._exposure)
+        if coverage is not None and self._outline is not None:
+            share = np.clip(coverage, 0.0, 1.0)
+            (levels,) = with_smooth_outline(levels[None], share, self._outline)
         return self._compared(levels)
 
     def _compared(self, levels: NDArray[Any]) -> FloatArray:

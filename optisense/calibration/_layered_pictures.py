@@ -41,6 +41,8 @@ class LayeredPictures:
         presses: radiance of each press, (groups, h, w, 3).
         chain: picture chain of the model's camera, without noise.
         contacts: contacts that were pressed in.
+        coverage: share (h, w) of each pixel that sees skin, if the photographs are averages of the
+            levels of smaller pixels; else None.
     """
 
     groups: tuple[str, ...]
@@ -48,6 +50,20 @@ class LayeredPictures:
     presses: tuple[FloatArray, ...] = field(repr=False)
     chain: PictureChain
     contacts: tuple[Contact, ...]
+    coverage: NDArray[np.float64] | None = field(default=None, repr=False)
+
+
+@dataclass(frozen=True)
+class PictureSlopes:
+    """Derivatives of layered pictures by a number, per plausible range.
+
+    Attributes:
+        layers: derivatives (groups, h, w, 3) of the background and of each press.
+        coverage: derivative (h, w) of the coverage; None if it does not change.
+    """
+
+    layers: Sequence[FloatArray] = field(repr=False)
+    coverage: NDArray[np.float64] | None = field(default=None, repr=False)
 
 
 def layered_pictures(
@@ -95,6 +111,7 @@ def layered_pictures(
     return LayeredPictures(
         tuple(model.design.lights), pictures[0], tuple(pictures[1:]),
         model.picture_chain.without_noise(), tuple(contacts),
+        view.coverage if photographs.scale < 1.0 else None,
     )  # fmt: skip
 
 

@@ -89,6 +89,7 @@ def with_view(
         layers,
         background=layers.background + ground,
         presses=tuple(one + two for one, two in zip(layers.presses, presses, strict=True)),
+        coverage=None if layers.coverage is None else after.coverage,
     )
 
 

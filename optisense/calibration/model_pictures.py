@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from optisense.calibration._covered_view import with_smooth_outline
 from optisense.calibration._layered_pictures import layered_pictures
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.photographs import Photographs
@@ -79,6 +80,8 @@ def model_pictures(
     if exposure is None:
         exposure = matched_exposure(background, layers.chain, photographs.background)
     pictures = [levels_of(each, layers.chain, exposure) for each in (background, *presses)]
+    if layers.coverage is not None:
+        pictures = list(with_smooth_outline(np.stack(pictures), layers.coverage))
     return ModelPictures(exposure, pictures[0], tuple(pictures[1:]), layers.contacts)
 
 

@@ -289,8 +289,14 @@ class _Shading:
         sparse = self._sparse = int(far.sum()) * beams > most
         filled = between_rays(rays, far) if sparse else np.zeros_like(far)
         first = far & ~filled
-        pixel = dr.compress(mi.Bool(padded(first.ravel())))
+        edge = np.zeros_like(far) if self.plan.draft else first & outline(rays.hit)
+        pixel = dr.compress(mi.Bool(padded((first & ~edge).ravel())))
         self.sample(pixel, dr.zeros(mi.UInt32, dr.width(pixel)), False)
+        if edge.any():
+            pixel, number = repeated(edge, OUTLINE_SAMPLES)
+            count = dr.opaque(mi.UInt32, OUTLINE_SAMPLES, dr.width(pixel))
+            dr.eval(pixel, number, count)
+            self.sample(pixel, number, False, count=count)
         reflections = self.reflections()
         if sparse:
             fill(reflections, filled)
@@ -301,14 +307,10 @@ class _Shading:
             layers[:, ::step, ::step].sum(axis=0) @ np.ones(3, dtype=np.float32),
             (far & rays.hit & (not self.plan.draft))[::step, ::step],
         )
-        edge = first & outline(rays.hit) if not self.plan.draft else np.zeros_like(far)
         grain &= ~edge
-        again = [repeated(edge, OUTLINE_SAMPLES)] if edge.any() else []
         if grain.any():
             affordable = int(first.sum()) // (2 * int(grain.sum()))
-            again.append(repeated(grain, min(GRAIN_SAMPLES, max(1, affordable))))
-        if again:
-            pixel, number = (dr.concat(each) for each in zip(*again, strict=True))
+            pixel, number = repeated(grain, min(GRAIN_SAMPLES, max(1, affordable)))
             dr.eval(pixel, number)
             self.sample(pixel, number, False, again=True)
             layers = self.main_layers() + reflections
