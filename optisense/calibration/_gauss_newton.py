@@ -72,6 +72,10 @@ off. Errors at one place of all pictures are not regarded as independent: those 
 same in all, and those of the background are in each response.
 """
 
+OUTLINE_ERROR = 0.08
+"""Expected error of a pixel at the outline of the skin, relative to the difference between skin and
+rest there: the RMS of simulated GelSight360 and GelSight Svelte, whose true designs were known."""
+
 NOISE_EXTENT = 6.0
 """Standard deviation, pixels, of the neighbourhood over which squares of the noise of the light are
 averaged: there is only one sample of it, and shadows, where it changes, are about as wide.
@@ -319,7 +323,8 @@ class LayeredFit:
     ) -> list[FloatArray]:
         """Return the expected errors (h, w, 3) of the background and of the responses, in levels.
 
-        They come from the noise of the photographs and of the light.
+        They come from the noise of the photographs and of the light, and, at the outline of the
+        skin, from the brightness of the skin, which is that of the nearest pixel inside.
         """
         noise = [np.zeros_like(shown) for shown in pictures]
         if self._noise is not None:
@@ -327,12 +332,17 @@ class LayeredFit:
                 noise[index + 1] = self._shown(index, steps, contacts[index], self._noise) - shown
             noise[0] = self._shown(-1, steps, None, self._noise) - pictures[0]
             noise[1:] = [each - noise[0] for each in noise[1:]]
-        return [
+        expected = [
             np.sqrt(
                 PHOTOGRAPH_NOISE**2 + gaussian_filter(each**2, (NOISE_EXTENT, NOISE_EXTENT, 0.0))
             )
             for each in noise
         ]
+        if self._outline is not None:
+            where = self._outline.where
+            (contrast,) = self._outline.contrast(pictures[0][None])
+            expected[0][where] = np.hypot(expected[0][where], OUTLINE_ERROR * contrast)
+        return expected
 
     def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:
         ground = float(np.sqrt(((pictures[0] - self._real) ** 2).mean()))
