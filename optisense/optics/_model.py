@@ -40,8 +40,8 @@ from optisense.optics.transport.photons import Emission
 from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
 
 SPPM_PASS_PHOTONS = 1_000_000
-"""Number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on GelSight
-Mini gets some 300 landings, and a photon map of 60 MB."""
+"""Largest number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on
+GelSight Mini gets some 300 landings, and a photon map of 60 MB."""
 
 
 @dataclass(frozen=True)
@@ -346,9 +346,11 @@ class OpticalModel(RayModel):
     ) -> ImageLayers:
         from optisense.optics.imaging.sppm import render_sppm
 
-        per_light = max(1, SPPM_PASS_PHOTONS // self.scenes.emitter_table.count)
-        emitted = per_light * self.scenes.emitter_table.count
-        passes = max(1, -(-(photons or 16 * SCORE_PHOTONS) // emitted))
+        wanted = photons or 16 * SCORE_PHOTONS
+        lights = self.scenes.emitter_table.count
+        passes = max(1, -(-wanted // SPPM_PASS_PHOTONS))
+        per_light = max(1, -(-wanted // (passes * lights)))
+        emitted = per_light * lights
 
         def stop(done: int) -> bool:
             on_stage(Stage.PHOTONS, done / passes, done * emitted, None)

@@ -33,9 +33,10 @@ FIELDS = {"gelsight-mini-ideal": 1, "gelsight-mini-ideal-cylindrical": 5}
 MAPPED = {"gelsight-mini-ideal": 2, "gelsight-mini-ideal-cylindrical": 4}
 """Pictures by photon mapping that are averaged: an even number, as their halves tell the noise."""
 
-PER_PIXEL = {"gelsight-mini-ideal": 0.07, "gelsight-mini-ideal-cylindrical": 0.2}
+PER_PIXEL = {"gelsight-mini-ideal": 0.07, "gelsight-mini-ideal-cylindrical": 0.28}
 """RMS error over the contact's pixels without the noise of photon mapping. Measured: flat 0.01 to
-0.04; cylinder, where few photons reach the ball's flanks and photon mapping is noisy, 0.05 to 0.15.
+0.04; cylinder, where few photons reach the ball's flanks and the noise of photon mapping, 0.1, is
+known from few pixels, 0 to 0.23.
 """
 
 OUTSIDE = 0.02
@@ -94,6 +95,7 @@ def test_groups_rendered_together_add_up_to_the_same_lights_in_one_group() -> No
         )
         for each in (parted, joined)
     ]
+    assert images[0].settings["photons"] == pytest.approx(PHOTONS, rel=0.01)
     a, b = (image.radiance for image in images)
     assert np.abs(a - b).max() < ROUNDING * b.max()
 
@@ -265,7 +267,7 @@ def test_the_light_field_agrees_with_photon_mapping(name: str, specularity: floa
     ]
     field = fields[0]
     mapped = [
-        of.render([BALL], resolution=PIXELS, photons=2_000_000, seed=seed, estimator="sppm")
+        of.render([BALL], resolution=PIXELS, photons=3_000_000, seed=seed, estimator="sppm")
         for seed in range(1, MAPPED[name] + 1)
     ]
     inside = field.contact_mask
