@@ -39,12 +39,14 @@ BROAD_MIRRORED_RAYS = 1
 """Value of `MIRRORED_RAYS` for lobes that are not narrower than most lamps; one suffices, as they
 receive little such light, and evenly from all directions."""
 MIRRORED_WIDTH = 1.0 / 40.0
-"""Width over which light from contacts is averaged on the skin, as a fraction of the image width:
-half a millimetre on GelSight Mini. A lobe of alpha 0.05 spreads it over 1 to 2 mm."""
+"""Width over which light from contacts is averaged, as a fraction of the image width: half a
+millimetre on GelSight Mini."""
 NARROW_MIRRORED_WIDTH = 1.0 / 107.0
-"""Value of `MIRRORED_WIDTH` in contacts, whose tilt varies, for narrow lobes: 3 pixels of 320. In a
-contact of GelSight Mini of specularity 1 this reduces the noise from 10 to 3 % of the mean and adds
-a blur of 2 %."""
+"""Width over which light that contacts reflect through the interfaces is averaged for narrow lobes:
+3 pixels of 320. In a contact of GelSight Mini of specularity 1 this reduces the noise from 10 to 3
+% of the mean and adds a blur of 2 %. On the skin within 0.6 mm of a contact of GelBelt,
+`MIRRORED_WIDTH` would make red and blue a sixth too dark in front of the flanks that face their
+lamps."""
 BESIDE_DIRECTIONS = 2
 """Number of rays per pixel that sample the light that contacts reflect to the skin beside them, in
 an image `REFERENCE_WIDTH` wide; smaller images take more. They are averaged over `MIRRORED_WIDTH`,
@@ -79,8 +81,8 @@ def mirrored_contact_layers(
     def light(points: VisiblePoints) -> PointLight | None:
         return mirrored_contacts(cache, scenes, points, rays)
 
-    inside = NARROW_MIRRORED_WIDTH if cache.binned.narrow_lobes else MIRRORED_WIDTH
-    over = [(skin, MIRRORED_WIDTH), (where & ~skin, inside)]
+    width = NARROW_MIRRORED_WIDTH if cache.binned.narrow_lobes else MIRRORED_WIDTH
+    over = [(skin, width), (where & ~skin, width)]
     return _averaged_layers(cache.binned.groups, scenes, camera, where, over, (seed, 9), light)
 
 

@@ -70,7 +70,7 @@ class SecondaryHits:
 
 
 def glossy_interreflection(
-    cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints
+    cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints, directions: int | None = None
 ) -> list[mi.Color3f]:
     """Return the radiance (3, n) towards the camera due to interreflected light, for each light
     group.
@@ -79,11 +79,13 @@ def glossy_interreflection(
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
         at: the points.
+        directions: number of rays from each point; by default that of points in contacts.
     """
     lanes = dr.width(at.seen.pixel)
     totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(cache.binned.groups)]
     dr.eval(at)
-    directions = DIRECTIONS if cache.binned.narrow_lobes else BROAD_DIRECTIONS
+    if directions is None:
+        directions = DIRECTIONS if cache.binned.narrow_lobes else BROAD_DIRECTIONS
     lane = dr.arange(mi.UInt32, lanes * directions)
     owner = lane // directions
     table = scenes.full.table

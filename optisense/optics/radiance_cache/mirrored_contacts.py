@@ -4,7 +4,8 @@ The radiance cache holds the light of the undeformed skin. A metallic coating re
 gel and glass in front of it, and these reflect the contacts. A few rays are therefore drawn from
 the lobes of each visible point and followed like paths from the camera. Where a ray ends on an
 indenter, the light of that place replaces the light of the undeformed skin behind it, which is in
-the cache.
+the cache. With narrow lobes, the place also receives the light of the skin beside it: where lamps
+are low, the skin mirrors them to the flank of a contact, which is then twice as bright.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from optisense.optics.radiance_cache.beam_sums import sum_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.glossy_interreflection import (
     SecondaryHits,
+    glossy_interreflection,
     light_of,
     shading_points,
 )
@@ -154,6 +156,10 @@ def _radiance_differences(
     coating = coating_of(scenes.full.table, behind.surface, behind.valid)
     flat = ShadingPoints(skin, coating, base, cell, shift, found & behind.valid, mi.Bool(False))
     without = sum_beams(cache.beams, cache.binned.groups, flat)
-    places = SecondaryHits(seen, mi.Bool(seen.valid), cell)
-    lit = light_of(cache, scenes, shading_points(cache, scenes, places))
+    places = shading_points(cache, scenes, SecondaryHits(seen, mi.Bool(seen.valid), cell))
+    lit = light_of(cache, scenes, places)
+    if cache.binned.narrow_lobes:
+        dr.eval(places, lit)
+        between = glossy_interreflection(cache, scenes, places, directions=1)
+        lit = [one + other for one, other in zip(lit, between, strict=True)]
     return [one - other for one, other in zip(lit, without, strict=True)]
