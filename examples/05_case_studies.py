@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import optisense as ots
+from optisense import sensors
 
 PAD = Path(__file__).resolve().parent.parent / "docs" / "examples" / "pad-sensor" / "sensor.yaml"
 
@@ -55,6 +56,14 @@ AT_PLACES = (
 COLOURINGS = f"--vary 'lights.*.colour=R,G,B' --method light-colours {AT_PLACES} --budget 200"
 """Up to 200 colourings: the search changes one group after another until no change helps."""
 
+ROW_ACROSS, ROW_HEIGHT = 42.0, -24.0
+"""Distance from the middle of GelBelt and height (z), mm, of its red and blue rows where they lie
+outside of the belt, whose half width is 18 mm, and below the window."""
+
+AIMED_BEYOND = 6.0
+"""Distance from the middle line of the skin to the line at which these rows are aimed, on its far
+side, mm, so that each row lights the skin more evenly."""
+
 CASES = {
     "cylinder": CaseStudy(
         "cylindrical GelSight Mini: its rows of LEDs are raised out of the light guide",
@@ -88,21 +97,16 @@ CASES = {
         ),
     ),
     "gelbelt": CaseStudy(
-        "GelBelt: positions, directions and powers of its LEDs and the coating",
+        "GelBelt: a thicker gel, rows of LEDs below the belt, the coating and the green power",
         (
-            "search gelbelt --vary lights.red.shift.x=-8:8 --vary lights.red.shift.y=-0.1:6 "
-            "--vary lights.red.shift.z=-3:1.4 --vary lights.red.aim.x=-50:50 "
-            "--vary lights.red.aim.z=-60:60 --vary lights.blue.shift.x=-8:8 "
-            "--vary lights.blue.shift.y=-6:0.1 --vary lights.blue.shift.z=-3:1.4 "
-            "--vary lights.blue.aim.x=-50:50 --vary lights.blue.aim.z=-60:60 "
-            "--vary lights.green.shift.x=-6:4 --vary lights.green.shift.z=-4:3 "
-            "--vary lights.green.aim.y=-50:50 --vary lights.red.flux=0.2:4 "
-            "--vary lights.blue.flux=0.2:4 --vary coating.specularity=0:0.4 "
-            "--vary coating.reflectance.r=0.2:0.9 --objective reading.mean_of_places "
-            "--set 'resolution=[320,240]' --set photons=1000000 --set together=true "
-            "--budget 224 --no-verify --out belt",
-            "apply belt --trial best --out better",
             "make matt",
+            "make rows-below",
+            "search rows-below "
+            "--vary 'coating.reflectance=[[0.7,0.7,0.7],[0.5,0.5,0.5],[0.3,0.3,0.3]]' "
+            "--vary lights.green.flux=0.7:2.1:3 --method grid --budget 9 "
+            "--objective reading.mean_of_places --set depth=0.6 --set 'resolution=[320,240]' "
+            "--set photons=1000000 --set together=true --no-verify --out belt",
+            "apply belt --trial best --out better",
             "verify matt better --quick --out proof",
         ),
     ),
@@ -180,6 +184,24 @@ def matt_belt() -> ots.SensorDesign:
     return design.model_copy(update={"name": "matt-belt"})
 
 
+def rows_below() -> ots.SensorDesign:
+    """GelBelt's light design 3, diffuse, with a gel of 4 mm, and with its red and blue rows 42 mm
+    from the middle and 24 mm below the skin, aimed at points 6 mm beyond its middle line.
+    """
+    design = ots.set_value(sensors.gelbelt(gel_thickness=4.0), "coating.specularity", 0.0)
+    for name, side in (("red", 1.0), ("blue", -1.0)):
+        across, up = ROW_ACROSS + AIMED_BEYOND, -ROW_HEIGHT
+        length = math.hypot(across, up)
+        for number, light in enumerate(design.lights[name].lights):
+            place = f"lights.{name}.lights[{number}]"
+            x = light.position[0]
+            position = (x, side * ROW_ACROSS, ROW_HEIGHT)
+            direction = (0.0, -side * across / length, up / length)
+            design = ots.set_value(design, f"{place}.position", position)
+            design = ots.set_value(design, f"{place}.direction", direction)
+    return design.model_copy(update={"name": "rows-below"})
+
+
 def best_of_paper() -> ots.SensorDesign:
     """GelSight360 with GBBRRGGB, the best of the paper's five colourings by `reading`."""
     design = ots.load("gelsight360")
@@ -189,7 +211,12 @@ def best_of_paper() -> ots.SensorDesign:
     return design.model_copy(update={"name": "best-of-paper"})
 
 
-MAKERS = {"tray": on_the_tray, "matt": matt_belt, "best-of-paper": best_of_paper}
+MAKERS = {
+    "tray": on_the_tray,
+    "matt": matt_belt,
+    "rows-below": rows_below,
+    "best-of-paper": best_of_paper,
+}
 """Designs that no search makes."""
 
 if __name__ == "__main__":

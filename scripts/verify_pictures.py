@@ -2,7 +2,8 @@
 
 python scripts/verify_pictures.py                    the objects that are pressed
 python scripts/verify_pictures.py svelte DESIGN      GelSight Svelte beside this one
-python scripts/verify_pictures.py pad START DESIGN   the pad sensor beside this one
+python scripts/verify_pictures.py CASE START DESIGN  the start of a case study beside this design;
+                                                     CASE is pad or gelbelt
 """
 
 from __future__ import annotations
@@ -57,7 +58,11 @@ def _copper() -> object:
     return colormaps["copper"]
 
 
-SHOWN = {"svelte": ("aoap", "coverage"), "pad": ("reading.mean_of_places", "coverage")}
+SHOWN = {
+    "svelte": ("aoap", "coverage"),
+    "pad": ("reading.mean_of_places", "coverage"),
+    "gelbelt": ("uniformity", "coverage"),
+}
 """Scores above the pictures, by the name of the case study."""
 
 
