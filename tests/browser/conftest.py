@@ -15,7 +15,7 @@ import pytest
 from playwright.sync_api import Browser, sync_playwright
 
 from .pages import write_pages
-from .visit import DESKTOP, Visit
+from .visit import DESKTOP, PATIENCE, Visit
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL by the processor
@@ -30,7 +30,7 @@ def browser() -> Iterator[Browser]:
     if program is None:
         pytest.skip("no Chromium is installed: make setup-browser")
     with sync_playwright() as playwright:
-        running = playwright.chromium.launch(executable_path=program, args=FLAGS)
+        running = playwright.chromium.launch(executable_path=program, args=FLAGS, timeout=PATIENCE)
         yield running
         running.close()
 

@@ -197,7 +197,7 @@ def test_a_watched_study_refreshes_itself_and_shows_any_trial(
     before = {path.name for path in folder.iterdir()}
     for _ in range(7):
         begun.may.release()
-    header.get_by_text("10 of 40").wait_for(timeout=60_000)
+    header.get_by_text("10 of 40").wait_for()
     figure = window.page.locator('[data-figure="convergence"]')
     figure.focus()
     for _ in range(2):
@@ -206,7 +206,7 @@ def test_a_watched_study_refreshes_itself_and_shows_any_trial(
     picture = window.page.locator("#trial img")
     assert picture.evaluate("(image) => image.decode().then(() => image.naturalWidth)") == 240
     begun.end()
-    header.get_by_text("40 of 40").wait_for(timeout=60_000)
+    header.get_by_text("40 of 40").wait_for()
     assert window.page.locator("#trial h2").inner_text() == "trial 2"  # it stays open
     assert {path.name for path in folder.iterdir()} <= before  # the page is written nowhere
     window.close()
@@ -217,7 +217,7 @@ def test_only_this_machine_is_answered(running: tuple[Running, str, Path]) -> No
     assert address.hostname == "127.0.0.1" and address.port
 
     def status(path: str, host: str) -> int:
-        asking = http.client.HTTPConnection("127.0.0.1", address.port, timeout=30)
+        asking = http.client.HTTPConnection("127.0.0.1", address.port)
         try:
             asking.request("GET", path, headers={"Host": host})
             return asking.getresponse().status

@@ -12,6 +12,10 @@ from playwright.sync_api import Browser, Locator
 
 DESKTOP, TELEPHONE = (1280, 900), (390, 844)
 
+PATIENCE = 600_000.0
+"""Longest time (ms) of a step of a browser. Only one that hangs takes so long, while on a busy
+machine a step can take more than the 30 s of Playwright's default."""
+
 
 class Visit:
     """A page that was opened.
@@ -37,6 +41,7 @@ class Visit:
         self._context = browser.new_context(
             viewport={"width": size[0], "height": size[1]}, **context
         )
+        self._context.set_default_timeout(PATIENCE)
         self.page = self._context.new_page()
         address = page if isinstance(page, str) else page.resolve().as_uri()
         self.page.on("console", self._hear)
