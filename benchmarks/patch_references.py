@@ -32,7 +32,7 @@ Render = Callable[[int], FloatArray]
 """Renders the picture of the window (rows, columns, 3) for a number of a batch."""
 
 CACHE = Path(__file__).parent / ".cache"
-PATH_SAMPLES = 16_384
+PATH_SAMPLES = 4_096
 """Number of the path tracer's samples per pixel in a batch."""
 PASS_SAMPLES = 1_024
 """Number of samples per pixel in one call of the path tracer."""
