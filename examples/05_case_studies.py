@@ -119,7 +119,11 @@ CASES = {
             f"{AT_PLACES} --out coating",
             "apply coating --trial best --out coated",
             f"search coated {COLOURINGS} --out again",
-            "apply again --trial best --out better",
+            "apply again --trial best --out recoloured",
+            "search recoloured --vary 'coating.reflectance=[[0.5,0.5,0.5],[0.3,0.3,0.3],"
+            f"[0.15,0.15,0.15],[0.08,0.08,0.08]]' --method grid --budget 4 {AT_PLACES} "
+            "--out darker",
+            "apply darker --trial best --out better",
             "make best-of-paper",
             "verify best-of-paper better --presses 150 --places 2 --resolution 320x240 "
             "--photons 500000 --out proof",
