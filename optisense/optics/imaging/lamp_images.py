@@ -46,10 +46,11 @@ light around it then adds 3 % to its middle."""
 class LampImages:
     """The mirror images of the lamps of a sensor.
 
-    The light does not reach the skin and does not depend on contacts. The image that was made last
-    is kept, so that images with and without contacts, which are subtracted from each other, have
-    the same mirror images. Lamps are so bright that the rare path (one in a thousand) that meets
-    one would be a speck, whose light is spread over the pixels around it.
+    Interfaces reflect this light to the camera before it reaches the skin, so that it does not
+    depend on contacts. The image that was made last is kept: images with and without contacts,
+    which are subtracted from each other, then have the same mirror images. Lamps are so bright that
+    a rare path (one in a thousand) that meets one causes a speck. The light of specks is spread
+    over the pixels around them.
     """
 
     def __init__(self, scene: RayScene, emitters: list[Emitter], groups: int) -> None:
