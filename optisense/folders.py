@@ -63,7 +63,6 @@ class FolderLock:
         """Take the lock, create the folder if needed, and clean up after killed processes.
 
         Args:
-            folder: path of the folder.
             wait: whether to wait for another process instead of failing.
             hint: remedy if the folder can't be written.
 

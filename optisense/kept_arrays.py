@@ -51,7 +51,6 @@ class KeptArrays:
         Args:
             inputs: all values that determine the arrays: numbers, texts, paths, arrays, and
                 sequences, dictionaries and dataclasses of these.
-            make: function that makes the arrays.
             names: names that stored arrays must have, in their order.
 
         Raises:

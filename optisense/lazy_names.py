@@ -18,7 +18,6 @@ def load_on_first_use(
     For type checkers the package imports the same names under `TYPE_CHECKING`.
 
     Args:
-        package: name of the package.
         homes: module of each public name, relative to the package (`".model"`); if the module has
             the same name as the public name, the name stands for the module.
         before: function that is called before each import.

@@ -70,7 +70,6 @@ class TimeLeft:
         """Start the clock; no step has begun.
 
         Args:
-            steps: steps in their order.
             workers: number of processes that share pieces with times of their own.
             clock: function that returns the time, s.
         """

@@ -35,7 +35,6 @@ def read_arrays(path: Path, error: Error, most: int = MOST_ARRAYS) -> dict[str, 
     """Return the arrays of an NPZ file by name; pickled objects in it are refused.
 
     Args:
-        path: path of the file.
         error: class of the error that is raised.
         most: largest size of all arrays together, unpacked, bytes.
 
@@ -82,7 +81,6 @@ def check_arrays(
     """Check that all arrays of a picture exist, and have the right type and size.
 
     Args:
-        arrays: arrays by name.
         kinds: required arrays by name: the allowed types, as NumPy's `dtype.kind`, and the number
             of channels (None for an array without a channel axis).
         size: height and width.

@@ -78,7 +78,6 @@ def read_bytes(path: Path, most: int, error: Error, what: str = "the file") -> b
     """Return the content of a regular file that is not too large.
 
     Args:
-        path: path of the file.
         most: largest size, bytes; a larger file is refused before it is read.
         error: class of the error that is raised.
         what: name of the file in messages, such as "the mesh file".
@@ -202,7 +201,6 @@ def read_table(path: Path, error: Error, padded: bool = False) -> list[dict[str,
     """Return the rows of a CSV file as text, by column.
 
     Args:
-        path: path of the file.
         error: class of the exception to raise.
         padded: whether a row may have fewer values than there are columns, as in tables that are
             written by hand; the others are empty.

@@ -121,7 +121,6 @@ def is_own_page(path: Path, kind: str) -> bool:
     """Return whether a file is an HTML page that this program has written.
 
     Args:
-        path: path of the file.
         kind: kind of the page, which its head names: "render", "scores", "search", "tolerance",
             "compare" or "calibrate".
     """
@@ -140,7 +139,6 @@ def remove_own_page(path: Path, kind: str) -> None:
     Any other file of that name belongs to the user, and is kept.
 
     Args:
-        path: path of the page.
         kind: see `is_own_page`.
 
     Raises:

@@ -58,13 +58,9 @@ def placed(
     """Return the contacts where the model's responses are closest to the photographs'.
 
     Args:
-        model: model of the sensor.
         photographs: photographs, at the size of a fit.
-        seen: contacts in them.
         photons: number of photons of the light.
-        seed: seed of the light.
         exposure: factor on the radiance; the one that brings the background closest if None.
-        kept: store of renderings.
 
     Raises:
         CalibrationError: a contact is not on the model's skin.

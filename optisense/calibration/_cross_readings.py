@@ -98,9 +98,6 @@ def realism_and_readings(
     """Return all figures of a model's pictures beside photographs.
 
     Args:
-        model: model that made the pictures.
-        photographs: photographs of the sensor.
-        seen: contacts in the photographs.
         pictures: pictures of the model, of the same presses.
     """
     found = realism(photographs, seen, pictures)
@@ -125,8 +122,6 @@ def cross_readings(
     amplifies it.
 
     Args:
-        photographs: photographs of the sensor.
-        seen: contacts in the photographs.
         pictures: pictures of the model, of the same presses.
         rays: the model's chief rays at the photographs' size.
         axes: axes (3, 3) of the camera: right, up and viewing direction.

@@ -48,11 +48,6 @@ def with_known_total(
 
     Photographs determine the ratios of powers only. If the sum is kept, the error of one power
     changes all others: a power that alone is uncertain makes them uncertain, too.
-
-    Args:
-        chosen: fitted quantities.
-        solution: their solution.
-        fitted: fitted design.
     """
     total = sum(group.flux * len(group.lights) for group in fitted.lights.values())
     powers, shares = [], []

@@ -158,10 +158,7 @@ class LayeredFit:
         """Prepare a round.
 
         Args:
-            photographs: photographs to fit.
-            seen: contacts in the photographs.
             layers: layers of the model at `start`.
-            chosen: quantities to fit.
             exposure: factor on the radiance.
             start: steps (n,) of the quantities at which the layers were rendered.
             slopes: slopes of quantities that need a rendering, by index.

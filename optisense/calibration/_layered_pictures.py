@@ -79,13 +79,9 @@ def layered_pictures(
     """Render the background and the presses of photographs as layers.
 
     Args:
-        model: model of the sensor.
         photographs: photographs whose size and presses are used.
-        seen: contact in each photograph.
         photons: number of photons of the light that all pictures share.
-        seed: seed of the light.
         contacts: contacts to press in, if they are known already.
-        kept: store of renderings.
         progress: function that is called with the number of finished pictures.
 
     Raises:

@@ -56,7 +56,6 @@ def view_changes(
 
     Args:
         layers: layers before the change.
-        seen: contacts in the photographs.
         before, after: views before and after the change, at the size of the layers.
     """
     columns, rows = displacements(before.rays, after.rays)

@@ -50,7 +50,6 @@ def usable(
     findings.
 
     Args:
-        photographs: photographs as they were read.
         refine: whether labelled contacts are searched near their labels too.
 
     Raises:

@@ -40,10 +40,8 @@ class KeptRenderings(KeptArrays):
         """Return layers (h, w, 3) by light group: stored ones, or else new ones, which are stored.
 
         Args:
-            design: design to render.
             contacts: contacts to press into it.
             settings: all other inputs of the picture.
-            render: function that makes the layers.
 
         Raises:
             OutputError: the layers can't be written.

@@ -60,13 +60,8 @@ def model_pictures(
     """Render the background and the presses of photographs.
 
     Args:
-        model: model of the sensor.
-        photographs: photographs of the real sensor.
-        seen: contact in each photograph.
         photons: number of photons of the light that all pictures share.
-        seed: seed of the light.
         exposure: factor on the radiance; the one that brings the background closest if None.
-        kept: store of renderings.
         progress: function that is called with the number of finished pictures.
 
     Raises:
@@ -99,7 +94,6 @@ def matched_exposure(
 
     Args:
         radiance: (h, w, 3) radiance, mW/(mm^2 sr).
-        chain: picture chain of the camera.
         photograph: (h, w, 3) uint8.
 
     Raises:

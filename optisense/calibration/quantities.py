@@ -32,7 +32,6 @@ def quantities_of(
     """Return the quantities of a design that are fitted.
 
     Args:
-        design: design to start from.
         families: names of families, of `FAMILIES`.
         asked: path, smallest and largest value of further numbers of the design.
 
@@ -79,8 +78,6 @@ def designed(
     """Return a design with the numbers of a fit.
 
     Args:
-        design: design of the quantities.
-        chosen: quantities.
         steps: (n,) distance of each from its start, in plausible ranges.
 
     Raises:
@@ -125,7 +122,6 @@ def chain_with(
 
     Args:
         chain: picture chain of the design that the quantities are of.
-        chosen: quantities.
         steps: (n,) distance of each from its start, in plausible ranges.
     """
     matrix: FloatArray | None = None

@@ -193,8 +193,6 @@ def realism(
     """Compare a model's pictures with photographs.
 
     Args:
-        photographs: photographs of the real sensor.
-        seen: contact in each photograph.
         pictures: pictures of the model, of the same presses.
     """
     real = photographs.background.astype(np.float64)
@@ -248,7 +246,6 @@ def _noise_figures(real: FloatArray, seen: SeenContact, noise: float) -> NoiseFi
 
     Args:
         real: real response (h, w, 3).
-        seen: contact.
         noise: standard deviation of the noise of the response, levels.
     """
     distance = distances(real.shape[:2], seen)

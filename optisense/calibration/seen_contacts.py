@@ -55,7 +55,6 @@ def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[Seen
     """Return the contact in each photograph.
 
     Args:
-        photographs: photographs with labels or without.
         refine: whether labelled contacts are also searched, near their labels; hand labels are off
             by pixels. If the picture beside a label does not look like a ball, while it does at
             another place, that place is taken; if it does nowhere, the label is kept. A place at
@@ -199,9 +198,6 @@ def contact_of(
     """Return the contact of a model that touches where a photograph shows it.
 
     Args:
-        press: press of a ball.
-        seen: contact in the photograph.
-        model: model of the sensor.
         rays: chief rays of the model, at the photograph's size.
 
     Raises:

@@ -155,7 +155,6 @@ def _from_tuning(
 
     Args:
         what: argument of the command: the word camera.
-        tuning: tuning file.
         given: data that the file lacks.
         name: name for designs; the file's name if None.
         description: description in one line.

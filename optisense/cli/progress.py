@@ -62,7 +62,6 @@ class ProgressLine:
         """Begin a step of the work.
 
         Args:
-            step: name of the step.
             count, done: see `TimeLeft.begin`.
             text: text of the step; its name if None.
         """
@@ -170,7 +169,6 @@ def progress_line(
     to time.
 
     Args:
-        steps: steps of the work.
         waits: function that says what Ctrl-C waits for, if it does not act at once; see
             `stopping.waiting`.
     """

@@ -48,8 +48,7 @@ def sample_steps(
 
     Args:
         name: name of the samples, different from that of other samples.
-        photons: photons of their light.
-        count: number of samples.
+        photons: photons of the samples' light.
         work: processor time of a sample on GelSight Mini, s.
         after: time of the work after the last sample, s.
         is_cached: whether the light is cached already, since other samples have used it.
@@ -79,7 +78,6 @@ def load_sensor(
         line: progress line with the steps of `loading_steps`.
         source: name or folder of the design.
         out: output folder, if there is one.
-        variant: variant of the renderer.
         steps: function that returns the later steps for usual durations and the design.
 
     Raises:
@@ -103,8 +101,6 @@ def set_expected_durations(
     """Set the expected durations for this sensor on this machine, once both are known.
 
     Args:
-        line: progress line of the steps.
-        design: design of the sensor.
         steps: function that returns the steps for usual durations.
     """
     times = UsualTimes.here(design.sensing_area, len(design.lights))
@@ -120,8 +116,7 @@ def sample_progress(
     Args:
         line: progress line with the steps of `sample_steps`.
         model: model of the sensor, which reports the progress of its light.
-        name: name of the samples.
-        after: text of the work after them.
+        after: text of the work after the samples.
     """
     line.begin(_light(name), text=f"{name}: tracing light")
     first: list[int] = []

@@ -185,7 +185,6 @@ def install(blender: Path, archive: Path, environment: dict[str, str]) -> None:
     """Install the extension for the user and enable it, in place of an older one.
 
     Args:
-        blender: executable of Blender.
         archive: zip of the extension.
         environment: environment for Blender; the extension stores the engine's command from it.
 

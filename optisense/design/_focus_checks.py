@@ -32,7 +32,6 @@ def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
     Designs with mirrors are not checked.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
     """
     camera = design.camera
@@ -68,7 +67,6 @@ def apparent_distances(design: SensorDesign, meshes: dict[str, TriangleMesh]) ->
     along the ray for others.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
 
     Returns:
@@ -103,7 +101,6 @@ def _reduced(
     """Return the apparent lengths (k,) of rays, mm: each piece is divided by its medium's index.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
         origin: start (3,) of all rays, mm.
         rays: unit directions (k, 3).

@@ -29,7 +29,6 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
     """Return problems of solids of different index that overlap without a priority between them.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
     """
     problems: list[Diagnostic] = []
@@ -60,7 +59,6 @@ def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]
     """Return a mask (n,) of the points that lie in the picture along straight rays.
 
     Args:
-        camera: camera of the design.
         points: points (n, 3), mm.
     """
     across, down = picture_places(camera, points)

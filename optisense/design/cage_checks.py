@@ -123,7 +123,6 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     Cages that have moved are left to `cage_problems`.
 
     Args:
-        design: design to check.
         meshes: deformed meshes, mm, by part.
     """
     solids = [name for name in meshes if design.parts[name].role in TRANSPARENT_SOLIDS]

@@ -63,7 +63,6 @@ def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
     """Return the problem of a field of view that no lens has.
 
     Args:
-        camera: camera of the design.
         where: place of the field of view in the design.
     """
     if camera.fov < NARROWEST:
@@ -109,7 +108,6 @@ def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
     medium.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
     """
     position = np.array(design.camera.position)
@@ -144,7 +142,6 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagn
     """Return the first reason why the camera can't exist, or None.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
     """
     found = lens_problems(design.camera, design.where("camera", "fov"))
@@ -160,7 +157,6 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     mirrors are not checked.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
     """
     shares = view_shares(design, meshes)
@@ -195,7 +191,6 @@ def view_shares(
     along straight rays.
 
     Args:
-        design: design of the sensor.
         meshes: deformed meshes, mm, by part.
 
     Returns:

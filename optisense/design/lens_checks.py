@@ -11,8 +11,7 @@ def fold_problems(camera: Camera, where: str) -> list[Diagnostic]:
     """Return the problem of a distortion that folds within the picture.
 
     Args:
-        camera: camera of the design.
-        where: place of its distortion in the design.
+        where: place of the lens's distortion in the design.
     """
     angle = folding_angle(camera)
     if angle is None:

@@ -86,8 +86,7 @@ def absorption_problems(
     once.
 
     Args:
-        design: design of the sensor.
-        meshes: meshes of its parts, mm, by part.
+        meshes: meshes of the design's parts, mm, by part.
     """
     problems: list[Diagnostic] = []
     told: set[str] = set()

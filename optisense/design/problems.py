@@ -55,7 +55,6 @@ def raise_problems(problems: list[Diagnostic], source: str, unseen: int = 0) -> 
     """Raise one DesignError for all problems of severity "error"; return if there are none.
 
     Args:
-        problems: problems.
         source: file, or other source of the problems.
         unseen: number of further problems.
     """
@@ -83,11 +82,8 @@ def design_error(
     """Return the DesignError for an error of pydantic.
 
     Args:
-        error: error of pydantic.
-        data: data that were validated.
         where: file, or dotted path that was set.
         lines: line of each path in the file, if there is one.
-        model: model of the data.
     """
     problems = _problems(error, data, where, lines or {}, model)
     try:

@@ -41,7 +41,6 @@ def shown_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatA
     """Return x and y (2, ...) on the image plane, as the lens shows them, of positions.
 
     Args:
-        camera: camera of the design.
         across, down: positions (...) in the picture, in shares of its width and height.
     """
     edge, tall = image_edges(camera)
@@ -53,7 +52,6 @@ def ideal_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatA
     """Return x and y (2, ...) on the image plane of an ideal lens for positions in the picture.
 
     Args:
-        camera: camera of the design.
         across, down: positions (...) in the picture, in shares of its width and height.
     """
     shown = shown_places(camera, across, down)
@@ -68,7 +66,6 @@ def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArr
     """Return unit vectors (..., 3) in the viewing directions of positions in the picture.
 
     Args:
-        camera: camera of the design.
         across, down: positions (...) in the picture, in shares of its width and height.
     """
     x, y = ideal_places(camera, across, down)
@@ -86,7 +83,6 @@ def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, Floa
     show are NaN.
 
     Args:
-        camera: camera of the design.
         points: points (n, 3), mm.
     """
     right, up, depth = camera.axes() @ (np.asarray(points) - np.array(camera.position)).T
@@ -152,7 +148,6 @@ def _first_fold(camera: Camera, shown: FloatArray) -> float:
     """Return the smallest angle off the axis, degrees, at which the lens folds.
 
     Args:
-        camera: camera of the design.
         shown: positions (2, k) on the image plane, towards the farthest of which the fold is
             searched.
     """

@@ -51,7 +51,6 @@ def ggx_density(cosine: ArrayLike, alpha: float) -> FloatArray:
 
     Args:
         cosine: cosine (...) of the angle between facet normal and mean normal.
-        alpha: roughness.
     """
     cos2 = np.square(np.asarray(cosine, dtype=np.float64))
     return np.asarray(alpha**2 / (np.pi * np.square(cos2 * (alpha**2 - 1.0) + 1.0)))
@@ -64,7 +63,6 @@ def smith_shadowing(cosine: ArrayLike, alpha: float) -> FloatArray:
 
     Args:
         cosine: cosine (...) of the angle between direction and mean normal.
-        alpha: roughness.
     """
     cos2 = np.maximum(np.square(np.asarray(cosine, dtype=np.float64)), 1e-12)
     tan2 = (1.0 - cos2) / cos2
@@ -79,7 +77,6 @@ def sample_facets(view: FloatArray, alpha: float, u: FloatArray) -> FloatArray:
 
     Args:
         view: unit directions (n, 3), z above 0.
-        alpha: roughness.
         u: numbers (n, 2) from 0 to 1.
 
     Returns:

@@ -58,7 +58,6 @@ def section_svg(design: SensorDesign, rays: Sequence[DrawnRay] = ()) -> str:
     The camera's view points upward. Lights and rays are projected onto the plane of the section.
 
     Args:
-        design: design of the sensor.
         rays: chief rays of the camera to draw, if any.
     """
     found = section(design)

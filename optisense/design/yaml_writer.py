@@ -31,7 +31,6 @@ def to_yaml(model: BaseModel, head: str) -> str:
     """Return the text of a model with all fields except those that are None.
 
     Args:
-        model: model to write.
         head: comment line for the top.
     """
     return "\n".join([f"# {head}", *_model(model, "")]) + "\n"

@@ -83,7 +83,6 @@ def errors_naming_contact(contacts: Sequence[Contact], place: Place) -> Iterator
     """Context in which an error about one of several contacts names that contact.
 
     Args:
-        contacts: all contacts.
         place: function that presses one contact in, and raises an error if it can't.
 
     Raises:

@@ -122,7 +122,6 @@ def place_in(message: str, parts: object = None) -> str | None:
     names.
 
     Args:
-        message: message of an error.
         parts: parts of the design as JSON; a value of another type counts as no parts.
     """
     known = parts if isinstance(parts, dict) else {}

@@ -47,8 +47,6 @@ class Following:
         """Store the arguments; `result` follows the study.
 
         Args:
-            folder: folder of the study.
-            job: request that gets the events.
             files: files for the meshes of the best trial.
             child: process that runs the study, if the engine has started it.
             budget: total number of trials; the study's own budget if None.

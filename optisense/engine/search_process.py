@@ -37,7 +37,6 @@ class SearchProcess:
         """Start the process.
 
         Args:
-            folder: folder of the study.
             workers: number of processes that score trials.
             budget: total number of trials; the study's own budget if None.
             go_on: whether it continues after the end of this process.

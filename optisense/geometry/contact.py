@@ -219,7 +219,6 @@ def surface_axes(
 
     Args:
         inward: (3,) unit normal there.
-        surface: the surface.
         along: direction in the design's frame that x follows instead of u.
     """
     z = -inward

@@ -123,7 +123,6 @@ def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:
 
     Args:
         mesh: the mesh, mm; its normals are written if it has any.
-        name: name of the object.
     """
     lines = ["# millimetres"] + ([] if name is None else [f"o {name}"])
     lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]

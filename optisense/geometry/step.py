@@ -67,7 +67,6 @@ def no_step(error: ImportError, action: str, instead: str, where: Path | None = 
     """Return the error to raise if Open CASCADE cannot be imported.
 
     Args:
-        error: the error of the import.
         action: "reading" or "writing".
         instead: hint for what a user can do without it.
         where: the file.

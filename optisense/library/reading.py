@@ -59,7 +59,6 @@ def make_entry(kind: Kind, name: str, data: Any, lines: Lines, source: str) -> A
     """Check the data of an entry, and return the entry.
 
     Args:
-        data: data from YAML.
         lines: line of each value in the data; the first line of all is under ().
         source: file, for messages.
 

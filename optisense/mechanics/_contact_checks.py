@@ -47,7 +47,6 @@ def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
     """Raise if the mesh of an indenter has an open edge where it touches the skin.
 
     Args:
-        place: the footprint of the contact.
         indenter: the placed mesh of the indenter in the design's frame, mm.
 
     Raises:

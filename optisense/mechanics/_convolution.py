@@ -46,7 +46,6 @@ class GridResponse:
             shape: (rows, columns); rows follow y and columns follow x.
             pitch: side of a square, mm.
             thickness: thickness of the layer, mm.
-            elasticity: elastic constants of the layer.
             farthest: largest number of rows and of columns between a loaded square and any square
                 of the grid; without it, all squares may be loaded.
         """

@@ -83,11 +83,9 @@ class DisplacementField:
         """Compute the displacement due to a pressure.
 
         Args:
-            place: the grid of the pressure.
             overlap: (rows, columns) overlap (mm) of the place, minus the displacement due to other
                 contacts and minus ``beyond``.
             pressure: (rows, columns) pressure, MPa.
-            elasticity: elastic constants of the gel.
             beyond: normal displacement of the gel in addition to that of a flat layer.
             patch: the shape of the gel, from which ``beyond`` was computed.
         """
@@ -326,9 +324,7 @@ def tangential_beyond(
     """Return splines of the contribution (mm) of a gel's shape to displacements along x and y.
 
     Args:
-        patch: the gel's shape.
         loads: (3, rows, columns) loads (MPa) along x and y and into the gel.
-        place: the grid of the loads.
         shear_modulus: shear modulus of the gel, MPa.
     """
     pitch, start = patch.columns.pitch, (patch.x[0], patch.y[0])

@@ -104,7 +104,6 @@ def gel_columns(
     """Return the columns around a contact; None if there are too few for a body.
 
     Args:
-        place: the footprint of the contact.
         loaded: half sides (mm) of the rectangle around the contact that carries loads.
         skin: the undeformed sensing surface, in the design's frame.
         elastomers: the gels under it.

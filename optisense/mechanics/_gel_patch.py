@@ -82,7 +82,6 @@ class GelPatch:
         """Set up the elements.
 
         Args:
-            columns: the columns of the gel.
             loaded: half sides (mm) of the rectangle in which loads lie.
             thickness: thickness (mm) of the flat layer to which the response is compared.
             poisson_ratio: Poisson's ratio of the gel.

@@ -232,7 +232,6 @@ def press(
 
     Args:
         places: the footprint of each indenter on the undeformed skin.
-        elasticity: elastic constants of the gel.
         patches: the gel's shape around each place; None where it is a flat layer.
         drags: the motion of each indenter along the skin after it was pressed in; None where there
             is none.
@@ -309,7 +308,6 @@ def _refuse_unsettled(what: str, turns: int, change: float) -> None:
 
     Args:
         what: what is solved for.
-        turns: number of iterations.
         change: last change of the displacements, mm.
 
     Raises:

@@ -67,7 +67,6 @@ def aoap(
     not arrive), plus k1 times the share of the surface's triangles that are seen.
 
     Args:
-        evaluation: the sensor.
         coverage_weight: weight k1, from 0 to 1; with 1, full coverage counts as much as
             perpendicular rays.
     """

@@ -48,9 +48,6 @@ def bend_radius(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 
     One hundredth of a part's area may be bent more sharply. The part `of_parts` has the radius of
     each part, and `sharpest` the smallest radius anywhere.
-
-    Args:
-        evaluation: the sensor.
     """
     design = evaluation.design
     names = dict.fromkeys(part for cage in design.cages.values() for part in cage.parts)

@@ -32,7 +32,6 @@ class CachedValues:
 
         Args:
             name: name of the value, with the settings that it depends on.
-            make: function that computes the value.
         """
         if name not in self._made:
             began = time.perf_counter()

@@ -32,9 +32,6 @@ def cage_roughness(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     the difference between a point's displacement and the mean displacement of these neighbours. It
     is 0 if the lattice is moved, stretched or sheared as a whole, which bends nothing. The value is
     that of the roughest cage; `largest` is the largest such difference.
-
-    Args:
-        evaluation: the sensor.
     """
     found, largest = {}, 0.0
     for name, cage in evaluation.design.cages.items():

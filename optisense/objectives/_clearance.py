@@ -56,9 +56,6 @@ def clearance(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 
     Parts that touch before cages bend them, such as a gel and its tray, are left out. The value is
     0 if others intersect. `of_parts` names the two that are nearest.
-
-    Args:
-        evaluation: the sensor.
     """
     design = evaluation.design
     bent = design.deformed_meshes()

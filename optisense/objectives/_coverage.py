@@ -33,9 +33,6 @@ def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, A
 
     The value is the share of the surface's triangles on which a chief ray arrives, as in AOAP; the
     part `by_area` weights each triangle by its area.
-
-    Args:
-        evaluation: the sensor.
     """
     rays = evaluation.checked_rays
     seen = triangles_seen(evaluation)

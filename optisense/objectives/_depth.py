@@ -53,7 +53,6 @@ def depth(
     value is the median over places of the mean absolute difference over the pixels of a contact.
 
     Args:
-        evaluation: the sensor.
         camera_noise: standard deviation of the noise of all pictures, levels of 255.
     """
     places: list[dict[str, Any]] = []

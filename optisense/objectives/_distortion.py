@@ -64,9 +64,6 @@ def distortion(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str,
 
     The value is the geometric mean over all footprints, 1 at best. The part `area_variation` is the
     standard deviation of their areas over the mean.
-
-    Args:
-        evaluation: the sensor.
     """
     rays = evaluation.checked_rays
     long, wide = seen_footprints(rays)

@@ -32,9 +32,6 @@ def draft(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     wall is parallel to the direction, and negative in an undercut, where the sheet cannot be
     removed. Castings usually need 1 to 3 degrees. One hundredth of a sheet's area may be steeper,
     as in `bend_radius`. Closed bodies are left out; a gel is formed by the skin on it.
-
-    Args:
-        evaluation: the sensor.
     """
     design = evaluation.design
     bent = design.deformed_meshes()

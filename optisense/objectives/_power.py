@@ -29,9 +29,6 @@ def power(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """The radiant flux, in mW, of all LEDs of the sensor.
 
     The electrical power is the radiant flux over the LEDs' efficiency.
-
-    Args:
-        evaluation: the sensor.
     """
     lights = evaluation.design.lights
     groups = {name: group.flux * len(group.lights) for name, group in lights.items()}

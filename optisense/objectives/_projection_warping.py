@@ -83,7 +83,6 @@ def projection_warping(
     Each quad of neighbouring pixels forms two triangles on the surface.
 
     Args:
-        evaluation: the sensor.
         jump: ratio of an edge's length to its neighbours' above which the edge crosses a fold or a
             gap, and its triangles are left out.
     """

@@ -52,7 +52,6 @@ def reading(
     contain little information, unlike a real calibration.
 
     Args:
-        evaluation: the sensor.
         camera_noise: standard deviation of the noise of all pictures, levels of 255.
     """
     places: list[dict[str, Any]] = []

@@ -41,9 +41,6 @@ def shadow(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any
     It is the share of the pixels that lose a quarter or more of any colour, among those that see
     the skin beside the ball and are lit in that colour; the mean over places. Small images are
     rendered for it.
-
-    Args:
-        evaluation: the sensor.
     """
     before = _image(evaluation, [])
     seen = np.linalg.norm(before.normals, axis=2) > 0.5

@@ -47,9 +47,6 @@ def sharpness(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, 
     The squared width is the sum of two squares: the longer side of the footprint of the camera's
     pixel, and the line width at which the lens's blur leaves a tenth of the contrast. The value is
     the mean over the skin that is seen.
-
-    Args:
-        evaluation: the sensor.
     """
     rays = evaluation.checked_rays
     long, wide = seen_footprints(rays)

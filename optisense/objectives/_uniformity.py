@@ -38,9 +38,6 @@ def uniformity(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str,
 
     The value is the ratio of the 5th to the 95th percentile of the linear light in the pixels that
     see the skin, the smallest over those of red, green and blue that are lit; 1 is even.
-
-    Args:
-        evaluation: the sensor.
     """
     evaluation.view.refuse_less(evaluation.settings)
     image = evaluation.untouched

@@ -51,7 +51,6 @@ def combined(
     """Return the objective that an expression defines.
 
     Args:
-        expression: the expression to compute.
         known: objectives by their names in the expression; others are looked up in the registry.
 
     Raises:

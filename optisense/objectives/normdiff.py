@@ -135,7 +135,6 @@ def normdiff(
     pixels whose colour lies within the noise; it is averaged over normals and places.
 
     Args:
-        evaluation: the sensor.
         noise: half the width of the colour range, as a share of the value in each channel.
         theta_weight, phi_weight: weights of the two ranges in the sum.
         nearest_only: whether the confusion at a normal is that of the one pixel nearest to it,

@@ -292,7 +292,6 @@ def from_file(path: Path, function: str | None = None) -> Objective:
     """Load a user's objective from a Python file, which is run.
 
     Args:
-        path: the file.
         function: name of the function in the file; optional if the file registers a single
             objective.
 

@@ -104,7 +104,6 @@ def rgb2normal(
     R² of dominant colour against signed angle along a line through the ball's centre.
 
     Args:
-        evaluation: the sensor.
         directions: number of compass directions; two opposite ones share a diameter.
         half_lines: whether each direction's radius, from the centre outward, is fitted separately.
         signed: whether tilts on the two flanks of a ball have opposite signs.
@@ -213,7 +212,6 @@ def line(press: Press, angle: float, half: bool = False) -> NDArray[np.bool_]:
     on any surface.
 
     Args:
-        press: the press.
         angle: direction, degrees from east towards north.
         half: whether the line is only the radius in that direction instead of the diameter.
     """

@@ -125,8 +125,6 @@ def refuse_outside(
     """Check a setting of an objective before anything is rendered for it.
 
     Args:
-        name: name of the setting.
-        value: the given value.
         low, high: smallest and largest allowed value.
         open_low: whether `low` itself is too small.
 

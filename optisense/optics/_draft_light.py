@@ -92,7 +92,6 @@ class DraftCacheStore(CacheStore):
         """Create an empty store.
 
         Args:
-            lit: the sensor.
             seen: (n, 3) points (mm) that the camera sees.
             before: the store of the previous design, if there is one.
             groups: the light groups whose light is traced; all groups if None.

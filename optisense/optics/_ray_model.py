@@ -169,7 +169,6 @@ class RayModel:
 
         Args:
             resolution: (width, height) pixels; the camera's own by default.
-            contacts: the contacts.
             skin: "conforming" or "elastic", as in `OpticalModel.render`. On an elastic skin
                 triangles have no numbers.
         """
@@ -243,7 +242,6 @@ class RayModel:
         """Solve for the elastic skin under contacts: its shape, pressures and forces.
 
         Args:
-            contacts: the contacts.
             placed: their meshes from `place`, if they are known.
 
         Raises:

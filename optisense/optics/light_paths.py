@@ -55,9 +55,7 @@ def photon_paths(
     ledger, up to the noise of so few photons.
 
     Args:
-        model: the sensor.
         per_group: number of photons of each light group.
-        seed: seed of the photons.
         seen: result of `cells_in_view` for the model, if it is known.
 
     Returns:

@@ -45,9 +45,7 @@ def trace_paths(
     """Trace the path of the ray through the middle of each pixel, row by row.
 
     Args:
-        model: a sensor.
         resolution: (width, height) of the grid of pixels.
-        contacts: the contacts.
 
     Raises:
         ContactError: a contact is off the surface or deeper than the gel.

@@ -91,7 +91,6 @@ def marks_svg(balls: Sequence[Ball], width: int, height: int) -> Markup:
     """Return outlines and numbers of the visible balls as SVG, to lie over a picture.
 
     Args:
-        balls: balls of the picture.
         width, height: size of the picture, pixels.
     """
     shapes = []

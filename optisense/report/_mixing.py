@@ -39,7 +39,6 @@ def mixing_data(
     Args:
         layers: linear radiance (h, w, 3) for each light group.
         exposure: factor on the radiance.
-        chain: picture chain of the camera.
 
     Returns:
         Values that can be written as JSON.

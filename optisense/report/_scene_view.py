@@ -37,7 +37,6 @@ def scene_data(
     """Return the 3-D view's data, ready for JSON.
 
     Args:
-        design: design of the sensor.
         indenters: meshes of the indenters, in the design's frame.
         rays: chief rays of the camera, if they are to be drawn.
         ways: paths of photons, see `LightSection`.

@@ -60,8 +60,6 @@ def convergence(
     """Draw scores in the order of the trials, and the best so far; one panel per objective.
 
     Args:
-        trials: trials of the study.
-        names: names of its objectives.
         marks: record of the positions of trials in the figure.
     """
     figure = new_figure(9.5, 0.6 + 2.7 * len(names))
@@ -159,8 +157,6 @@ def parameters(
     few trials.
 
     Args:
-        trials: trials of the study.
-        name: name of the score.
         best: trial that is marked.
         marks: record of the positions of trials in the figure.
     """
@@ -221,9 +217,7 @@ def front(
     """Draw two objectives against each other, with the Pareto front.
 
     Args:
-        trials: trials of the study.
         chosen: trials of the front.
-        names: names of the objectives.
         best: trial that is marked.
         marks: record of the positions of trials in the figure.
     """

@@ -180,7 +180,6 @@ def changes(
     """Return parameter, values before and after, the largest change relative to its range first.
 
     Args:
-        study: study.
         start, best: trials of the study.
         drawn_cages: whether the control points of cages are shown elsewhere and left out.
     """

@@ -61,7 +61,6 @@ def contact_rows(
     """Return the contacts with place and depth, and force and area if they are known.
 
     Args:
-        contacts: contacts.
         presses: `PressedSkin.in_numbers` of each contact; empty if the skin is not elastic.
     """
     rows = []

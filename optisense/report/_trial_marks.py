@@ -52,7 +52,6 @@ class Marks:
         """Record trials that were plotted.
 
         Args:
-            axes: axes with the trials.
             numbers: numbers (n,) of the trials.
             x, y: positions (n,) in the units of the axes.
         """
@@ -93,7 +92,6 @@ class TrialFigure:
 
         Args:
             figure: figure before it is drawn.
-            marks: positions of its trials.
             of: numbers of the trials that the page knows.
         """
         address = figure_uri(figure)  # this also computes its layout
@@ -122,7 +120,6 @@ def page_data(
     """Return the data of trials for the page, ready for JSON.
 
     Args:
-        study: study of the trials.
         trials: trials in the data of the figures.
         strongest: indices of the parameters by the strength of their association with the score.
         pictures: pictures (h, w, 3) of some trials, by number.

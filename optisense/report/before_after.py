@@ -87,12 +87,10 @@ def design_view(
     """Trace a design's chief rays, and render it with the balls that its objectives press into it.
 
     Args:
-        design: design of the sensor.
         settings: settings of the objectives, of which ball, depth and resolution of the rays are
             used.
         pictures: whether to render; the rays alone take a tenth of a second.
         photons: number of photons for the picture.
-        seed: seed of the light.
 
     Raises:
         SetupError: the renderer can't run on this machine.

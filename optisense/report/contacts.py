@@ -36,9 +36,7 @@ def write_contacts(
     Its button saves the circles as `presses.csv`, in pixels of the photographs as they were read.
 
     Args:
-        path: path of the page.
         title: name of the photographs' folder.
-        photographs: photographs at working size.
         seen: contacts in them; None where there is none.
         notes: doubtful findings, one sentence each.
 

@@ -90,9 +90,7 @@ class LightSection:
         """Follow the light of a model.
 
         Args:
-            model: model of the sensor.
             photons: number of photons of the ledger; as many as suit a drawing if None.
-            seed: seed of the photons.
             at: places of the skin to examine, see `optisense.optics.light_at`.
             camera: light that reaches the camera, to be shown as well.
 

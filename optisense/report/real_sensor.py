@@ -113,7 +113,6 @@ def compare_with_real(
     Args:
         model: model of a sensor for which `has_real_picture` is true.
         photons: number of photons; the light of an earlier image with as many is reused.
-        seed: seed of the light.
         progress: function that is called during the rendering; it may raise KeyboardInterrupt.
 
     Raises:

@@ -82,8 +82,6 @@ def select_for_pictures(study: Study, trials: Sequence[Trial], count: int) -> li
     objectives, and the best ones by the first.
 
     Args:
-        study: study.
-        trials: trials of the study.
         count: largest number of trials.
     """
     names = study.settings.names

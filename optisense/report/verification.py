@@ -36,7 +36,6 @@ def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]
     """Return a verification as one self-contained HTML page.
 
     Args:
-        found: verification.
         axes: rows (3, 3) of each sensor's camera: image right, image up and viewing direction.
     """
     settings = found.settings

@@ -18,7 +18,6 @@ def mjcf(body: SensorBody, folder: str) -> str:
     """Return the text of an MJCF file.
 
     Args:
-        body: the sensor.
         folder: folder of the mesh files (binary STL, m), beside the file.
     """
     lines = [f"<mujoco model={quoteattr(body.name)}>"]

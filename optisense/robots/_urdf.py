@@ -19,7 +19,6 @@ def urdf(body: SensorBody, folder: str) -> str:
     down, z where the camera looks.
 
     Args:
-        body: the sensor.
         folder: folder of the mesh files (binary STL, m), beside the file.
     """
     name = body.name

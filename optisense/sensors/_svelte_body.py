@@ -31,7 +31,6 @@ def check_mirrors(
 
     Args:
         m1, sagitta: curved mirror, and its sagitta, mm.
-        m2: flat mirror.
         gel_outline: outline of the gel, (n, 2) mm, closed.
 
     Raises:
@@ -69,10 +68,8 @@ def housing(
     `side-walls`. They are sheets that absorb light, with inward normals.
 
     Args:
-        palm: coated face.
         back_outline: points (x, z) from base to tip, mm.
         m1, most: curved mirror, and its largest sagitta, mm.
-        m2: flat mirror.
         widths: widths of the gel and of the widest mirror, mm.
         led_gap: air gap between LEDs and gel, mm.
         wall_thickness: thickness of the walls, mm.
@@ -104,7 +101,6 @@ def led_covers(
     sheet that absorbs light, with its normals towards the LEDs.
 
     Args:
-        palm: coated face.
         inner: inner face of the gel, (n, 2) mm.
         widths: widths of the gel and of the widest mirror, mm.
         led_gap: air gap between LEDs and gel, mm.

@@ -168,7 +168,6 @@ def camera_model(camera: Camera, rays: ChiefRays) -> dict[str, Any]:
     """Return the pinhole of the design and the fitted one, each with its errors, ready for JSON.
 
     Args:
-        camera: the camera of the design.
         rays: chief rays without contacts.
 
     Returns:

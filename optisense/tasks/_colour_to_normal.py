@@ -127,11 +127,9 @@ def fit_reader(
     """Fit a reader by one of METHODS.
 
     Args:
-        method: name of the method.
         colours: colour differences (n, 3), levels of 255.
         places: places (n, 2) in the picture, -1 to 1 across its width and height.
         tilts: known tilts (n, 2).
-        seed: seed of the network.
 
     Raises:
         TaskError: there is no such method.

@@ -153,7 +153,6 @@ def plane_contact(model: OpticalModel, angle_x: float, angle_y: float, depth: fl
     """Return a plane over the camera's whole view.
 
     Args:
-        model: the sensor.
         angle_x, angle_y: rotation (degrees) about the u axis and then about the axis perpendicular
             to it.
         depth: depth (mm) of the plane below the middle of the surface.

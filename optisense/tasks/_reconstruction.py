@@ -237,8 +237,6 @@ def reconstruct_one(
     """Press an object into a calibrated sensor and reconstruct it.
 
     Args:
-        sensor: the calibrated sensor.
-        contact: the contact.
         number: number of the picture, for its noise.
         name: name of the object, for messages.
 

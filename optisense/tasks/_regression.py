@@ -47,7 +47,6 @@ def read_by_forest(features: FloatArray, targets: FloatArray, seed: int = 0) -> 
     Args:
         features: (n, f) features.
         targets: (n, t) targets, all of one unit.
-        seed: seed of folds and forests.
 
     Raises:
         TaskError: there are fewer than two samples per fold.

@@ -28,7 +28,6 @@ def split_of(
     further samples do not change those of existing ones.
 
     Args:
-        seed: seed of the dataset.
         indenter: text of the indenter, as given.
         spot: position of the place in the picture, as shares of its width from the left and from
             the upper edge.

@@ -139,10 +139,8 @@ def choose_presses(
     """Choose places, depths and rotations of objects on the skin that either sensor's camera sees.
 
     Args:
-        models: the two sensors.
         objects: keys of `OBJECTS`.
         places: number of presses of each object.
-        seed: seed of places and rotations.
 
     Raises:
         TaskError: the cameras see nothing, or there is no place for an object.

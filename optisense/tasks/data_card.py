@@ -41,7 +41,6 @@ def write_card(dataset: Dataset, licence: str | None = None) -> Path | None:
     """Write the card into the dataset's folder.
 
     Args:
-        dataset: the dataset on disk.
         licence: an identifier such as cc-by-4.0. With None the licence of an existing card is kept,
             or the card states that none was chosen.
 

@@ -79,7 +79,6 @@ def error_change(before: FloatArray, after: FloatArray, seed: int = 0) -> ErrorC
     Args:
         before, after: (objects, places, readers) errors of both sensors on the same presses; higher
             is worse.
-        seed: seed of the resamples.
     """
     if before.shape[:2] != after.shape[:2]:
         raise ValueError(f"errors of other presses: {before.shape} and {after.shape}")

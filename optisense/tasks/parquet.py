@@ -83,7 +83,6 @@ def write_parquet(
     Samples of a release without splits are all in "train". Files of an earlier call are removed.
 
     Args:
-        dataset: the dataset on disk.
         progress: function that is called with the number of samples written and their total number.
 
     Returns:

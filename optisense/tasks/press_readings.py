@@ -100,13 +100,10 @@ def read_press(
     """Press something into a calibrated sensor and read it.
 
     Args:
-        sensor: the sensor.
         areas: (h, w) area (mm^2) of skin that each of its pixels sees.
-        contact: the contact.
         number: number of the picture, for its noise.
         readers: number of the sensor's readers, all of which are used.
         keeps: whether the pictures are kept.
-        kept: store of readings.
     """
     return PressReading.from_arrays(
         kept.arrays(
@@ -157,7 +154,6 @@ def check_seen(name: str, pair: Sequence[PressReading]) -> None:
     """Check that a sensor sees the contact of an object.
 
     Args:
-        name: name of the object.
         pair: the readings of its press by two sensors.
 
     Raises:

@@ -173,12 +173,7 @@ STYLE = (
 
 
 def drawing(plate: Plate, title: str) -> str:
-    """Return three views of a plate at 1:1 with its dimensions, as an SVG picture in mm.
-
-    Args:
-        plate: plate.
-        title: name of the design.
-    """
+    """Return three views of a plate at 1:1 with its dimensions, as an SVG picture in mm."""
     ring = _polygon(plate)  # with its arcs, of which a mesh has only chords
     width, depth, thick = ring.bounds[2], ring.bounds[3], plate.thickness
     title_height = 8.0 * TEXT

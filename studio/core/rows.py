@@ -70,7 +70,6 @@ def nearest_edge(row: Row, edges: FloatArray) -> tuple[FloatArray, FloatArray] |
     parallel to the row is taken.
 
     Args:
-        row: row of lights.
         edges: ends of the edges, (n, 2, 3) mm.
 
     Returns:

@@ -73,7 +73,6 @@ def for_light(
     """Return suggestions for a light, and for the light group that it belongs to.
 
     Args:
-        group: name of the light group.
         index: number of the light in its group, from 0.
         flux: present radiant flux of each light, mW.
         model: present model of the lights in the library.
@@ -151,8 +150,6 @@ def for_material(
     """Return suggestions for the material of a part.
 
     Args:
-        part: name of the part.
-        material: name of its material.
         values: present values of the material's fields.
         rows: descriptions of the fields, as from `schema.fields`.
         choices: names of the library's materials that suit the part.

@@ -71,7 +71,6 @@ class LatestRequest:
         """Send the request with the scene's design.
 
         Args:
-            what: kind of the request.
             take: function that is called with the answer.
             refused: function that is called with an error; none is shown by default, as the
                 buttons show those of the design.

@@ -55,7 +55,6 @@ def paragraph(
     """Draw a text in as many lines as it needs.
 
     Args:
-        layout: layout to draw in.
         text: text without line breaks.
         icon: icon before the first line.
         boxed: whether `layout` is a box, which leaves less room.

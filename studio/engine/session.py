@@ -176,7 +176,6 @@ def start_job(
 
     Args:
         title: name of the job in the progress bar.
-        what: name of the request.
         on_result: called with the result after the job has ended.
         on_event: called with the job's events, except progress.
         wait: block until the job is over, for scripts.

@@ -35,7 +35,6 @@ def add_contact(
     It stays on the surface when it is moved.
 
     Args:
-        scene: scene of the design.
         point: point of contact, (3,) mm.
         outward: normal of the surface, (3,), out of the sensor.
     """
@@ -146,7 +145,6 @@ def contact_values(
     """Return a contact as the engine reads it.
 
     Args:
-        contact: object of the contact.
         depsgraph: evaluated dependency graph, for the pose on the surface.
         write: function that returns the path of a file with the given mesh.
     """

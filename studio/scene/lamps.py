@@ -30,7 +30,6 @@ def add_light(
     """Add an object for one light.
 
     Args:
-        scene: scene of the design.
         group: light group of the light.
         pose: `position`, `direction` and optionally `up`, as in the design file.
     """

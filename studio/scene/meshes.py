@@ -99,7 +99,6 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     """Return the mesh of a part at rest, in the frame of the design.
 
     Args:
-        part: mesh object.
         caged: whether a cage deforms the part, so that its drawn shape is not that at rest.
     """
     if part.mode == "EDIT":

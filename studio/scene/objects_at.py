@@ -17,7 +17,6 @@ def objects_at(
     """Return the objects at a place in the design; empty if there are none.
 
     Args:
-        scene: scene that holds the design.
         path: dotted path, such as `lights.red.lights[0].position`; may be empty.
         part: name of the part in the error; may be empty.
         contact: number of the visible contact, from 0; None if the error is about none.

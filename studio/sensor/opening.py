@@ -47,7 +47,6 @@ def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool)
     whether it ended well, or still runs.
 
     Args:
-        scene: scene to fill.
         source: design in the engine's notation, such as `builtin:gelsight-mini`.
         folder: folder of the user; empty for a built-in sensor, which is not saved yet.
         wait: block until the sensor is open.
@@ -82,7 +81,6 @@ def open_stage(
     whether it ended well, or still runs.
 
     Args:
-        scene: scene to fill.
         stage: folder that the engine wrote.
         wait: block until the sensor is open.
         folder: the user's own folder of the design; empty if it is not saved.

@@ -93,7 +93,6 @@ def presses(result: dict[str, Any], names: list[str]) -> str:
     """Return force, pressure and area of each contact of a full picture, one line each.
 
     Args:
-        result: answer of the engine.
         names: names of the contacts in the order of the request.
     """
     lines = []

@@ -45,7 +45,6 @@ class Defocus(LensBlur):
         """Return the diameter (...) of the circle of confusion, as a share of the picture's width.
 
         Args:
-            camera: camera of the lens.
             vergence: inverse (...) of the apparent distance, 1/mm.
         """
         pupil = self.focal_length / self.f_number
@@ -56,7 +55,6 @@ class Defocus(LensBlur):
         """Return the standard deviation (...) of the disc: a quarter of the circle's diameter.
 
         Args:
-            camera: camera of the lens.
             vergence: inverse (...) of the apparent distance, 1/mm.
         """
         return DISC_DEVIATION * self.circle(camera, vergence)

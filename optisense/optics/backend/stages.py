@@ -37,7 +37,6 @@ def fraction_done(stage: Stage, part: float) -> float:
     """Estimate the completed fraction (0 to 1) of a render.
 
     Args:
-        stage: the current stage.
         part: the traced part of the photons, 0 to 1.
     """
     if stage is not Stage.PHOTONS:

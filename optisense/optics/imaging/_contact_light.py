@@ -66,7 +66,6 @@ def mirrored_contact_layers(
     Args:
         cache: the radiance cache.
         scenes: scenes of the sensor with its contacts.
-        camera: camera of the image.
         where: (h, w) mask of the pixels.
         skin: (h, w) mask of those outside contacts; the light is averaged over them, and over the
             others.
@@ -99,7 +98,6 @@ def beside_layers(
     Args:
         cache: the radiance cache.
         scenes: scenes of the sensor with its contacts.
-        camera: camera of the image.
         where: (h, w) mask of the pixels that see this skin.
         seed: seed of the rays.
 
@@ -131,7 +129,6 @@ def _averaged_layers(
     Args:
         groups: number of light groups.
         scenes: scenes of the sensor with its contacts.
-        camera: camera of the image.
         where: pixels (h, w) that the rays go through.
         over: pixels (h, w) that are averaged with one another, and over which fraction of the image
             width.

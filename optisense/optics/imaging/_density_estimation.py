@@ -62,7 +62,6 @@ def build_grid(
     """Sort photons into the cells of a grid by counting sort.
 
     Args:
-        photons: the photons.
         lower, upper: corners (3,) of the box that the grid fills, mm.
         radius: side (mm) of the cells; larger where there would be more than 30 million cells.
     """
@@ -114,9 +113,7 @@ def estimate_radiance(
     lights of 1 mW.
 
     Args:
-        grid: the photons.
         surfaces: the table of surfaces (`surface_table`).
-        points: the n visible points.
         radius: radius (mm) of the disc over which photons are counted.
         groups: number of light groups.
     """

@@ -84,10 +84,8 @@ def render_cached(
     Args:
         light: the cache, and whether Ctrl-C ended its photon tracing early.
         scenes: the sensor with its contacts.
-        camera: the camera.
         rays: chief rays through the same scene and camera.
         emitters: the lights, whose windows may be in view.
-        seed: seed of the camera samples.
         plan: the pixels that are shaded, and their samples.
         known: parts of an earlier draft that are reused, to which those that are missing are added.
         lamps: mirror images of lamps, which are added to the image; none by default.

@@ -57,8 +57,6 @@ class LampImages:
         """Prepare the mirror images.
 
         Args:
-            scene: the surfaces.
-            emitters: the lights.
             groups: number of light groups.
         """
         self._scene, self._emitters, self._groups = scene, emitters, groups

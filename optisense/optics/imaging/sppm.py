@@ -61,9 +61,6 @@ def render_sppm(
     Args:
         scene: the surfaces, contacts included.
         emission: the photons of the first pass; the other passes continue its sequence.
-        camera: the camera.
-        passes: number of passes.
-        coloured: whether surfaces are coloured.
         radius: gather radius (mm) of the first pass.
         samples: number of camera samples of each pixel in a pass. If the gather discs are much
             smaller than a pixel, a single sample misses most photons of the pixel.

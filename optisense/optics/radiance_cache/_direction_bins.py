@@ -117,7 +117,6 @@ def direction_bin(
 
     Args:
         cells: the surface cells, whose frame is that of the bins.
-        bins: the bins.
         direction: unit vectors.
         bands_off: offset in bands, added before rounding.
         sectors_off: offset in sectors, added before rounding.
@@ -155,7 +154,6 @@ def dither(random: tuple[mi.UInt32, mi.UInt32], bins: DirectionBins) -> tuple[mi
 
     Args:
         random: the random bits of each photon (see `landing_bits`).
-        bins: the direction bins.
     """
     overlap = dr.opaque(mi.Float, bins.overlap)
     one, other = (

@@ -58,10 +58,9 @@ def crossings(
     """Return where photons cross the raised plane.
 
     Args:
-        cells: the cells of the surface.
         cell: the cell that each photon lands in.
-        point: where it lands, mm.
-        direction: unit vector along which it travels.
+        point: where each photon lands, mm.
+        direction: unit vector along which each photon travels.
         cosine: cosine of incidence at which it lands.
         active: mask of the photons that land in a cell.
         areas: the areas of the raised plane (see `areas`), if surfaces are curved.
@@ -103,10 +102,9 @@ def below_crossing(
     there is one (n,).
 
     Args:
-        cells: the cells of the surface.
         cell: the cell that each line starts above.
         point: a point of each line, mm.
-        towards: its unit direction away from the surface.
+        towards: unit direction of each line away from the surface.
         level: height (mm) of the plane above the surface.
         active: mask of the lines that count.
         curved: whether surfaces are curved; the planes of several cells are then intersected in
@@ -129,8 +127,7 @@ def sampled_plane(points: VisiblePoints, rise: mi.Float, raised: mi.Bool) -> mi.
     """Return whether each camera sample looks up the raised plane instead of the surface, (n,).
 
     Args:
-        points: the visible points.
-        rise: their heights (mm) above the undeformed surface.
+        rise: heights (mm) of the points above the undeformed surface.
         raised: mask of the points that lie on an indenter.
     """
     shift = mi.sample_tea_32(points.series, mi.UInt32(5), 4)[0]

@@ -119,7 +119,6 @@ def cosine_half_width(
     width.
 
     Args:
-        light: the beam.
         normal: unit normals.
         upright: unit normals of the undeformed surface.
     """
@@ -141,7 +140,6 @@ def passes_near(ball: mi.Vector4f, start: mi.Point3f, light: AngularVariance) ->
     Args:
         ball: centre and radius, mm.
         start: the point that the beam arrives at, mm.
-        light: the beam.
     """
     offset = mi.Vector3f(ball.x - start.x, ball.y - start.y, ball.z - start.z)
     along = dr.dot(offset, light.towards)

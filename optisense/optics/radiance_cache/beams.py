@@ -208,8 +208,7 @@ def cull_beams(beams: Beams, cells: SurfaceCells, groups: int, balls: mi.Float) 
     """Return the beams that may touch one of the balls before they reach their cell.
 
     Args:
-        beams: all beams.
-        cells: the cells that they belong to.
+        cells: the cells that the beams belong to.
         groups: number of light groups.
         balls: (4 k,) centre and radius of each ball, four floats, mm.
     """

@@ -67,9 +67,7 @@ def sum_bins(
     and the light on the surface below them.
 
     Args:
-        light: the light of the cache.
         scenes: the scenes of the image, with indenters.
-        at: the points.
         shadow_rays: number of shadow rays of each point and light group.
         horizon: the occluder horizon (n,) of each point (see `occluder_horizon`).
     """
@@ -186,10 +184,8 @@ def _reflected(
 
     Args:
         light: the binned light that the beam belongs to.
-        at: the points.
-        beam: the beam.
-        cosine: its mean cosine.
-        half_width: half-width of the distribution of its cosine with the normal.
+        cosine: mean cosine of the beam.
+        half_width: half-width of the distribution of the beam's cosine with the normal.
     """
     points = at.seen
 

@@ -78,7 +78,6 @@ def glossy_interreflection(
     Args:
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        at: the points.
         directions: number of rays from each point; by default that of points in contacts.
     """
     lanes = dr.width(at.seen.pixel)

@@ -110,7 +110,6 @@ def interreflected(
     Args:
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        at: the points.
         directions: number of rays from each point.
     """
     return _sample(cache.binned, scenes, at, dr.opaque(mi.UInt32, directions))

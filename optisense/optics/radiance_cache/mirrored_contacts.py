@@ -51,7 +51,6 @@ def mirrored_contacts(
     Args:
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        points: the visible points.
         rays: number of rays from each point.
 
     Returns:

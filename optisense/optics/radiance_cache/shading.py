@@ -79,8 +79,6 @@ def shade_in_contacts(
     Args:
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        points: the visible points.
-        effort: the number of shadow rays.
         interreflection: whether interreflection is computed.
 
     Returns:
@@ -144,9 +142,7 @@ def shade(
 
     Args:
         cache: the radiance cache.
-        scenes: the scenes of the image.
         culled_beams: the beams of the cache that pass near indenters (`cull_beams`).
-        points: the visible points.
         effort: the numbers of shadow rays and cells.
         reflected: whether the points are seen in the reflection of an interface.
     """
@@ -190,7 +186,6 @@ def beside_contacts(
     Args:
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        points: the points.
         directions: number of rays from each point; metallic coatings use a number of their own.
 
     Returns:

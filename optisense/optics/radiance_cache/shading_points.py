@@ -73,7 +73,6 @@ def may_be_cached(
     The flux layer holds such light only where it falls towards the surface (`sample_segment`).
 
     Args:
-        light: the binned light.
         cell: the cell below each point that the light arrives at.
         way: unit directions from the points to the places that the light comes from.
         active: mask of the points that count.

@@ -96,7 +96,6 @@ class Kernels:
         """Find the length over which light varies in each cell.
 
         Args:
-            cells: the cells of the surface.
             lamp_distance: (cells,) distance (mm) to the nearest lamp.
             density: landings per mm^2 for each emitted photon (1/mm^2).
             near: (cells,) whether a cell is in or near the camera's view. Other cells are smoothed
@@ -195,7 +194,6 @@ def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> F
     each relative to its own light.
 
     Args:
-        cells: the cells of the surface.
         halves: (2, cells, groups) power (mW) of each half of the photons on each cell.
         radii: (cells,) kernel radii (mm).
     """

@@ -99,7 +99,6 @@ class CacheStore:
         """Create an empty store; nothing is traced yet.
 
         Args:
-            lit: the sensor.
             seen: (n, 3) points (mm) that the camera sees.
         """
         self._lit = lit
@@ -292,7 +291,6 @@ class CacheStore:
         """Return the cache once a limit is reached.
 
         Args:
-            seed: seed of the photons.
             limits: when tracing ends.
             on_stage: function that is called when a stage begins and after each pass; see
                 `StageCallback`.

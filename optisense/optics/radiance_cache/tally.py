@@ -65,13 +65,11 @@ class CacheTally:
         """Prepare empty tables.
 
         Args:
-            kernels: the cells and their smoothing.
             groups: number of light groups.
             coloured: whether powers are kept per colour channel.
             roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
             flux_layer: the layer in which the light above the surface is tallied; None for no
                 layer.
-            directions: the direction bins.
             planes: 2 to tally the light in the raised plane as well (see `raised_plane`), else 1.
             curved: whether surfaces are curved.
         """

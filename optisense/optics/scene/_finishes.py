@@ -123,9 +123,7 @@ class ShapeCache:
         Args:
             before: the cache of a similar design.
             name: name of the cutting.
-            whole: the mesh.
-            others: the meshes that divide it.
-            make: function that returns the pieces.
+            others: the meshes that divide the whole one.
         """
         inputs = name, whole, *others
         known = next(
@@ -153,8 +151,7 @@ def finishes_of(
     """Return the frosted and the painted faces of a design.
 
     Args:
-        design: the sensor.
-        meshes: its parts in their current shape.
+        meshes: the design's parts in their current shape.
         sheets: the opaque parts, which cover paint and frost where they lie on the same faces.
         kept: cache to which the shapes are added.
         before: cache of a similar design, whose shapes are reused.

@@ -105,9 +105,6 @@ class AssemblyCache:
         """Return the piece of a mesh and its surface, reused if it is known.
 
         Args:
-            name: name of the piece.
-            mesh: its mesh.
-            surface: its surface.
             before: the cache of the assembly before.
             merge: whether flat faces are merged, as on a flat side of a curved solid.
         """
@@ -123,7 +120,6 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     """Resolve media, and turn parts and lights into surfaces and emitters.
 
     Args:
-        design: the sensor.
         before: the assembly of a similar design, whose unchanged shapes are reused.
         bend: whether boundaries between media are moved along with parts that bend instead of being
             resolved again, for drafts.

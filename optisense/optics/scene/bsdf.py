@@ -231,7 +231,6 @@ def evaluate_coating(
     """Return the BSDF (1/sr) times the cosine at the light, (3, n); 0 below the surface.
 
     Args:
-        coating: reflectance parameters of the surfaces.
         normal: unit normals.
         towards_light, towards_eye: unit directions away from the surface.
         cosine_half_width: half-width (n,) of the uniform distribution of cosines over which the
@@ -274,7 +273,6 @@ def sample_coating(
     """Draw a scattered direction and its weight.
 
     Args:
-        coating: reflectance parameters of the surfaces.
         normal: unit normals.
         incoming: unit directions in which the light travels, towards the surface.
         pick: random number (n,) in [0, 1) that chooses the lobe.

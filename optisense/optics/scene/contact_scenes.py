@@ -68,7 +68,6 @@ class SensorPieces:
         """Return the sensor with a deformed skin in place of its sensing surface.
 
         Args:
-            skin: the deformed skin.
             fixed: the opaque surfaces without contacts.
             absorption: absorption coefficient of the gel, as in `ContactScenes`.
         """
@@ -123,8 +122,6 @@ class SkinShapes:
         """Prepare a skin.
 
         Args:
-            mesh: the deformed skin.
-            pressed: the contacts that deform it.
             surfaces: number and surface for each state (`SensorPieces.skin_surfaces`).
         """
         skin = {}

@@ -203,7 +203,6 @@ def profile_direction(
     """Return the unit directions (3, n) of samples of equal power, with the light's axis along +z.
 
     Args:
-        table: the lights.
         profile: number (n,) of the inverse table of the light's profile plus 1; 0 is a power of the
             cosine.
         exponent: the power (n,) of the cosine where ``profile`` is 0.
@@ -240,7 +239,6 @@ def emit(
     power.
 
     Args:
-        table: the lights.
         light: number (n,) of the light.
         angle: point of the unit square that chooses the direction.
         place: point of the unit square that chooses the place on the emitting face.

@@ -168,7 +168,6 @@ class RayScene:
         """Build the mesh and its acceleration structure.
 
         Args:
-            pieces: the meshes.
             numbers: the number in ``table`` of each piece's surface; in the order of the pieces if
                 None.
             table: the table of surfaces (see ``surface_table``) that several scenes of one sensor
@@ -229,7 +228,6 @@ class RayScene:
         """Return the first hits along rays, with normals; symbolic loops may call it.
 
         Args:
-            ray: the rays.
             coherent: whether rays of neighbouring lanes are similar, which saves time.
         """
         origin, direction = ray.origin, ray.direction

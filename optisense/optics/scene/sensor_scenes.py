@@ -102,7 +102,6 @@ class SensorScenes:
         """Prepare the scenes; each is built on first use.
 
         Args:
-            assembly: the assembly of the design.
             coating: the coating of its sensing surface.
             before: the scenes of a similar design; those of unchanged shapes are reused.
         """
@@ -225,8 +224,6 @@ class SensorScenes:
         """Return the scenes of an image with a deformed skin in place of the sensing surface.
 
         Args:
-            mesh: the deformed skin.
-            pressed: the contacts that deform it.
             fixed: the scene in which rays are traced behind the deformed skin; that of the opaque
                 surfaces if None.
         """

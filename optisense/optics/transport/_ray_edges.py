@@ -115,7 +115,6 @@ def walk(scene: RayScene, origin: mi.Point3f, direction: mi.Vector3f) -> list[Pa
     """Return all surfaces that rays meet one after the other, without derivatives.
 
     Args:
-        scene: the surfaces.
         origin: origins (3, n), mm.
         direction: unit directions (3, n).
     """
@@ -149,8 +148,6 @@ def find_edges(scene: RayScene, camera: RayCamera, codes: NDArray[np.uint32]) ->
     """Find all boundaries between pixels of which at least one sees the sensing surface.
 
     Args:
-        scene: the surfaces.
-        camera: the camera of the picture.
         codes: (h, w) result of `trace_path_codes` for the middle of each pixel.
 
     Returns:

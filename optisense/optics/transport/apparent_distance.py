@@ -52,7 +52,6 @@ def focused_chain(
     one.
 
     Args:
-        camera: the camera of the design.
         scene: function that returns the surfaces; called only if the blur depends on depth.
         rays: function that returns the ray camera of a resolution.
     """
@@ -72,7 +71,6 @@ def apparent_vergence(scene: RayScene, camera: RayCamera) -> FloatArray:
     nearest one that does.
 
     Args:
-        scene: the surfaces.
         camera: the camera whose pixels are evaluated.
 
     Returns:

@@ -71,7 +71,6 @@ def follow(
     """Follow paths to their ends.
 
     Args:
-        scene: the surfaces.
         ray: the rays that the paths begin with.
         weight: factor (3, n) on the radiance at the paths' beginnings.
         rng: a random generator for each path.
@@ -148,7 +147,6 @@ def film_samples(
         pixel: numbers of the pixels.
         width: number of pixels in a row.
         sample: number of each sample in its pixel.
-        seed: seed of the positions.
         count: number of samples in each pixel, up to `MAX_PIXEL_SAMPLES`, numbered from 1; None if
             it is not known. The mean over a pixel of a known number of samples is more accurate.
             In a contact of GelSight Mini of specularity 1, twelve samples have a noise of 2.5 % of
@@ -181,12 +179,9 @@ def find_visible_points(
     depend on the others that are traced with it.
 
     Args:
-        scene: the surfaces.
-        camera: the camera.
         pixel: number (n,) of the pixel of each sample.
         number: number (n,) of each sample in its pixel.
         film: film positions (2, n), pixels.
-        seed: seed of the random numbers.
         only_main: whether the reflected points are left out.
         channel: channel of the light that the paths carry, 0 to 2; None for all channels.
 

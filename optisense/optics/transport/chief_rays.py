@@ -115,8 +115,6 @@ def trace_path_codes(
     reflections. Between rays of the same code the path changes smoothly.
 
     Args:
-        scene: the surfaces.
-        camera: the camera of the rays.
         x, y: (k,) film positions, pixels.
 
     Returns:
@@ -135,7 +133,6 @@ def trace_to_skin(
     """Follow rays from given origins to the sensing surface.
 
     Args:
-        scene: the surfaces.
         origin: (k, 3) origins, mm.
         direction: (k, 3) unit directions.
 
@@ -157,8 +154,6 @@ def trace_chief_rays(
     """Follow the ray through the middle of every pixel.
 
     Args:
-        scene: the surfaces.
-        camera: the camera.
         sensing_faces: (n,) for each of the scene's first n triangles, the number of the triangle of
             the sensing surface, or -1 for other surfaces; further triangles count as -1. Without
             it, ``face`` is -1 everywhere.
@@ -251,7 +246,6 @@ def shares_by_mirrors(
     """Return the shares of the rays that arrive, by the set of mirrors that reflect them.
 
     Args:
-        rays: chief rays.
         mirrors: pairs of a bit of ``rays.mirrors`` and the name of the mirror that it stands for.
     """
     met, counts = np.unique(rays.mirrors[rays.hit], return_counts=True)

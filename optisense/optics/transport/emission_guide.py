@@ -89,7 +89,6 @@ def warp(
     """Warp samples so that they have the density of a guide.
 
     Args:
-        guide: the guide.
         light: number (n,) of the light.
         sample: points of the unit square.
 
@@ -111,7 +110,6 @@ def learn_guide(cells: mi.UInt32, lights: int, per_light: int) -> EmissionGuide:
 
     Args:
         cells: number of the guide's cell (over all lights) of every photon that arrived.
-        lights: number of lights.
         per_light: number of photons of each light in the pass.
     """
     arrived = np.asarray(cells)

@@ -166,9 +166,6 @@ def interact(
     """Follow rays to the next surface and compute how they continue; symbolic loops may call it.
 
     Args:
-        scene: the surfaces.
-        ray: the rays.
-        ray_kind: the kind of the rays.
         sample: random numbers; not needed for chief rays, nor for camera rays in smooth scenes.
     """
     drawn = LobeSample() if sample is None else sample

@@ -147,7 +147,6 @@ def medium_before(
     """Return the medium through which light has come to a surface.
 
     Args:
-        step: the interaction at the surface.
         bound, side: the interface that bounds the medium so far, and the medium's side of it, as a
             `Fate`.
 
@@ -225,12 +224,10 @@ def trace_ledger(
     """Trace photons from all lights, and record where their light ends.
 
     Args:
-        scene: the sensor.
-        table: its lights; each emits 1 mW in each channel.
+        table: the lights; each emits 1 mW in each channel.
         surfaces: the number of surfaces in the scene's table.
         seen: the cells of the sensing surface, with flags for those that the camera sees.
         photons: approximate number of photons of all lights together.
-        seed: seed of the photons.
     """
     per_light = max(BATCHES, photons // table.count // BATCHES * BATCHES)
     lines = BATCHES * table.groups

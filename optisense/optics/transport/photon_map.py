@@ -109,7 +109,7 @@ class Landing:
 
     Attributes:
         point: position, mm.
-        direction: unit vector along which it travels.
+        direction: unit vector along which each photon travels.
         cosine: cosine of incidence, or its counterpart in the layer (see `PhotonMap.passing`).
         power: the photon's share of a light of 1 mW, per channel.
         bits: light group, half, and surface.

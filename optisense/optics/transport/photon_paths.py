@@ -156,13 +156,10 @@ def trace_photon_paths(
     """Trace single photons from all lights, and record their paths.
 
     Args:
-        scene: the sensor.
-        table: its lights.
         flux: (groups, 3) power (mW) in each channel, the weights of the channels in the
             probabilities of ends.
         seen: the cells of the sensing surface, with flags for those that the camera sees.
         per_light: number of photons of each light.
-        seed: seed of the photons.
     """
     emission = Emission(table, uniform_guide(table.count), per_light, seed_of(seed, 7))
     flight, _ = launch(scene, emission, indices(np.arange(table.count)))

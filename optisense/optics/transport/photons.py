@@ -122,8 +122,6 @@ def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[Flig
     channels take turns.
 
     Args:
-        scene: the surfaces.
-        emission: the photons to emit.
         lights: numbers (k,) of the lights.
 
     Returns:
@@ -240,9 +238,6 @@ def trace_photons(
     """Emit photons and record where they land.
 
     Args:
-        scene: the surfaces.
-        emission: the photons to emit.
-        coloured: whether surfaces are coloured.
         flux_layer: layer whose crossings are recorded as well; None for no layer.
     """
     return _traced(scene, emission, None, flux_layer, coloured)[1]

@@ -149,11 +149,8 @@ def trace_to_place(
 
     Args:
         scene: the sensor without contacts.
-        table: its lights.
-        disc: the place.
         seen: the cells of the sensing surface, with flags for those that the camera sees.
         photons: number of photons of all lights together.
-        seed: seed of the photons.
 
     Returns:
         The power (mW) that lands in the disc, (batches, groups, ways, tilts, turns, 3), and in the

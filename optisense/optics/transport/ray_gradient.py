@@ -67,8 +67,6 @@ class DifferentiableRays:
         """Trace the rays, and record the computation for `pull_back`.
 
         Args:
-            scene: the surfaces of the sensor.
-            camera: the camera of the rays.
             moving: by part name, the meshes with respect to whose vertices derivatives are wanted.
                 They must be sheets, and the scene's pieces have the same names.
 

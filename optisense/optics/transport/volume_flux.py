@@ -87,9 +87,6 @@ def sample_segment(
     the surface.
 
     Args:
-        flux_layer: the layer.
-        ray: the segment's start and direction.
-        hit: the segment's end.
         chance: uniform random number from 0 to 1, the same for all pieces of a segment.
         piece: the number of the piece.
         landing: whether the segment ends on an opaque surface.

@@ -122,7 +122,6 @@ class DesignEvaluator(PickledWithoutCaches):
         """Check the goals.
 
         Args:
-            space: a bound space.
             goals: one or more; the first is what single-goal methods search for.
             settings: settings of the objectives.
             requirements: conditions as texts, such as "coverage >= 0.55".
@@ -130,7 +129,6 @@ class DesignEvaluator(PickledWithoutCaches):
                 parts that they rest on; if None, they are where the space moves surfaces.
             keeps: whether points must keep the properties of the starting design in `kept`; False
                 for a space of manufacturing errors.
-            variant: variant of the renderer.
 
         Raises:
             SearchError: there is no goal, two goals have one name, or a condition can't be read.
@@ -188,8 +186,6 @@ class DesignEvaluator(PickledWithoutCaches):
         """Score any design: one of a point of the space, or one with manufacturing errors.
 
         Args:
-            design: design to score.
-            seed: seed of the objectives.
             further: constraints beside those of `constraints`.
 
         Raises:
@@ -254,8 +250,6 @@ class DesignEvaluator(PickledWithoutCaches):
         with a faster way.
 
         Args:
-            design: design to score.
-            seed: seed of the objectives.
             only: names of the objectives to score; all if None.
         """
         settings = dict(self.used_settings)

@@ -23,7 +23,6 @@ class ModelCache(PickledWithoutCaches):
         """Store the variant; the model is built on first use.
 
         Args:
-            variant: variant of the renderer.
             coarse: whether images are coarse (see `optisense.optics._coarse`).
         """
         self.variant = variant

@@ -47,7 +47,6 @@ class SameMirrors:
 
         Args:
             design: design that the search starts from.
-            models: models of the optical model.
         """
         self._design = design
         self._models = models
@@ -80,7 +79,6 @@ def least_skin(design: SensorDesign, models: ModelCache) -> float:
 
     Args:
         design: design that the search starts from.
-        models: models of the optical model.
 
     Raises:
         SetupError: the renderer can't run on this machine.

@@ -73,7 +73,6 @@ class AugmentedLagrangian:
         """Return the merit function of the first ascent.
 
         Args:
-            requirements: the conditions.
             score: score of the start.
             offsets: see the attribute, (m,).
         """

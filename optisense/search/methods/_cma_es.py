@@ -60,7 +60,6 @@ class CmaEs(Method):
         """Set up pycma's strategy.
 
         Args:
-            problem: problem to solve.
             population: points per generation; 4 + 3 ln n if None (Hansen's default), made even, so
                 that two workers finish together.
             sigma: standard deviation of the first generation, as a share of each parameter's range.

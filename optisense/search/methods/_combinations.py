@@ -96,7 +96,6 @@ class Combinations(Method):
         are tried, and the best is taken, until none is an improvement.
 
         Args:
-            stage: name of the stage.
             movable: sets of parameters that move together; those of a set have the same levels.
             start: first combination; the best so far if None.
         """

@@ -94,7 +94,6 @@ class FeasibleRegion:
         """Store the constraints; nothing is computed yet.
 
         Args:
-            space: space of the points.
             constraints: constraints that a design must meet.
             parts: names of the parts whose shapes points change.
         """

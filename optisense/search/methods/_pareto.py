@@ -45,7 +45,6 @@ class Pareto(Method):
         """Set up the population and its size.
 
         Args:
-            problem: problem to solve.
             population: points per generation, even; 20 to 100 depending on the budget if None.
 
         Raises:

@@ -44,7 +44,6 @@ class SmoothScore:
         these.
 
         Args:
-            rays: chief rays.
             settings: settings of the objectives; those that a smooth form does not know are
                 ignored.
         """

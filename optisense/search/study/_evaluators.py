@@ -19,9 +19,7 @@ def evaluators(study: Study, usual: DesignEvaluator, method: Method) -> tuple[Ev
     trials have coarse scores.
 
     Args:
-        study: study that is run.
         usual: evaluator of plain scores.
-        method: method of the study.
 
     Raises:
         SearchError: the study has manufacturing errors, which the method can't apply.

@@ -35,8 +35,6 @@ class ReadingWatch:
         """Store the study; nothing is read yet.
 
         Args:
-            study: study that is run.
-            tally: the counts of its trials.
             usual: evaluator of plain scores.
         """
         self._study, self._tally, self._usual = study, tally, usual

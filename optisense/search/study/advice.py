@@ -33,7 +33,6 @@ def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
     """Return a warning if no trial of a search can have another score than its start.
 
     Args:
-        paths: paths of the parameters.
         objectives: names of the objectives, expressions, or functions in files.
 
     Returns:

@@ -81,7 +81,6 @@ class StudyRun:
             make_runner: function that returns the executor of the trials.
             progress: function that is called a few times a second.
             limit: largest number of trials; the study's budget if None.
-            variant: variant of the renderer.
             time_left: time estimate of a command whose last steps are the stages of this search.
 
         Raises:

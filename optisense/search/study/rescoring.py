@@ -82,8 +82,6 @@ def _score(
     """Return the trials with their scores by fresh seeds; one seed suffices if seeds do not matter.
 
     Args:
-        trials: trials to score.
-        seeds: fresh seeds.
         work: function that scores them.
         rivals: scores of the trials that may come next.
         best: largest mean over fresh seeds so far.

@@ -21,7 +21,6 @@ def stages(
     Args:
         limit: largest number of trials.
         usual: usual durations of scores, s.
-        workers: number of processes that score.
         plain_trials: whether the start and the trials are scored as usual; else their times, such
             as those with derivatives and their compiling, do not tell how fast this machine is.
     """

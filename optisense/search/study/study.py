@@ -377,7 +377,6 @@ def _shown(name: str, *, rays_only: bool) -> tuple[str, ...]:
     objective, whose file is not run to look at a study.
 
     Args:
-        name: name of the objective.
         rays_only: whether objectives that need images have none.
     """
     from optisense.objectives.combined import objective_of

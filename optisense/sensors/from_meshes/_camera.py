@@ -46,7 +46,6 @@ def make_camera(
     """Return the camera of a design.
 
     Args:
-        choice: choice of the recipe.
         skin: sensing surface with inward normals, mm.
         place: position of the pupil, (3,) mm; None puts it behind the skin, which then fills the
             picture.

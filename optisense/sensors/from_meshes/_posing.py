@@ -33,7 +33,6 @@ def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGro
 
     Args:
         state: recipe and meshes; notes and sources are added to it.
-        name: name of the group.
         choice: model, colour and placement of the lights.
 
     Raises:

@@ -130,7 +130,6 @@ def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
 
     Args:
         choice: choice of parts, and the position of the board in the sensor.
-        table: parts of the file.
 
     Raises:
         DesignError: there is no such designator, or the points do not fit the file.

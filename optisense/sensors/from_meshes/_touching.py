@@ -134,8 +134,7 @@ def lay_on_elastomer(
     """Return a sensing surface on the faces of the elastomer that it lies on.
 
     Args:
-        name: name of the sensing surface.
-        skin: its mesh, mm.
+        skin: mesh of the skin, mm.
         elastomers: meshes of the elastomers, by name.
         distance: largest distance to the elastomer, mm.
 
