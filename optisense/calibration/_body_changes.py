@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense import library
+from optisense.array_types import FloatArray
 from optisense.design import Cage, Light, SensorDesign
 from optisense.design.emitters import AreaEmitter, LightModel, SpotEmitter
 from optisense.design.parts import FaceFinish, Role
 from optisense.errors import CalibrationError
 from optisense.geometry import TriangleMesh
-
-FloatArray = NDArray[np.float64]
 
 FLAT = 0.2
 """Largest deviation of a flat gel's skin from its plane, mm: the skin of a real GelSight Mini sags

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import layered_pictures
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
@@ -22,8 +22,6 @@ from optisense.calibration.seen_contacts import SeenContact
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
-
-FloatArray = NDArray[np.float64]
 
 FIT_WIDTH = 160
 """Width of the pictures of a fit, in pixels: a quarter of the pixels of those that are compared in

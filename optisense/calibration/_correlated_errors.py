@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft2, next_fast_len, rfft2
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 UNCORRELATED = 0.1
 """Correlation below which errors at a distance are regarded as independent: the estimate from one

@@ -16,10 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from optisense.array_types import FloatArray
+
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
 
-FloatArray = NDArray[np.float64]
 FloatType = TypeVar("FloatType", np.float32, np.float64)
 
 COVERAGE_RAYS = 8

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.calibration._far_field import without_drift
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
@@ -33,8 +34,6 @@ from optisense.reading.tilts import angles_between
 if TYPE_CHECKING:
     from optisense.geometry import Contact
     from optisense.optics import ChiefRays, OpticalModel
-
-FloatArray = NDArray[np.float64]
 
 INSIDE = 0.9
 """Radius up to which pixels of a contact are read, in radii of the contact: at the edge, hand

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 FAR = 3.0
 """Distance beyond which a press should change nothing, in radii of the contact: well outside the

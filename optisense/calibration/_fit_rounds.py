@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.calibration._contact_placing import (
     FIT_WIDTH,
     moved_contact,
@@ -36,8 +36,6 @@ from optisense.design import SensorDesign
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
-
-FloatArray = NDArray[np.float64]
 
 DIFFERENCE = 0.35
 """Step of the difference quotients of numbers that need a rendering, in plausible ranges; it is

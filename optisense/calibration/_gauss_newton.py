@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from optisense.array_types import FloatArray
 from optisense.calibration._correlated_errors import PHOTOGRAPH_NOISE, ErrorScale, error_scale
 from optisense.calibration._covered_view import outline_of, with_smooth_outline
 from optisense.calibration._far_field import without_drift
@@ -35,8 +36,6 @@ from optisense.calibration.quantities import chain_with, power_factors
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.realism import distances
 from optisense.calibration.seen_contacts import SeenContact
-
-FloatArray = NDArray[np.float64]
 
 NEAR = 2.2
 """Radius within which the response of a press counts, in radii of its contact; beyond, there is

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 MEDIAN_SQUARE = 0.455
 """Median of the square of a normally distributed number of variance 1 (0.6745 squared)."""

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from optisense.array_types import ByteArray
 from optisense.calibration.layouts import BACKGROUND, PRESSES
-from optisense.calibration.photographs import ByteArray, PhotographedPress, Photographs
+from optisense.calibration.photographs import PhotographedPress, Photographs
 from optisense.errors import CalibrationError
 from optisense.geometry import Contact, Sphere
 from optisense.picture_files import write_picture

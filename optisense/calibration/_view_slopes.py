@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
+from optisense.array_types import FloatArray
 from optisense.calibration._covered_view import CoveredView, outline_of
 from optisense.calibration._layered_pictures import LayeredPictures
 from optisense.calibration.seen_contacts import SeenContact
@@ -25,8 +26,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from optisense.optics import ChiefRays
-
-FloatArray = NDArray[np.float64]
 
 FARTHEST = 0.1
 """Largest displacement of a point in the picture, as a share of the picture's width; pixels with a

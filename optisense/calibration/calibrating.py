@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from optisense.array_types import FloatArray
 from optisense.calibration._body_changes import with_single_lights
 from optisense.calibration._cross_readings import realism_and_readings
 from optisense.calibration._fit_rounds import FitRounds, Progress
@@ -28,8 +26,6 @@ from optisense.calibration.seen_contacts import check_shape
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.errors import CalibrationError
-
-FloatArray = NDArray[np.float64]
 
 LEAST_PRESSES = 2
 """Smallest number of presses of a fit: the response of a single ball could be explained by its

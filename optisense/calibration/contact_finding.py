@@ -25,7 +25,7 @@ from scipy.ndimage import (
 )
 from scipy.optimize import minimize
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 BLUR = 0.005
 """Standard deviation of the blur of the difference, as a share of the picture's width: 1.6 pixels

@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.calibration.photographs import ByteArray, PhotographedPress, Photographs
+from optisense.array_types import ByteArray
+from optisense.calibration.photographs import PhotographedPress, Photographs
 from optisense.errors import CalibrationError, ContactError
 from optisense.geometry import Sphere
 from optisense.geometry.contact_text import parse_indenter

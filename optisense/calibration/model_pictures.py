@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from optisense.array_types import FloatArray
 from optisense.calibration._covered_view import with_smooth_outline
 from optisense.calibration._layered_pictures import layered_pictures
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
@@ -22,8 +23,6 @@ from optisense.geometry import Contact
 if TYPE_CHECKING:
     from optisense.design.responses import PictureChain
     from optisense.optics import OpticalModel
-
-FloatArray = NDArray[np.float64]
 
 WIDEST_RANGE = 4.0
 """Largest factor from the first guess at which exposures are searched; the guess is far closer."""

@@ -10,12 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 
+from optisense.array_types import ByteArray
 from optisense.errors import CalibrationError
-
-ByteArray = NDArray[np.uint8]
 
 WORKING_WIDTH = 320
 """Width of the pictures that are compared, in pixels: contacts of millimetres are then some 50

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.calibration.families import FAMILIES
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign, get_value, set_value
@@ -22,8 +22,6 @@ from optisense.design.lenses.radial_shading import RadialShading
 from optisense.design.responses import PictureChain
 from optisense.design.responses.gamma_curve import GammaCurve
 from optisense.errors import CalibrationError
-
-FloatArray = NDArray[np.float64]
 
 
 def quantities_of(

@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
+from optisense.array_types import FloatArray
 from optisense.calibration._far_field import FAR, drift, without_noise
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact
-
-FloatArray = NDArray[np.float64]
 
 RING = 1.1, 1.6
 """Inner and outer edge of the ring, in radii of the contact: the inner edge leaves out the

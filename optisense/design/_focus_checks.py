@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.arrangement import straight_rays
 from optisense.design.lenses.defocus import DISC_DEVIATION
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
@@ -13,8 +13,6 @@ from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.rays import ray_hits
-
-FloatArray = NDArray[np.float64]
 
 SHARP = 2.0
 """Diameter of the largest circle of confusion that counts as sharp, in pixels. A disc that is two

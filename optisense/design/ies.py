@@ -11,12 +11,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import LibraryError
 from optisense.untrusted_files import MOST_IES, read_bytes
-
-FloatArray = NDArray[np.float64]
 
 MAX_VALUES = 1_200_000
 """Largest number of candela values of one IES file. A table of one value per quarter degree over

@@ -6,11 +6,9 @@ A position in the picture is given by shares: 0 to 1 across from the left and do
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.camera import Camera
-
-FloatArray = NDArray[np.float64]
 
 FOLD_PLACES = 13
 """Number of positions along the picture's width and its height at which a lens is tested for

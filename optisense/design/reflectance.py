@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 
 def fresnel_dielectric(cosine: ArrayLike, eta: float | FloatArray) -> FloatArray:

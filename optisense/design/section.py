@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.parts import Role
 from optisense.design.projection import directions
 from optisense.geometry import TriangleMesh
 
 if TYPE_CHECKING:
     from optisense.design.sensor_design import SensorDesign
-
-FloatArray = NDArray[np.float64]
 
 OFF_VERTICES = 1e-7
 """Height, mm, above the plane that is assumed for vertices in the plane, so that no vertex is on

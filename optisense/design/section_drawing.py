@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.looks import ROLE_LOOKS
 from optisense.design.parts import Role
 from optisense.design.section import Section, section
@@ -15,8 +15,6 @@ from optisense.text import to_html
 
 if TYPE_CHECKING:
     from optisense.design.sensor_design import SensorDesign
-
-FloatArray = NDArray[np.float64]
 
 WIDTH, LABELS, MARGIN, LINE = 440.0, 190.0, 24.0, 17.0
 """Sizes in pixels: width of the drawing, width of the labels beside it, margin around both, and

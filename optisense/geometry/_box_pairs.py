@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.geometry.mesh import FloatArray
+from optisense.array_types import FloatArray, IntArray
 
 _GROUP = 4
 """Number of boxes of one level that a box of the next level encloses: each pair of boxes that
@@ -34,8 +34,6 @@ _SPREADING = (
     (4, 0x10C30C30C30C30C3), (2, 0x1249249249249249),
 )  # fmt: skip
 """Shifts and masks that spread the bits of a number, with two free places between any two."""
-
-IntArray = NDArray[np.int64]
 
 
 class _Boxes(NamedTuple):

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError
-
-FloatArray = NDArray[np.float64]
 
 _ROUNDS = 200
 """Largest number of rounds of the clustering, which usually converges much sooner."""

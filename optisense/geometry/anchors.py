@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.array_types import FloatArray
+from optisense.geometry.mesh import TriangleMesh
 
 _SAME = 1e-9
 """Distance (mm) within which a point coincides with a vertex. It is far above the rounding of

@@ -17,12 +17,12 @@ import weakref
 from collections import OrderedDict
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from optisense.array_types import FloatArray
 from optisense.errors import DesignError
 from optisense.geometry.mesh import TriangleMesh
 
-FloatArray = NDArray[np.float64]
 Resolution = tuple[int, int, int]
 
 OUTSIDE_TOLERANCE = 1e-6

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from optisense.geometry.cage import FloatArray, Resolution, bernstein, box_coordinates, contract
+from optisense.array_types import FloatArray
+from optisense.geometry.cage import Resolution, bernstein, box_coordinates, contract
 
 MOST_COMBINATIONS = 100_000
 """Largest number of combinations of differences that are tested, which take some milliseconds; with

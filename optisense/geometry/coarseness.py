@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.geometry.cage import FloatArray, Resolution, cage_weights, deform
+from optisense.array_types import FloatArray
+from optisense.geometry.cage import Resolution, cage_weights, deform
 from optisense.geometry.mesh import TriangleMesh
 
 LONGEST_EDGES = 64

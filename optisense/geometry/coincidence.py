@@ -14,8 +14,9 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry._box_pairs import overlapping_boxes
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.mesh import TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))
 """Smallest cosine between the normals of coincident faces (10 degrees); faces of two tessellations

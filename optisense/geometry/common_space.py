@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.array_types import FloatArray
+from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.overlaps import find_overlap
 
 Places = weakref.WeakKeyDictionary[TriangleMesh, FloatArray | None]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.array_types import FloatArray
+from optisense.geometry.mesh import TriangleMesh
 
 RAY_DIRECTION = np.array([0.3578, 0.2113, 0.9096])
 """Direction of the test rays, nearly a unit vector: not parallel to an axis or a diagonal, so that

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry._box_pairs import overlapping_boxes, overlapping_pairs
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.mesh import TriangleMesh
 
 TOUCH = 1e-4
 """Depth (mm) up to which faces that reach through one another only touch: above the rounding of

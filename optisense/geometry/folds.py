@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
-from optisense.geometry.cage import FloatArray, Resolution
+from optisense.array_types import FloatArray
+from optisense.geometry.cage import Resolution
 from optisense.geometry.cage_map import is_one_to_one, jacobians
 from optisense.geometry.crossings import self_crossings
 from optisense.geometry.mesh import TriangleMesh

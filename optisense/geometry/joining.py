@@ -13,8 +13,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry.coincidence import find_coincident
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle, patches, smoothly_joined
 
 EXACT = 0.001

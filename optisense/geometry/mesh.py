@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import MeshError
 from optisense.geometry._grid_welding import WELD_DISTANCE, welded
 from optisense.geometry.mesh_files import obj_text, read_mesh
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 CREASE = 40.0

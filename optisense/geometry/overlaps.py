@@ -9,9 +9,10 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry.containment import inside
 from optisense.geometry.crossings import crossings
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.mesh import TriangleMesh
 
 CONTACT = 0.002
 """Distance (mm) below which parts touch, and depth up to which parts that overlap only touch: a

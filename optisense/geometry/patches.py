@@ -7,8 +7,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry.connected import connected_components
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.mesh import TriangleMesh
 
 Faces = NDArray[np.int64]
 

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+from optisense.array_types import FloatArray, IntArray
 
 MAX_PASSES = 40
 """Number of passes after which refinement ends. Each pass halves the area of the triangles that it

@@ -10,13 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import MeshError
 from optisense.geometry._mesh_checks import with_consistent_winding
 from optisense.geometry._welding import merged_vertices
 from optisense.geometry.connected import connected_components
 from optisense.geometry.containment import inside
 from optisense.geometry.crossings import self_crossings
-from optisense.geometry.mesh import FloatArray, TriangleMesh
+from optisense.geometry.mesh import TriangleMesh
 
 WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Distances (mm) below which vertices are merged, tried in ascending order until the mesh is

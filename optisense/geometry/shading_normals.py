@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 SAME_NORMAL = 1e-6
 """Difference between the components of unit normals below which corners of a vertex share it: far

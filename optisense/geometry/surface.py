@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError, MeshError
 from optisense.geometry.mesh import TriangleMesh
-
-FloatArray = NDArray[np.float64]
 
 _ARRIVED = 1e-9
 """Remaining distance (mm) below which a walk over the surface has arrived: far above the rounding

@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import LibraryError
 from optisense.untrusted_files import read_json
-
-FloatArray = NDArray[np.float64]
 
 FULL = 65536.0
 """Level of a full pixel in tuning files, which have 16 bits whatever the sensor has."""

@@ -5,13 +5,11 @@ an indenter where it touches.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError
 from optisense.geometry import TriangleMesh
 from optisense.mechanics._footprint import Footprint
-
-FloatArray = NDArray[np.float64]
 
 SHALLOWEST = 1e-3
 """Depth (mm) of skin inside both of two indenters above which they count as overlapping: some

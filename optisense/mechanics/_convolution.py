@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from optisense.array_types import FloatArray
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._layer import LoadKernels, SquareLoad
-
-FloatArray = NDArray[np.float64]
 
 ODD = {
     "zz": (False, False),

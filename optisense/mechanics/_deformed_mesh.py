@@ -8,12 +8,11 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
 from optisense.geometry.refinement import refine
 from optisense.mechanics._displacement_field import DECAY
 from optisense.mechanics._pressed_skin import PressedSkin
-
-FloatArray = NDArray[np.float64]
 
 EDGE_IN_CONTACT = 1.5
 """Smallest value of the greatest edge length in a contact, in units of the pitch of its grid:

@@ -14,6 +14,7 @@ from scipy.ndimage import (
     maximum_filter,
 )
 
+from optisense.array_types import FloatArray
 from optisense.mechanics._convolution import GridResponse
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._footprint import NO_OVERLAP, Footprint
@@ -22,8 +23,6 @@ from optisense.mechanics._height_map import slopes
 
 if TYPE_CHECKING:
     from optisense.mechanics._gel_patch import GelPatch
-
-FloatArray = NDArray[np.float64]
 
 RING = 1.0
 """Width of the fine grid around a footprint, over the footprint's shorter side or, if that is less,

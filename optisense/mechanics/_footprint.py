@@ -8,14 +8,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.surface import SurfacePoint
 from optisense.mechanics._height_map import heights
-
-FloatArray = NDArray[np.float64]
 
 MARGIN = 1.15
 """Ratio of the sides of a grid to those of the overlap of the undeformed shapes. The contact area

@@ -7,17 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from optisense.array_types import BoolArray, FloatArray, IntArray
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rays import ray_hits
 from optisense.mechanics._footprint import Footprint, outer_faces
 from optisense.mechanics._height_map import heights
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
 
 PITCH = 1.0 / 3.0
 """Distance of columns under a contact over the thickness of the gel. The effect of the gel's shape

@@ -7,12 +7,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray, IntArray
 from optisense.errors import ContactError
 from optisense.mechanics._gel_columns import LAYERS, GelColumns
 from optisense.mechanics._hexahedra import face_points, stiffnesses
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 AT_ONCE = 128
 """Number of elements whose matrices are computed together: at 4.6 kB each, they fit in a

@@ -15,9 +15,9 @@ from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
+from optisense.array_types import FloatArray, IntArray
 from optisense.mechanics import _point_load as point_load
 from optisense.mechanics._gel_columns import GelColumns
 from optisense.mechanics._gel_elements import GelElements
@@ -26,9 +26,6 @@ from optisense.mechanics._point_load import INTO
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 TAPER = 1.0
 """Distance, in thicknesses, over which the correction falls to 0 at the rim of the modelled region:

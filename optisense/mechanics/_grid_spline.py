@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates, spline_filter
 
+from optisense.array_types import FloatArray
 from optisense.mechanics._footprint import Footprint
-
-FloatArray = NDArray[np.float64]
 
 
 class GridArea:

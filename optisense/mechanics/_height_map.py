@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
-
-FloatArray = NDArray[np.float64]
 
 LEAST_UPRIGHT = 0.05
 """Smallest z of unit shading normals with which the heights of a triangle are curved. Steeper

@@ -15,13 +15,13 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import j0, j1
+
+from optisense.array_types import FloatArray
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
-
-FloatArray = NDArray[np.float64]
 
 MAX_WAVE_NUMBER = 20.0
 """Largest wave number times thickness in the Hankel transforms. The layer's compliance differs from

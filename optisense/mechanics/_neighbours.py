@@ -6,13 +6,11 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.mechanics._displacement_field import DisplacementField
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._grid_spline import GridSpline
-
-FloatArray = NDArray[np.float64]
 
 SPARSE = 4
 """Distance, in pitches of a contact's grid, of the points at which displacements due to other

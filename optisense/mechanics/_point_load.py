@@ -7,9 +7,8 @@ Contact Mechanics, 1985, sections 3.2 and 3.6).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 NEAREST_SQUARE = 1e-12
 """Lower bound on squared distances (mm^2), so that results are finite at the point of the load

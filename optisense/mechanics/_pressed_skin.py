@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError
 from optisense.mechanics._displacement_field import (
     DisplacementField,
@@ -28,8 +29,6 @@ from optisense.mechanics._normal_contact import (
 )
 from optisense.mechanics._relaxation import Relaxation
 from optisense.mechanics._tangential_contact import Drag, solve_shear
-
-FloatArray = NDArray[np.float64]
 
 SETTLED = 1e-4
 """Change (mm) of the displacements that contacts cause at each other at which the iteration over

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 LEAST, MOST = 0.2, 1.5
 """Smallest and largest share of a change that is taken, so that no single iteration throws the next

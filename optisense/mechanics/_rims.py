@@ -7,14 +7,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.design.parts import Role
 from optisense.geometry import TriangleMesh
 from optisense.geometry.surface import closest_points
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._gel_columns import LEAST_UPRIGHT
-
-FloatArray = NDArray[np.float64]
 
 STEEP_RIM = 2.0
 """Distance (mm) of a contact from skin that is too steep for elements, below which forces are not

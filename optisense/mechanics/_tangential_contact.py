@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError
 from optisense.mechanics._convolution import GridResponse
-
-FloatArray = NDArray[np.float64]
 
 TOLERANCE = 1e-4
 """Relative change of the shear (root of the sum of squares) in a step at which the iteration ends,

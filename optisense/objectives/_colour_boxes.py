@@ -14,7 +14,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 BLOCK = 128
 """Number of points of a block; any number gives the same result."""

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.objectives import _figures
-from optisense.objectives._press import FloatArray
 from optisense.objectives._reader import (
     CAMERA_NOISE,
     LEAST_PIXELS,

@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.lenses.film import PictureWindow
 from optisense.design.responses import PictureChain
 from optisense.errors import ObjectiveError
 
-FloatArray = NDArray[np.float64]
 Value = TypeVar("Value")
 
 MOST_CLIPPED = 0.25

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ObjectiveError
-from optisense.objectives._press import FloatArray, Press
+from optisense.objectives._press import Press
 from optisense.objectives.settings import refuse_outside
 from optisense.reading.camera_noise import MEASURED_NOISE
 from optisense.reading.lookup import (

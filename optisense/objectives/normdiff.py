@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
 from optisense.objectives._colour_boxes import ranges_in_boxes
-from optisense.objectives._press import FloatArray, Press, azimuths, refuse_kind
+from optisense.objectives._press import Press, azimuths, refuse_kind
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 

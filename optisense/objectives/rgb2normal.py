@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
-from optisense.objectives._press import FloatArray, Press, refuse_kind
+from optisense.objectives._press import Press, refuse_kind
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 

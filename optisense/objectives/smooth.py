@@ -15,11 +15,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.objectives._aoap import COVERAGE_WEIGHT
 from optisense.objectives._distortion import MOST_ANISOTROPY
 from optisense.objectives._projection_warping import MOST_EVEN
-
-FloatArray = NDArray[np.float64]
 
 
 class Rays(Protocol):

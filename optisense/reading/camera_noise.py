@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from optisense.array_types import ByteArray
 
 MEASURED_NOISE = 1.5
 """Standard deviation, in levels of 255: published ball presses of a real GelSight Mini show 1.1 to
 1.9 between frames of one press."""
-
-ByteArray = NDArray[np.uint8]
 
 
 def add_camera_noise(picture: ByteArray, noise: float, seed: int | list[int]) -> ByteArray:

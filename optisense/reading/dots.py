@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import black_tophat
 from scipy.spatial import cKDTree
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 REACH = 0.5
 """Search radius around a dot's place at rest, over the distance to its nearest neighbour; with a

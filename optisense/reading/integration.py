@@ -11,10 +11,9 @@ from scipy import sparse
 from scipy.ndimage import binary_erosion
 from scipy.sparse.linalg import factorized
 
+from optisense.array_types import FloatArray
 from optisense.reading.tilts import STEEPEST
 from optisense.reading.untouched import UntouchedSurface
-
-FloatArray = NDArray[np.float64]
 
 ROUNDS = 3
 """Number of rounds of `NormalIntegrator.depths`: the change of a ray's direction between pixels,

@@ -24,9 +24,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 CELL = 3.0
 """Angle (degrees) between neighbouring tilts of the grid: fine enough for the errors of sensors, 2

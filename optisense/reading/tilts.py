@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 STEEPEST = 80.0
 """Largest tilt (degrees) of a read normal, and largest angle between a ray and the normal of an

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatArray
+
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, TactileImage
-
-FloatArray = NDArray[np.float64]
 
 UNMOVED = 1e-4
 """Displacement (mm) below which a surface counts as unmoved; smaller values are rounding of single

@@ -9,9 +9,8 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.objectives.frames import nearest_press
-
-FloatArray = NDArray[np.float64]
 
 LEAST_PIXELS = 12
 """Smallest number of pixels that a visible ball covers (about 4 x 3); smaller ones can't be made

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.design.section import cut
 from optisense.report.drawing import BLUE, GREY, PALE, RED, new_figure
@@ -15,8 +16,6 @@ from optisense.report.drawing import BLUE, GREY, PALE, RED, new_figure
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 STILL = 1e-6
 """Largest displacement of a control point that counts as unmoved, mm; rounding of a blend stays

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.design.section import section
 from optisense.report.drawing import AMBER, BLUE, GREY, PALE, RED, legend_above, new_figure
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from optisense.report._trial_marks import Marks
-
-FloatArray = NDArray[np.float64]
 
 MOST_PANELS = 12
 """Largest number of parameters that are drawn: those with the strongest association with the

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.calibration.comparing import Comparison
 from optisense.calibration.realism import PATCH, PressRealism, Realism, distances
 from optisense.design import SensorDesign
@@ -18,8 +19,6 @@ from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 CONTRAST = 2.0
 """Factor on responses and errors in the pictures, which show them around a middle grey: they are

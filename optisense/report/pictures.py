@@ -9,8 +9,9 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import ByteArray
+
 FloatArray = NDArray[np.floating]
-ByteArray = NDArray[np.uint8]
 
 MOST_STRETCHED = 4.0
 """Stretching at the end of the colour scale: a ball four times as long as wide hardly looks like a

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.design.colour import decode
 from optisense.geometry import Contact, Sphere
@@ -20,8 +21,6 @@ from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, RenderProgress
-
-FloatArray = NDArray[np.float64]
 
 SENSOR = "gelsight-mini"
 """Built-in sensor of which there is a real picture."""

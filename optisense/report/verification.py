@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry.objects import OBJECTS
 from optisense.report._files import page
 from optisense.report.drawing import AMBER, BLUE, GREY, RED, figure_uri, legend_above, new_figure
@@ -28,8 +29,6 @@ BESIDE = 1.0
 
 SMALLEST_CROP = 40
 """Smallest side of a cut-out of a picture, in pixels."""
-
-FloatArray = NDArray[np.float64]
 
 
 def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]) -> str:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
+from optisense.array_types import FloatArray
 from optisense.design import Role, SensorDesign
 from optisense.design.looks import ROLE_LOOKS
 from optisense.design.projection import image_edges
@@ -20,8 +20,6 @@ from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
 from optisense.robots._densities import density_of
 from optisense.workshop.export import file_name
 from optisense.workshop.shapes import Shape, is_air, shapes
-
-FloatArray = NDArray[np.float64]
 
 METRES = 1e-3
 """Length of one mm, m: robot files are in metres, designs in mm."""

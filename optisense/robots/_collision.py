@@ -11,10 +11,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 COVERED = 0.05
 """Depth (mm) in a hull from which on a point of the skin counts as covered: more than the gap

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign, get_value
 from optisense.errors import SearchError
 from optisense.search._run_search import run_study
@@ -32,7 +32,6 @@ from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchResult
 from optisense.search.study.study import Study
 
-FloatArray = NDArray[np.float64]
 Landscape = Callable[[FloatArray], float]
 """Score of a point (n,), whose coordinates are shares of their ranges, 0 to 1."""
 

@@ -7,11 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.sensors._shapes import arc, pieces_of_arc
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from optisense import library
+from optisense.array_types import FloatArray
 from optisense.design import (
     Cage,
     Camera,
@@ -27,7 +28,7 @@ from optisense.design import (
 )
 from optisense.geometry import TriangleMesh
 from optisense.sensors._digit_sources import provenance
-from optisense.sensors._half_round import FloatArray, HalfRound, stacked
+from optisense.sensors._half_round import HalfRound, stacked
 from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors.dimensions import (
     Dimensions,

@@ -10,10 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
 from optisense.sensors._shapes import ASIDE, arc
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

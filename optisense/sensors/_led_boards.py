@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import AreaEmitter, Light, LightGroup
 from optisense.geometry import TriangleMesh
 from optisense.sensors._led_flux import package
@@ -28,8 +28,6 @@ WALL_MARGIN = 0.15
 RING_HEIGHT = 0.3
 """z of the windows of a ring of LEDs at the foot of the wall, mm, an assumption: just inside
 the wall."""
-
-FloatArray = NDArray[np.float64]
 
 
 def led_height() -> float:

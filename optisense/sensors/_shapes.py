@@ -11,13 +11,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from optisense.array_types import FloatArray
 from optisense.design import Light
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import grid_faces
 
-FloatArray = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 ON_AXIS = 1e-12

@@ -8,11 +8,12 @@ import manifold3d
 import numpy as np
 import shapely
 
+from optisense.array_types import FloatArray
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.sensors._led_flux import package
 from optisense.sensors._shapes import ribbon
-from optisense.sensors._svelte_profile import CurvedMirror, FlatMirror, FloatArray, Palm, Points
+from optisense.sensors._svelte_profile import CurvedMirror, FlatMirror, Palm, Points
 
 LED = "smd-3528"
 """Light of the library beside the gel."""

@@ -13,9 +13,9 @@ import numpy as np
 import shapely
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import DesignError
 
-FloatArray = NDArray[np.float64]
 Points = Sequence[tuple[float, float]]
 
 SAGITTA_STEP = 0.1

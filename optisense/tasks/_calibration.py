@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, gaussian_filter
 
+from optisense.array_types import FloatArray
 from optisense.design.difference import fingerprint
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
@@ -28,8 +29,6 @@ from optisense.tasks._draws import Places
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
-
-FloatArray = NDArray[np.float64]
 
 WIDTH = 320
 """Default width of the pictures (pixels), that of GelSight's own software."""

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import Camera
 
 if TYPE_CHECKING:
@@ -29,8 +30,6 @@ parameters."""
 WIDEST = 150.0
 """Field of view (degrees) across the picture above which no pinhole is fitted, as a flat picture
 stretches its edge without bound."""
-
-FloatArray = NDArray[np.float64]
 
 
 def ray_arrays(rays: ChiefRays) -> dict[str, NDArray[np.float32]]:

@@ -12,16 +12,14 @@ import warnings
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import StandardScaler
 
+from optisense.array_types import FloatArray
 from optisense.errors import TaskError
-
-FloatArray = NDArray[np.float64]
 
 BIN = 4.0
 """Width of a bin of the table, levels of 255: a few times the noise of the camera (1 to 2 levels),

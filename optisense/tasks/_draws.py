@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.geometry import Contact, Indenter
 from optisense.geometry.contact_text import INDENTER_FORM, parse_indenter
@@ -24,8 +25,6 @@ on a GelSight Mini they are 0.07 mm apart.
 MARGIN = 0.02
 """Margin around a contact, as a share of the picture's width: 6 of 320 pixels, 0.4 mm on a GelSight
 Mini, so that the picture includes the shading just outside the contact."""
-
-FloatArray = NDArray[np.float64]
 
 
 def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:

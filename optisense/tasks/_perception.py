@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import ByteArray, FloatArray
 from optisense.errors import TaskError
 from optisense.folders import held
 from optisense.geometry import Contact
@@ -34,9 +34,6 @@ from optisense.writing import write_json
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
-
-FloatArray = NDArray[np.float64]
-ByteArray = NDArray[np.uint8]
 
 SETTINGS = "task.json"
 SAMPLES = "samples.csv"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.geometry import Contact, Cylinder, MeshIndenter, Sphere, TriangleMesh
 from optisense.objectives.score import json_ready
@@ -23,8 +24,6 @@ from optisense.tasks._calibration import LEAST_PIXELS, CalibratedSensor, Reconst
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
-
-FloatArray = NDArray[np.float64]
 
 
 def pyramid(slope: float = 30.0, height: float = 2.0) -> TriangleMesh:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.ensemble import RandomForestRegressor
 from sklearn.model_selection import KFold
 
+from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 
 TREES = 100
@@ -16,8 +16,6 @@ TREES = 100
 its own."""
 FOLDS = 5
 """Number of folds of the cross-validation, which is scikit-learn's default."""
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

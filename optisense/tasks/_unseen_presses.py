@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
@@ -19,8 +20,6 @@ from optisense.tasks._draws import PLACES_SEEN
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
-
-FloatArray = NDArray[np.float64]
 
 CANDIDATES = 1500
 """Number of places on the skin from which those of presses are chosen: far more than presses, so

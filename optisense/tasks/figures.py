@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.tasks._perception import PerceptionResult
 from optisense.tasks._reconstruction import ReconstructionResult
 
@@ -20,8 +21,6 @@ LINE = "#c0392b"
 WORST_ANGLE = 30.0
 """Error of a normal (degrees) at the end of the colour scale, larger than the mean error of a flat
 reading (about 20 degrees)."""
-
-FloatArray = NDArray[np.float64]
 
 
 def _figure(width: float, height: float) -> Figure:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 RESAMPLES = 4000
 """Number of resamples; the ends of the interval then vary by 2 to 3 per cent of its width."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.reading.tilts import angles_between
@@ -17,8 +18,6 @@ from optisense.tasks._calibration import CalibratedSensor
 
 if TYPE_CHECKING:
     from optisense.geometry import Contact
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

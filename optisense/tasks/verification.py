@@ -12,9 +12,9 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
@@ -43,8 +43,6 @@ from optisense.tasks.press_readings import (
 if TYPE_CHECKING:
     from optisense.geometry import Contact
     from optisense.optics import OpticalModel
-
-FloatArray = NDArray[np.float64]
 
 NEAR = 2.0
 """Largest distance of a place of the skin from the nearest point that a camera sees at which the

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.cluster.hierarchy import fcluster, linkage
 
+from optisense.array_types import FloatArray
 from optisense.design import Light
-
-FloatArray = NDArray[np.float64]
 
 SAME_PLANE = 0.01
 """Largest distance of LEDs' windows from one plane for which they may share a board, mm, if they

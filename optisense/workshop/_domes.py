@@ -7,13 +7,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
 from optisense.workshop._recognised import SAME
-
-FloatArray = NDArray[np.float64]
 
 FEWEST = 8
 """Smallest number of corners of a ring, and twice the smallest number of rings of a dome."""

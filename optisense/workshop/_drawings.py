@@ -10,15 +10,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from optisense.array_types import FloatArray
 from optisense.text import to_html
 from optisense.workshop._dxf import Pair, arc, circle, dxf, line
 from optisense.workshop._plates import Circle, Plate
 from optisense.workshop._profiles import OutlinePiece, centre_of
-
-FloatArray = NDArray[np.float64]
 
 GAP = 16.0
 """Distance between two views, mm: room for a dimension and its number."""

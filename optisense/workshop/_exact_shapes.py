@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from optisense.array_types import FloatArray
 from optisense.design import Cage
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import bernstein, deformed
@@ -40,7 +40,6 @@ RIGHT_SIDE = 0.5
 where that is less: a plate on the wrong side of its sheet is off by the whole thickness.
 """
 
-FloatArray = NDArray[np.float64]
 
 WORTH_IT = 60
 """Smallest number of triangles for a recognition of shapes; a smaller mesh is written as it is,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
@@ -59,8 +59,6 @@ pulling; below it the skin points in all directions, as that of a belt.
 
 SIDES = 48
 """Number of sides of round holes and pins, which are then 0.01 mm off the circle."""
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.workshop._profiles import pieces
 
-FloatArray = NDArray[np.float64]
 Lift = Callable[[FloatArray], FloatArray]
 """Map from points of an outline, (n, 2), to points in the sensor, (n, 3)."""
 

@@ -9,15 +9,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense import library
+from optisense.array_types import FloatArray
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.errors import LibraryError
 from optisense.library import LightEntry, TypicalLight
 from optisense.workshop._boards import axes_at_rest, boards_of
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import Role
 from optisense.geometry import TriangleMesh
 from optisense.workshop._profiles import OutlinePiece, pieces
 from optisense.workshop._recognised import extruded_along
 from optisense.workshop._step_format import bodies
 from optisense.workshop.shapes import Shape
-
-FloatArray = NDArray[np.float64]
 
 THICKEST = 10.0
 """Largest thickness of a plate, mm: common laser cutters cut acrylic of up to 10 mm."""

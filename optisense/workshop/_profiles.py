@@ -10,9 +10,8 @@ from itertools import pairwise
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 EXACT = 2e-6
 """Largest deviation of corners from the line or circle that they come from, mm; it covers rounding

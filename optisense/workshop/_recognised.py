@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
 from optisense.geometry.connected import connected_components
 from optisense.geometry.patches import smoothly_joined
-
-FloatArray = NDArray[np.float64]
 
 SAME = 1e-6
 """Largest difference of coordinates that count as equal, mm; files keep seven digits."""

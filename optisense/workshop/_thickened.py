@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
+from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import as_manifold
-
-FloatArray = NDArray[np.float64]
 
 LONGEST_MITRE = 3.0
 """Largest distance of a corner of the far face from the near one, in thicknesses; the mitre of two

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 from pydantic import Field
 
 from optisense import sensors
+from optisense.array_types import FloatArray
 from optisense.design import LightGroup, LightModel, check_design, load_design, save_design
 from optisense.design.emitters import SpotEmitter
-from optisense.design.emitters.base import FloatArray
 from optisense.design.fields import Positive
 from optisense.errors import DesignError
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from optisense.array_types import FloatArray
 from optisense.geometry import _box_pairs
 from optisense.geometry._box_pairs import overlapping_boxes, overlapping_pairs
-from optisense.geometry.mesh import FloatArray
 
 
 def boxes(count: int, size: float, seed: int) -> tuple[FloatArray, FloatArray]:

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from optisense.design.emitters.base import FloatArray, LightModel, Window
+from optisense.array_types import FloatArray
+from optisense.design.emitters.base import LightModel, Window
 from optisense.design.fields import MILLIMETRES, Positive
 
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 
+from optisense.array_types import FloatArray
 from optisense.design.emitters._intensity import Intensity
-from optisense.design.emitters.base import FloatArray, LightModel
+from optisense.design.emitters.base import LightModel
 from optisense.design.fields import RelativePath
 from optisense.design.ies import IesProfile, read_ies
 

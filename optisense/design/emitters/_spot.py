@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
-from optisense.design.emitters.base import FloatArray, HalfAngle, LightModel
+from optisense.array_types import FloatArray
+from optisense.design.emitters.base import HalfAngle, LightModel
 
 FALL_ANGLES = 65
 """Number of polar angles of the table between the beam and the cut-off, where the intensity is a

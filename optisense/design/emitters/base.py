@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field
 
+from optisense.array_types import FloatArray
 from optisense.design.emitters._intensity import Intensity
 from optisense.design.fields import DEGREES, Number
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
-
-FloatArray = NDArray[np.float64]
 
 HalfAngle = Annotated[Number, Field(gt=0.0, le=90.0, json_schema_extra=DEGREES)]
 """Angle from the axis of a lamp that shines forward, degrees."""

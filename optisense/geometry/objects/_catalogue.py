@@ -12,16 +12,14 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import ContactError
 from optisense.geometry.indenter_kinds import FACET_ERROR, IndenterKind, Quantity, quantity
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.objects import _outlines
 from optisense.geometry.objects._relief import Relief
 from optisense.near import suggestion
-
-FloatArray = NDArray[np.float64]
 
 
 def _screw_head(x: FloatArray, y: FloatArray) -> FloatArray:

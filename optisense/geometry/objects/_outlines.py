@@ -8,9 +8,9 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 STEEP = 5.67
 """Slope of walls, mm of height per mm: the tangent of 80 degrees, as the walls of moulded parts

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.geometry.mesh import TriangleMesh, grid_faces
 
-FloatArray = NDArray[np.float64]
 Heights = Callable[[FloatArray, FloatArray], FloatArray]
 
 CELLS = 200

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.colour import encode
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.materials.base import GEL_INDEX
@@ -20,8 +21,6 @@ from optisense.design.reflectance import (
     smith_shadowing,
 )
 from optisense.library.previews._studio import Studio, coloured_studio, white_studio
-
-FloatArray = NDArray[np.float64]
 
 SMOOTH = 1e-3
 """GGX alpha below which a face is drawn as a plain mirror: its lobe is 0.1 degrees wide, narrower

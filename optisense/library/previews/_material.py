@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.materials.base import GEL_INDEX
 from optisense.design.materials.dielectric import critical_angle
@@ -21,8 +21,6 @@ from optisense.library.previews._ball import medium_of, picture_of_ball
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 RGB = (("red", "#d62728"), ("green", "#2ca02c"), ("blue", "#1f5fd0"))
 INCIDENCE = 45.0

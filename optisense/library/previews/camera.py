@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design.camera import Camera
 from optisense.design.projection import directions
 from optisense.library._entries import CameraModel
@@ -14,8 +14,6 @@ from optisense.library._entries import CameraModel
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 DISTANCES = (40.0, 20.0, 10.0)
 """Distances in front of the pupil at which the preview draws the camera's field, mm: those of skins

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense.design.emitters import LightModel
 from optisense.design.emitters.base import DARK
@@ -14,8 +13,6 @@ from optisense.library._entries import LightEntry, TypicalLight
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-FloatArray = NDArray[np.float64]
 
 LEGEND_COLOURS = 4
 """Largest number of colours that the legend names; more do not fit beside the curves."""

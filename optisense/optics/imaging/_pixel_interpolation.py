@@ -12,11 +12,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import BoolArray
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.chief_rays import ChiefRays
 
 FloatArray = NDArray[np.floating]
-BoolArray = NDArray[np.bool_]
 
 MAX_OFFSET = 0.2
 """Largest distance of a pixel's surface point from the centre of its neighbours' points, relative

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatArray
 from optisense.design.markers import Markers
 from optisense.design.materials import CoatingModel
 from optisense.design.materials.base import GEL_INDEX
@@ -18,8 +19,6 @@ from optisense.geometry import SensingSurface
 
 if TYPE_CHECKING:
     from optisense.optics.transport.chief_rays import ChiefRays
-
-FloatArray = NDArray[np.float64]
 
 FARTHEST = 1.5
 """Distance of a dot from the nearest pixel's place on the skin, in widths of a pixel, from which on

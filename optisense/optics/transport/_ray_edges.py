@@ -20,14 +20,12 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray, IntArray
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.transport.chief_rays import trace_path_codes
 from optisense.optics.transport.interact import RayKind, interact
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 HALVINGS = 11
 """Number of bisections of the gap between two pixels. With 11, boundaries are found to 1/2048 of a

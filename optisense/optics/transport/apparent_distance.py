@@ -17,14 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
+from optisense.array_types import FloatArray
 from optisense.design.camera import Camera
 from optisense.design.responses import PictureChain
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.chief_rays import trace_to_skin
-
-FloatArray = NDArray[np.float64]
 
 PUPIL_SHIFT = 0.02
 """Shift of the pupil (mm): small against all distances of a sensor (some mm and more), and large

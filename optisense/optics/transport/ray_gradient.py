@@ -17,6 +17,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import NoDerivativeError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh import CREASE
@@ -28,8 +29,6 @@ from optisense.optics.scene.ray_scene import Piece, RayScene, leave
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport._ray_edges import Discontinuity, PathVertex, find_edges, walk
 from optisense.optics.transport.chief_rays import sees_nothing, trace_chief_rays, trace_path_codes
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from optisense.array_types import FloatArray
 from optisense.design import Role, SensorDesign
 from optisense.errors import OptiSenseError, SearchError, SetupError, UnknownPartError
 from optisense.objectives import Objective, Score, Settings, evaluate
@@ -40,8 +38,6 @@ from optisense.search.space.constraints import Constraint, NoCrossings, NoFolds,
 from optisense.search.space.pickling import PickledWithoutCaches
 from optisense.search.space.rigid_moves import PartShift, PartTurn
 from optisense.search.space.search_space import BoundSpace
-
-FloatArray = NDArray[np.float64]
 
 DesignFunction = Callable[[SensorDesign], float]
 """A goal that needs no image, such as a length or a price; higher is better."""

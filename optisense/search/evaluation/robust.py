@@ -7,8 +7,9 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from optisense.array_types import FloatArray
 from optisense.errors import OptiSenseError, UnknownPartError
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import CONDITIONS
@@ -22,8 +23,6 @@ from optisense.search.space.manufacturing import (
     ManufacturingErrors,
     latin_hypercube,
 )
-
-FloatArray = NDArray[np.float64]
 
 LOW, MIDDLE, HIGH = 0.1, 0.5, 0.9
 """Quantiles of the scores of manufactured sensors: P10, which is the robust score, as nine of ten

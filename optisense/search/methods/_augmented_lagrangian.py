@@ -17,11 +17,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.search.evaluation.requirements import Requirement
-
-FloatArray = NDArray[np.float64]
 
 ROUNDS = 8
 """Largest number of ascents with new multipliers; conditions are usually met to

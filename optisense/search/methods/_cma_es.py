@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
+from optisense.array_types import FloatArray
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.methods.base import FloatArray, Method, Problem, values_to_maximise
+from optisense.search.methods.base import Method, Problem, values_to_maximise
 
 MOST_POPULATION = 100_000
 """Largest population; a generation of so many trials takes days, so a larger number is a typing

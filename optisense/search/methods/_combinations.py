@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from optisense.array_types import FloatArray
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import FAILED, Outcome, Rank, rank_of
-from optisense.search.methods.base import FloatArray, Method, Problem
+from optisense.search.methods.base import Method, Problem
 from optisense.search.space.search_space import BoundSpace
 
 Combination = tuple[int, ...]

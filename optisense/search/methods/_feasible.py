@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError
 from optisense.geometry.crossings import crossings
 from optisense.search.methods._jacobian import Jacobian, jacobian
-from optisense.search.methods.base import FloatArray
 from optisense.search.space.constraints import Constraint, NoCrossings, why_forbidden
 from optisense.search.space.search_space import BoundSpace
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from optisense.array_types import FloatArray
 from optisense.errors import ObjectiveError, SearchError
 from optisense.objectives.named import are_rays_only
 from optisense.search.evaluation.evaluator import RELIGHTS
@@ -15,7 +16,7 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import Requirement
 from optisense.search.methods._jacobian import moving_parts
 from optisense.search.methods._smooth_scores import SmoothScore
-from optisense.search.methods.base import FloatArray, Problem
+from optisense.search.methods.base import Problem
 from optisense.search.methods.score_differences import STEP
 
 

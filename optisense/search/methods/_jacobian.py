@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import Camera, SensorDesign
 from optisense.errors import SearchError
 from optisense.geometry import TriangleMesh
 from optisense.search.space.search_space import BoundSpace
-
-FloatArray = NDArray[np.float64]
 
 STEP = 1e-4
 """Step of the finite differences to each side, as a share of a parameter's range; small against all

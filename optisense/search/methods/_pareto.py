@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from optisense.array_types import FloatArray
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.methods.base import FloatArray, Method, Problem
+from optisense.search.methods.base import Method, Problem
 from optisense.search.methods.dominance import crowding, ranks
 
 CROSSOVER_SPREAD = 15.0

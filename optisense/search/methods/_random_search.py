@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 from scipy.stats import qmc
 
+from optisense.array_types import FloatArray
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.methods.base import FloatArray, Method, Problem
+from optisense.search.methods.base import Method, Problem
 
 GENERATION = 64
 """Number of points that are drawn together, which keeps all workers busy; a power of two, as

@@ -15,15 +15,12 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import BoolArray, FloatArray
 from optisense.errors import SearchError
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.search_space import BoundSpace
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)

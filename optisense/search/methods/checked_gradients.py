@@ -19,13 +19,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import NoDerivativeError, OptiSenseError
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods._jacobian import Jacobian, jacobian, predicts
 from optisense.search.methods._smooth_scores import SmoothScore
-from optisense.search.methods.base import FloatArray
 from optisense.search.methods.score_differences import STEP, ScoreDifferences
 from optisense.search.space.pickling import PickledWithoutCaches
 

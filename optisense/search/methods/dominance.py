@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-FloatArray = NDArray[np.float64]
+from optisense.array_types import FloatArray
 
 
 def dominates(values: ArrayLike, broken: ArrayLike | None = None) -> NDArray[np.bool_]:

@@ -32,6 +32,7 @@ from typing import Any
 
 import numpy as np
 
+from optisense.array_types import FloatArray
 from optisense.errors import SearchError
 from optisense.search.evaluation.evaluator import RELIGHTS, DesignEvaluator, Evaluator
 from optisense.search.evaluation.outcome import Outcome
@@ -52,7 +53,7 @@ from optisense.search.methods._gradient_sources import (
     source_of,
 )
 from optisense.search.methods._jacobian import moving_parts
-from optisense.search.methods.base import FloatArray, Method, Problem
+from optisense.search.methods.base import Method, Problem
 from optisense.search.methods.checked_gradients import (
     DIFFERENCES,
     FEW_PARAMETERS,

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import ObjectiveError, OptiSenseError
 from optisense.search.evaluation.evaluator import DesignEvaluator
-from optisense.search.methods.base import FloatArray
 from optisense.search.space.search_space import BoundSpace
 
 STEP = 0.05

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign, set_value
 from optisense.errors import DesignError, SearchError
 from optisense.search.space._expansion import expand
 from optisense.search.space.parameters import Around, CagePoints, Continuous, Integer, Parameter
 from optisense.search.space.search_space import BoundSpace, SearchSpace
-
-FloatArray = NDArray[np.float64]
 
 TRUNCATION = 3.0
 """Truncation of the normal distribution of errors, in standard deviations. Parts with larger

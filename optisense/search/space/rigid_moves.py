@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.search.space.design_variables import DesignVariable
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import ValidationError
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign, get_value, set_values
 from optisense.design.problems import design_error
 from optisense.errors import OptiSenseError, SearchError
@@ -26,8 +27,6 @@ from optisense.search.space.parameters import (
     from_plain,
     to_plain,
 )
-
-FloatArray = NDArray[np.float64]
 
 SURE_SECTIONS = ("coating", "cages", "materials")
 """Sections of a design whose numbers are limited by bounds only, so that every value between two

@@ -19,16 +19,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import OutputError, SearchError
 from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study._reader import Reader
 from optisense.search.study._store_errors import damaged, translated_errors
 from optisense.untrusted_files import MOST_STORE, check_size
-
-FloatArray = NDArray[np.float64]
 
 STORE_VERSION = 1
 """Version of the tables of trials; it is increased when an older program can't read them."""

@@ -11,8 +11,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives.score import deviation_of
@@ -31,8 +31,6 @@ from optisense.search.tolerance.sensitivity import (
     total_effect,
 )
 from optisense.time_left import TimedStep, TimeLeft
-
-FloatArray = NDArray[np.float64]
 
 SENSORS = 120
 """Default number of sensors with manufacturing errors. They render in about ten minutes, and shares

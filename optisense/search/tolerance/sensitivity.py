@@ -17,10 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.array_types import FloatArray
 from optisense.search.evaluation.robust import percentile
 from optisense.search.space.manufacturing import BoundManufacturingErrors, latin_hypercube
-
-FloatArray = NDArray[np.float64]
 
 RESAMPLES = 1000
 """Number of bootstrap samples for an interval; with 1000 the ends of a 90 % interval are known to a

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense import library
+from optisense.array_types import FloatArray
 from optisense.design import Camera
 from optisense.design.limits import refuse_far
 from optisense.design.projection import picture_places
@@ -16,8 +16,6 @@ from optisense.geometry.patches import mean_normal
 from optisense.library import CameraModel
 from optisense.sensors.from_meshes.directions import vector
 from optisense.sensors.from_meshes.recipe import CameraChoice
-
-FloatArray = NDArray[np.float64]
 
 WIDTH = 320
 """Width of a picture if the recipe gives no resolution, pixels; the height follows the camera."""

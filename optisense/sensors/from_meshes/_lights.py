@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import Light
 from optisense.design.limits import refuse_far
 from optisense.errors import ContactError, DesignError
@@ -13,8 +13,6 @@ from optisense.geometry import SensingSurface, TriangleMesh
 from optisense.geometry.patches import Faces, mean_normal, middle
 from optisense.sensors.from_meshes.directions import Direction, axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
-
-FloatArray = NDArray[np.float64]
 
 FLAT = 1e-4
 """Largest deviation from a plane of a reference surface that counts as flat, mm."""

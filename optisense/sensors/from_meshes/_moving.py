@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes.directions import axis_of
 from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
-
-FloatArray = NDArray[np.float64]
 
 IN_PLANE = 1e-3
 """Largest distance of vertices from the outermost plane of a part that count as on its flat face,

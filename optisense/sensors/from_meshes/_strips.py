@@ -6,8 +6,8 @@ import fnmatch
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatArray
 from optisense.design import Light
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
@@ -16,8 +16,6 @@ from optisense.sensors.from_meshes._lights import evenly, light
 from optisense.sensors.from_meshes._pick_and_place import BoardPart
 from optisense.sensors.from_meshes.directions import axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
-
-FloatArray = NDArray[np.float64]
 
 ROUND = 30.0
 """Largest angle between sides of an outline that count as pieces of a curve, degrees; lights on

@@ -6,8 +6,9 @@ import re
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import PlainValidator
+
+from optisense.array_types import FloatArray
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -15,8 +16,6 @@ Direction = str | tuple[float, float, float]
 
 _AXIS = re.compile(r"[+-]?[xyz]$")
 _FORMS = "a direction is +x, -x, +y, -y, +z, -z or three numbers, not all 0"
-
-FloatArray = NDArray[np.float64]
 
 
 def _read(value: Any) -> Direction:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -16,8 +15,6 @@ from optisense.sensors.from_meshes.directions import axis_of, vector
 from optisense.sensors.from_meshes.recipe import CameraChoice
 from optisense.sensors.from_meshes.recipe_lights import LightChoice, Ring
 from optisense.sensors.from_meshes.surfaces import WITHIN
-
-FloatArray = NDArray[np.float64]
 
 STEEP = 80.0
 """Angle (degrees) from the outward direction above which faces of a gel are taken for the sides of
