@@ -4,12 +4,16 @@ Mitsuba's `path` knows nothing of photons, cells or bins. Where it is too slow, 
 its place: it shares the photon pass and the surfaces with the radiance cache, but neither cells,
 bins, kernels nor shading. Its photons fly through the scene with the ball in it, and each is seen
 where it lands, without a gather radius. Where both were compared, they agree within their noise.
+
+`benchmarks.fine_references` makes pictures with less noise on a GPU; where there are enough of
+them, they are used.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
@@ -32,8 +36,6 @@ Render = Callable[[int], FloatArray]
 """Renders the picture of the window (rows, columns, 3) for a number of a batch."""
 
 CACHE = Path(__file__).parent / ".cache"
-PATH_SAMPLES = 4_096
-"""Number of the path tracer's samples per pixel in a batch."""
 PASS_SAMPLES = 1_024
 """Number of samples per pixel in one call of the path tracer."""
 PATH_DEPTH = 64
@@ -41,8 +43,11 @@ PATH_DEPTH = 64
 the light."""
 LIGHT_PASSES = 4
 """Number of photon passes in a batch of light tracing."""
-LIGHT_PHOTONS = 1_000_000
-"""Number of photons in a pass, whose landings take 50 MB."""
+FEWEST_FINE = 4
+"""Number of fine pictures from which on they are used: the variance of the mean of fewer is too
+uncertain."""
+MOST_FINE = 64
+"""Largest number of fine pictures of a case."""
 FIRST_SEED = 9_000
 """Seed of the first batch of photons, far from the seeds of the judged images."""
 
@@ -54,43 +59,96 @@ class Referee(StrEnum):
     LIGHT = "light"
 
 
-def reference(
-    referee: Referee,
-    model: OpticalModel,
-    contact: Contact,
-    mask: NDArray[np.bool_],
-    margin: int,
-    batches: int,
-) -> FloatArray:
-    """Return independent pictures (batches, h, w, 3) of a reference renderer, zero outside a window
-    around the contact. Each is cached in a file.
+@dataclass(frozen=True)
+class Effort:
+    """Work for a picture of a reference.
 
-    Args:
+    Attributes:
+        samples: number of the path tracer's samples per pixel.
+        photons: number of photons in each of the `LIGHT_PASSES` passes of light tracing.
+    """
+
+    samples: int
+    photons: int
+
+    def name(self, referee: Referee) -> str:
+        """Return the effort in the digest of a picture's file."""
+        return f"{self.samples}" if referee is Referee.PATH else f"{LIGHT_PASSES}x{self.photons}"
+
+    def count(self, referee: Referee) -> int:
+        """Return the number of samples per pixel or of photons of a picture."""
+        return self.samples if referee is Referee.PATH else LIGHT_PASSES * self.photons
+
+
+USUAL = Effort(4_096, 1_000_000)
+"""Effort for a processor. The landings of a million photons take 50 MB."""
+FINE = Effort(16_384, 16_000_000)
+"""Effort for a GPU with 8 GB of memory: more photons in a pass keep it busy."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Region of a sensor's image that a reference renderer shows.
+
+    Attributes:
         referee: reference renderer.
         model: sensor.
         contact: contact.
         mask: mask (h, w) of the pixels that see the contact.
         margin: width of the margin around the contact, pixels.
-        batches: number of pictures.
     """
-    kind = f"{PATH_SAMPLES}" if referee is Referee.PATH else f"{LIGHT_PASSES}x{LIGHT_PHOTONS}"
-    shape = mask.shape
-    name = _digest(model.design, [f"{contact.point}, {contact.depth}", repr(shape), kind])
-    window = box_around(mask, margin)
-    pictures = np.zeros((batches, *shape, 3))
-    render = None
-    for batch in range(batches):
-        path = CACHE / f"patches-{referee}-{name}-{batch}.npy"
-        if not path.is_file():
-            if render is None:
-                make = _path if referee is Referee.PATH else _light
-                render = make(model, contact, shape, window)
-            CACHE.mkdir(exist_ok=True)
-            unfinished = path.with_name(f".{path.name}")
-            np.save(unfinished, render(batch).astype(np.float32))
-            unfinished.replace(path)
-        pictures[batch][window] = np.load(path)
-    return pictures
+
+    referee: Referee
+    model: OpticalModel
+    contact: Contact
+    mask: NDArray[np.bool_]
+    margin: int
+
+    def paths(self, effort: Effort, batches: int) -> list[Path]:
+        """Return the files of independent pictures, which may not exist."""
+        more = [
+            f"{self.contact.point}, {self.contact.depth}",
+            repr(self.mask.shape),
+            effort.name(self.referee),
+        ]
+        name = _digest(self.model.design, more)
+        return [CACHE / f"patches-{self.referee}-{name}-{batch}.npy" for batch in range(batches)]
+
+    def renderer(self, effort: Effort) -> Render:
+        """Return the function that renders the window around the contact."""
+        make = _path if self.referee is Referee.PATH else _light
+        window = box_around(self.mask, self.margin)
+        return make(self.model, self.contact, self.mask.shape, window, effort)
+
+    def pictures(self, batches: int) -> tuple[FloatArray, int]:
+        """Return independent pictures (n, h, w, 3), zero outside a window around the contact, and
+        the number of samples per pixel or of photons of all of them.
+
+        All fine pictures are returned if there are at least `FEWEST_FINE`; otherwise `batches`
+        usual ones, which are rendered unless they are in the cache.
+        """
+        effort = FINE
+        paths = [path for path in self.paths(FINE, MOST_FINE) if path.is_file()]
+        if len(paths) < FEWEST_FINE:
+            effort = USUAL
+            paths = self.paths(USUAL, batches)
+        window = box_around(self.mask, self.margin)
+        found = np.zeros((len(paths), *self.mask.shape, 3))
+        render = None
+        for batch, path in enumerate(paths):
+            if not path.is_file():
+                render = render or self.renderer(effort)
+                save_picture(path, render(batch))
+            found[batch][window] = np.load(path)
+        return found, len(paths) * effort.count(self.referee)
+
+
+def save_picture(path: Path, picture: FloatArray) -> None:
+    """Write a picture of the cache, whole or not at all."""
+    path.parent.mkdir(exist_ok=True)
+    unfinished = path.with_name(f".{path.name}")
+    np.save(unfinished, picture.astype(np.float32))
+    unfinished.replace(path)
 
 
 def _digest(design: SensorDesign, more: list[str]) -> str:
@@ -104,7 +162,13 @@ def _digest(design: SensorDesign, more: list[str]) -> str:
     return digest.hexdigest()[:12]
 
 
-def _path(model: OpticalModel, contact: Contact, shape: tuple[int, int], window: Window) -> Render:
+def _path(
+    model: OpticalModel,
+    contact: Contact,
+    shape: tuple[int, int],
+    window: Window,
+    effort: Effort,
+) -> Render:
     parts = assembly.assemble(model.design)
     coat = assembly.coating_surface(model.design.coating, parts.ior_before, Region.INDENTER)
     pieces = [*parts.pieces, assembly.indenter_piece(model.place(contact), coat)]
@@ -125,7 +189,7 @@ def _path(model: OpticalModel, contact: Contact, shape: tuple[int, int], window:
         "crop_height": int(rows.stop - rows.start),
     }
     loaded = mi.load_dict(scene)
-    passes = PATH_SAMPLES // PASS_SAMPLES
+    passes = effort.samples // PASS_SAMPLES
 
     def render(batch: int) -> FloatArray:
         total = np.zeros((rows.stop - rows.start, columns.stop - columns.start, 3))
@@ -137,8 +201,14 @@ def _path(model: OpticalModel, contact: Contact, shape: tuple[int, int], window:
     return render
 
 
-def _light(model: OpticalModel, contact: Contact, shape: tuple[int, int], window: Window) -> Render:
+def _light(
+    model: OpticalModel,
+    contact: Contact,
+    shape: tuple[int, int],
+    window: Window,
+    effort: Effort,
+) -> Render:
     camera = window_camera(model.camera(shape[::-1]), window)
     scene = model.scenes.touched([contact], [model.place(contact)]).full
-    render = light_traced(model, scene, camera, LIGHT_PHOTONS, LIGHT_PASSES)
+    render = light_traced(model, scene, camera, effort.photons, LIGHT_PASSES)
     return lambda batch: render(FIRST_SEED + batch)

@@ -18,13 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from benchmarks.patch_references import (
-    LIGHT_PASSES,
-    LIGHT_PHOTONS,
-    PATH_SAMPLES,
-    Referee,
-    reference,
-)
+from benchmarks.patch_references import Referee, Reference
 from benchmarks.results import measure_parts
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign, set_value
@@ -105,6 +99,12 @@ class PatchCase:
         place = model.nine_contacts()[self.place].point
         assert place is not None
         return Contact(Sphere(radius=RADIUS), point=place, depth=self.depth)
+
+    def reference(self, model: OpticalModel) -> Reference:
+        """Return the region that the reference renderer shows."""
+        contact = self.contact(model)
+        mask = model.chief_rays(self.resolution, [contact], CONFORMING).contact_mask
+        return Reference(self.referee, model, contact, mask, MARGIN)
 
 
 CASES = [
@@ -244,8 +244,7 @@ def measure(case: PatchCase, photons: int = PHOTONS) -> dict[str, Any]:
     model = OpticalModel(case.design())
     contact = case.contact(model)
     # The reference comes first: its pictures are kept if the measurement is interrupted.
-    mask = model.chief_rays(case.resolution, [contact], CONFORMING).contact_mask
-    truth = reference(case.referee, model, contact, mask, MARGIN, case.batches)
+    truth, effort = case.reference(model).pictures(case.batches)
     images = [
         model.render([contact], case.resolution, photons, seed=seed, skin=CONFORMING)
         for seed in range(1, case.images + 1)
@@ -254,9 +253,7 @@ def measure(case: PatchCase, photons: int = PHOTONS) -> dict[str, Any]:
     patches = Patches.of(images[0])
     model.forget_light()
     whole = truth.mean(axis=0)
-    each = PATH_SAMPLES if case.referee is Referee.PATH else LIGHT_PASSES * LIGHT_PHOTONS
-    effort = round(case.batches * each / 1e6, 3)
-    found: dict[str, Any] = {"effort": effort, "images": case.images}
+    found: dict[str, Any] = {"effort": round(effort / 1e6, 3), "images": case.images}
     for name, patch in vars(patches).items():
         # The skin around a metal contact is dark; it is judged by its own light.
         scale = whole[(patches.contact if name == "contact" else patch) >= 0].mean(axis=0)
