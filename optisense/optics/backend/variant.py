@@ -137,6 +137,13 @@ def cuda_device_found() -> bool:
     return bool(drjit.has_backend(drjit.JitBackend.CUDA))
 
 
+def one_scene_per_kernel() -> bool:
+    """Return whether a kernel of the current variant can trace rays in only one scene, which is so
+    with OptiX.
+    """
+    return str(import_renderer("mitsuba").variant()).startswith("cuda")
+
+
 def run_test_kernel(variant: str = "auto", timeout: float = 120.0) -> KernelTest:
     """Compile and run a tiny kernel and trace a few rays, in a child process.
 

@@ -15,6 +15,7 @@ from optisense.optics.radiance_cache.angular_variance import (
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
+from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.photon_map import GROUP_MASK
 
 MIN_STEP = 1e-20
@@ -68,7 +69,7 @@ def sum_diffuse(
 def sum_hidden(
     beams: Beams,
     totals: list[mi.Color3f],
-    indenters: mi.Scene,
+    indenters: RayScene,
     at: ShadingPoints,
     axis: mi.Vector3f,
     shadow_rays: mi.Float,
@@ -128,11 +129,7 @@ def sum_hidden(
         ):
             state = next_random(state)
             beam = angular_variance(axis, towards, cosine, height)
-            blocked = indenters.ray_test(
-                mi.Ray3f(at.start, sample_direction(beam, state)),
-                coherent=False,
-                active=mi.Bool(True),
-            )
+            blocked = indenters.occluded(at.start, sample_direction(beam, state), mi.Bool(True))
             part = dr.select(blocked, weight, 0)
             for g in range(groups):
                 hidden[g] += dr.select(group == g, reflected * part, 0)

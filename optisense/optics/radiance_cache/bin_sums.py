@@ -74,7 +74,7 @@ def sum_bins(
     moments, heights, colours = light.tables
     upper, groups, bins, points = light.above, light.groups, light.bins, at.seen
     assert scenes.indenters is not None
-    indenters, active, raised = scenes.indenters.scene, at.active, at.raised
+    indenters, active, raised = scenes.indenters, at.active, at.raised
     totals = [mi.Color3f(0) for _ in range(groups)]
     steps = []
     running = []
@@ -145,11 +145,7 @@ def sum_bins(
                         )
                         state = next_random(points.random + (number * groups + g) * GOLDEN_BITS)
                         way = mirrored_above(sample_direction(beam, state), points.face_normal)
-                        blocked = indenters.ray_test(
-                            mi.Ray3f(at.start, way),
-                            coherent=False,
-                            active=mi.Bool(True),
-                        )
+                        blocked = indenters.occluded(at.start, way, mi.Bool(True))
                         weight = dr.select(blocked, 0.0, times / share)
                     if dr.hint(light.coloured, mode="scalar"):
                         flux = dr.gather(mi.Vector4f, colours, entry)
@@ -239,11 +235,8 @@ def _place(
     )
     if dr.hint(fixed.smooth, mode="scalar"):  # noqa: SIM102 (the one is Python's, the other Dr.Jit's)
         if at.active & at.raised & ~exists:
-            below = fixed.scene.ray_intersect_preliminary(
-                mi.Ray3f(point, -towards), coherent=False, active=mi.Bool(True)
-            )
-            reached = below.is_valid()
-            landing = point - towards * dr.select(reached, below.t, 0)
+            distance, reached = fixed.hit_distance(point, -towards)
+            landing = point - towards * dr.select(reached, distance, 0)
             there, exists = cell_at(cells, landing + at.shift, reached)
             first = mi.UInt32(0)
     return first + dr.select(exists, there, at.cell)

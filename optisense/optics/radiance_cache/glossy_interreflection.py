@@ -145,7 +145,7 @@ def _secondary_hits(
     raised = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
     # The cache already holds the light along a line that comes from the skin behind.
     cached = may_be_cached(cache.binned, at.cell, way, skin.valid)
-    behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=cached)
+    behind = fixed.occluded(start, -way, cached)
     valid = raised | (skin.valid & ~behind)
     facing = dr.select(raised, pressed.normal, skin.normal)
     shading = dr.select(raised, pressed.shading_normal, skin.shading_normal)

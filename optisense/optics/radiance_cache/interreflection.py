@@ -67,7 +67,7 @@ def _sample(
             on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
             # The cache already holds the light along a line that comes from the skin behind.
             cached = may_be_cached(light, home, way, above)
-            behind = fixed.scene.ray_test(mi.Ray3f(start, -way), coherent=False, active=cached)
+            behind = fixed.occluded(start, -way, cached)
             walking = on_indenter | (skin.valid & ~behind)
             if walking:
                 seen = dr.select(on_indenter, pressed.point, skin.point)
@@ -81,9 +81,7 @@ def _sample(
                     falling, _mean, towards = irradiance(table, there * groups + g, facing)
                     lit = falling > 0
                     towards = dr.select(lit, dr.normalize(towards), facing)
-                    hidden = indenters.scene.ray_test(
-                        mi.Ray3f(lift, towards), coherent=False, active=mi.Bool(True)
-                    )
+                    hidden = indenters.occluded(lift, towards, mi.Bool(True))
                     totals[g] += dr.select(lit & ~hidden, falling, 0) * dr.inv_pi * weight
                 # The path continues in a direction of the diffuse lobe.
                 state = next_random(state)

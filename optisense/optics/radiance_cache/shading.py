@@ -173,7 +173,7 @@ def shade(
     rays = REFLECTED_SHADOW_RAYS if reflected else effort.shadow_rays
     shadow_rays = dr.opaque(mi.Float, rays)
     axis = bin_axis(cache.binned.cells, 2)
-    hidden = sum_hidden(culled_beams, totals, indenters.scene, at, axis, shadow_rays)
+    hidden = sum_hidden(culled_beams, totals, indenters, at, axis, shadow_rays)
     # Where all light is occluded, rounding may make the sum of the shares exceed the total.
     return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mitsuba as mi
 import numpy as np
@@ -13,7 +13,7 @@ from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMesh, SkinState
 from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.assembly import indenter_piece
-from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.ray_scene import Piece, RayScene, share_scene
 from optisense.optics.scene.surfaces import Region, Surface
 
 
@@ -38,6 +38,14 @@ class ContactScenes:
     balls: mi.Float
     convex: bool = False
     absorption: mi.Color3f | None = None
+
+    def in_one_scene(self) -> ContactScenes:
+        """Return the same ray scenes with their meshes in a single scene of Mitsuba, as OptiX needs
+        (`share_scene`).
+        """
+        apart = [self.full, self.fixed, *([] if self.indenters is None else [self.indenters])]
+        full, fixed, *indenters = share_scene(apart)
+        return replace(self, full=full, fixed=fixed, indenters=next(iter(indenters), None))
 
 
 @dataclass(frozen=True)

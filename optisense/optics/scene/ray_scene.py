@@ -8,6 +8,8 @@ indenter never changes a compiled kernel.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -27,6 +29,10 @@ FloatArray = NDArray[np.floating]
 SMOOTH_FACE = 1 << 16
 """Bit in a face's record that marks interpolated normals: the first bit above those of a surface's
 number, which thus is below 65,536."""
+
+LONGEST_RAY = 2.0
+"""Length of the longest ray in a shared scene, in diagonals of the sensor: rays between surfaces
+have at most 1, and a camera outside of all meshes may be as far away again."""
 
 SAME_WAY = 1e-4
 """Largest difference between the components of the unit normals (0.006 degrees) of flat facets that
@@ -147,7 +153,9 @@ class RayScene:
         bounds: lower and upper corner (3,) of the box around all vertices, mm.
         vertices: (n, 3) float32, mm.
         faces: (m, 3) uint32, indices of vertices.
-        scene: Mitsuba's scene of the merged mesh.
+        scene: Mitsuba's scene of the merged mesh, or of several scenes (`share_scene`).
+        offset: vector (mm) from the mesh to its place in ``scene``; None for no offset.
+        reach: length (mm) of rays in a scene with an offset.
         rows: (4 m,) four floats per face: the normal, and as bits the surface's number (with
             ``SMOOTH_FACE`` set where the shading normal varies).
         corners: (12 m,) twelve floats per face: three corner normals, padded to four floats.
@@ -182,14 +190,15 @@ class RayScene:
         self.bounds = vertices.min(axis=0), vertices.max(axis=0)
         self.vertices = vertices
         self.faces = faces
-        mesh = mi.Mesh("sensor", len(vertices), len(faces))
-        params = mi.traverse(mesh)
-        params["vertex_positions"] = mi.Float(vertices.ravel())
-        params["faces"] = mi.UInt32(faces.ravel())
-        params.update()
         self.scene = mi.load_dict(
-            {"type": "scene", "sensor": mesh, "embree_use_robust_intersections": robust}
+            {
+                "type": "scene",
+                "sensor": _mesh(vertices, faces),
+                "embree_use_robust_intersections": robust,
+            }
         )
+        self.offset: mi.Vector3f | None = None
+        self.reach = mi.Float(dr.inf)
         self.rows = floats(rows)
         self.corners = floats(corners)
         self.table = surface_table(surfaces) if table is None else table
@@ -224,6 +233,20 @@ class RayScene:
         other.table = table
         return other
 
+    def occluded(self, origin: mi.Point3f, direction: mi.Vector3f, active: mi.Bool) -> mi.Bool:
+        """Return a mask of the active rays that hit a surface; symbolic loops may call it."""
+        ray = self._displaced(origin, direction)
+        return self.scene.ray_test(ray, coherent=False, active=active)
+
+    def hit_distance(self, origin: mi.Point3f, direction: mi.Vector3f) -> tuple[mi.Float, mi.Bool]:
+        """Return the distances (mm) of the first hits along rays, and a mask of the rays that hit a
+        surface; symbolic loops may call it.
+        """
+        found = self.scene.ray_intersect_preliminary(
+            self._displaced(origin, direction), coherent=False, active=mi.Bool(True)
+        )
+        return found.t, found.is_valid()
+
     def intersect(self, ray: Ray, coherent: bool = False) -> SurfaceHit:
         """Return the first hits along rays, with normals; symbolic loops may call it.
 
@@ -232,7 +255,7 @@ class RayScene:
         """
         origin, direction = ray.origin, ray.direction
         found = self.scene.ray_intersect_preliminary(
-            mi.Ray3f(origin, direction), coherent=coherent, active=ray.active
+            self._displaced(origin, direction), coherent=coherent, active=ray.active
         )
         valid = ray.active & found.is_valid()
         face = found.prim_index
@@ -253,6 +276,55 @@ class RayScene:
             surface=bits & (SMOOTH_FACE - 1),
             face=face,
         )
+
+    def _displaced(self, origin: mi.Point3f, direction: mi.Vector3f) -> mi.Ray3f:
+        """Return Mitsuba's rays in ``scene``."""
+        if self.offset is None:
+            return mi.Ray3f(origin, direction)
+        return mi.Ray3f(origin + self.offset, direction, self.reach, 0.0, [])
+
+
+def share_scene(scenes: Sequence[RayScene]) -> list[RayScene]:
+    """Return the same ray scenes, whose meshes are all in a single scene of Mitsuba.
+
+    OptiX can trace rays in only one scene within a kernel, whereas Embree has no such limit. Each
+    mesh is therefore displaced to a place of its own along the x axis, and its rays begin there and
+    end before they reach another mesh.
+
+    Args:
+        scenes: ray scenes of one sensor.
+    """
+    lower = np.min([scene.bounds[0] for scene in scenes], axis=0)
+    upper = np.max([scene.bounds[1] for scene in scenes], axis=0)
+    diagonal = float(np.linalg.norm(upper - lower))
+    reach = LONGEST_RAY * diagonal
+    # Sums with a power of two round the least.
+    spacing = 2.0 ** math.ceil(math.log2(reach + diagonal))
+    offsets = [spacing * (i - len(scenes) // 2) for i in range(len(scenes))]
+    meshes = {
+        f"mesh_{i}": _mesh(scene.vertices + np.array([offset, 0, 0], np.float32), scene.faces)
+        for i, (scene, offset) in enumerate(zip(scenes, offsets, strict=True))
+    }
+    together = mi.load_dict({"type": "scene", **meshes})
+    shared = []
+    for scene, offset in zip(scenes, offsets, strict=True):
+        other = copy(scene)
+        other.scene = together
+        # Opaque values, as constants would give each sensor kernels of its own.
+        other.offset = mi.Vector3f(dr.opaque(mi.Float, offset), 0, 0)
+        other.reach = dr.opaque(mi.Float, reach)
+        shared.append(other)
+    return shared
+
+
+def _mesh(vertices: NDArray[np.float32], faces: NDArray[np.integer]) -> mi.Mesh:
+    """Return Mitsuba's mesh of vertices (n, 3), mm, and faces (m, 3)."""
+    mesh = mi.Mesh("sensor", len(vertices), len(faces))
+    params = mi.traverse(mesh)
+    params["vertex_positions"] = mi.Float(vertices.ravel())
+    params["faces"] = mi.UInt32(faces.ravel())
+    params.update()
+    return mesh
 
 
 def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.Point3f:

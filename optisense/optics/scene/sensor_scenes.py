@@ -13,6 +13,7 @@ from optisense.design.materials import CoatingModel
 from optisense.geometry import Contact, TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMesh
 from optisense.optics.backend.arrays import floats
+from optisense.optics.backend.variant import one_scene_per_kernel
 from optisense.optics.scene._fine_scene import FineScene, fine_scene
 from optisense.optics.scene.assembly import Assembly, coating_surface, indenter_piece
 from optisense.optics.scene.bsdf import surface_table
@@ -206,16 +207,18 @@ class SensorScenes:
             placed: meshes of the indenters in the design's frame, mm.
         """
         if not contacts:
-            return ContactScenes(self.robust, self.fixed, None, mi.Float())
+            return _for_renderer(ContactScenes(self.robust, self.fixed, None, mi.Float()))
         balls = np.stack([bounding_ball(mesh.vertices) for mesh in placed])
         indenters = self._shapes.indenters(len(self.pieces), tuple(placed))
-        return ContactScenes(
-            self._sensor_pieces.with_indenters(placed),
-            self.fixed,
-            indenters.with_table(self.table),
-            floats(balls),
-            all(getattr(contact.indenter, "convex", False) for contact in contacts),
-            self._absorption(),
+        return _for_renderer(
+            ContactScenes(
+                self._sensor_pieces.with_indenters(placed),
+                self.fixed,
+                indenters.with_table(self.table),
+                floats(balls),
+                all(getattr(contact.indenter, "convex", False) for contact in contacts),
+                self._absorption(),
+            )
         )
 
     def deformed(
@@ -229,7 +232,7 @@ class SensorScenes:
         """
         pieces = self._sensor_pieces
         skin = self._shapes.skin(mesh, pressed, pieces.skin_surfaces)
-        return pieces.with_skin(skin, fixed or self.fixed, self._absorption())
+        return _for_renderer(pieces.with_skin(skin, fixed or self.fixed, self._absorption()))
 
     @property
     def _sensor_pieces(self) -> SensorPieces:
@@ -241,6 +244,11 @@ class SensorScenes:
         """
         absorption = self.assembly.absorption_before
         return dr.opaque(mi.Color3f, absorption) if max(absorption) > 0.0 else None
+
+
+def _for_renderer(scenes: ContactScenes) -> ContactScenes:
+    """Return the scenes of an image as the current variant needs them."""
+    return scenes.in_one_scene() if one_scene_per_kernel() else scenes
 
 
 def _indenters(number: int, placed: tuple[TriangleMesh, ...]) -> RayScene:
