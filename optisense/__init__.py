@@ -20,28 +20,6 @@ if TYPE_CHECKING:
     from optisense.sensors import check, load, save_design
     from optisense.version import __version__
 
-_HOMES = {
-    "__version__": ".version",
-    "Contact": ".geometry",
-    "Cylinder": ".geometry",
-    "MeshIndenter": ".geometry",
-    "OpticalModel": ".optics",
-    "Plane": ".geometry",
-    "Score": ".objectives",
-    "SearchSpace": ".search",
-    "SensorDesign": ".design",
-    "Sphere": ".geometry",
-    "check": ".sensors",
-    "evaluate": ".objectives",
-    "get_value": ".design",
-    "load": ".sensors",
-    "load_design": ".design",
-    "objective": ".objectives",
-    "save_design": ".sensors",
-    "search": ".search",  # the package; the function is `optisense.search.search`
-    "set_value": ".design",
-}
-
 __all__ = [
     "Contact",
     "Cylinder",
@@ -65,4 +43,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
-    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)
+    __getattr__, __dir__ = load_on_first_use(__name__, __file__)

@@ -19,20 +19,6 @@ if TYPE_CHECKING:
     from optisense.calibration.result import Calibration
     from optisense.calibration.settings import CalibrationSettings
 
-_HOMES = {
-    "Calibration": ".result",
-    "CalibrationSettings": ".settings",
-    "Comparison": ".comparing",
-    "PhotographedPress": ".photographs",
-    "Photographs": ".photographs",
-    "Realism": ".realism",
-    "calibrate": ".calibrating",
-    "compare": ".comparing",
-    "photograph_model": "._synthetic_photographs",
-    "read_photographs": ".layouts",
-    "save_photographs": "._synthetic_photographs",
-}
-
 __all__ = [
     "Calibration",
     "CalibrationSettings",
@@ -48,4 +34,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
-    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)
+    __getattr__, __dir__ = load_on_first_use(__name__, __file__)

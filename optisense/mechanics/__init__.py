@@ -19,26 +19,6 @@ if TYPE_CHECKING:
     from optisense.mechanics._rims import rims_in_words
     from optisense.mechanics.skins import CONFORMING, ELASTIC, SKINS
 
-_HOMES = {
-    "CONFORMING": ".skins",
-    "ELASTIC": ".skins",
-    "SKINS": ".skins",
-    "Elasticity": "._elasticity",
-    "Gel": "._gel",
-    "Pressed": "._pressed_skin",
-    "PressedSkin": "._pressed_skin",
-    "SkinMaps": "._pressed_skin",
-    "SkinMesh": "._deformed_mesh",
-    "SkinState": "._deformed_mesh",
-    "elasticity_in_words": "._gel",
-    "elasticity_of": "._gel",
-    "is_attached": "._attachment",
-    "refuse_loose_gel": "._attachment",
-    "rims_in_words": "._rims",
-    "skin_mesh": "._deformed_mesh",
-    "youngs_modulus_of_shore_a": "._elasticity",
-}
-
 __all__ = [
     "CONFORMING",
     "ELASTIC",
@@ -60,4 +40,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
-    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)
+    __getattr__, __dir__ = load_on_first_use(__name__, __file__)

@@ -22,21 +22,6 @@ if TYPE_CHECKING:
     from optisense.optics.place_light import PlaceLight, light_at
     from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
-_HOMES = {
-    "CameraLight": ".light_at_camera",
-    "ChiefRays": ".transport.chief_rays",
-    "CoarseModel": "._coarse",
-    "LightLedger": ".ledger",
-    "OpticalModel": "._model",
-    "PlaceLight": ".place_light",
-    "RayOutcome": ".transport.chief_rays",
-    "RenderProgress": "._model",
-    "TactileImage": ".imaging.tactile_image",
-    "camera_light": ".light_at_camera",
-    "light_at": ".place_light",
-    "light_ledger": ".ledger",
-}
-
 __all__ = [
     "CameraLight",
     "ChiefRays",
@@ -60,4 +45,4 @@ def _check_llvm() -> None:
 
 
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
-    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES, before=_check_llvm)
+    __getattr__, __dir__ = load_on_first_use(__name__, __file__, before=_check_llvm)

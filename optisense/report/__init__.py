@@ -13,9 +13,7 @@ if TYPE_CHECKING:
     from optisense.report._page import write_report
     from optisense.report.scores import write_score_report
 
-_HOMES = {"write_report": "._page", "write_score_report": ".scores"}
-
 __all__ = ["write_report", "write_score_report"]
 
 if not TYPE_CHECKING:  # type checkers would take any name for one of the package's
-    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)
+    __getattr__, __dir__ = load_on_first_use(__name__, __file__)

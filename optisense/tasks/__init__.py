@@ -29,30 +29,6 @@ if TYPE_CHECKING:
     from optisense.tasks.dataset import Dataset, Sample
     from optisense.tasks.verification import Verification, VerificationSettings, verify
 
-_HOMES = {
-    "CalibratedSensor": "._calibration",
-    "ContactDraw": "._draws",
-    "BallForce": "._ball_force",
-    "BallShear": "._ball_shear",
-    "CylinderRadius": "._cylinder_radius",
-    "Dataset": ".dataset",
-    "DatasetSettings": "._dataset_settings",
-    "Misalignment": "._misalignment",
-    "PerceptionResult": "._perception",
-    "PerceptionTask": "._perception",
-    "ReconstructionResult": "._reconstruction",
-    "ReconstructionSettings": "._calibration",
-    "Sample": ".dataset",
-    "SampleSettings": "._perception",
-    "Verification": ".verification",
-    "VerificationSettings": ".verification",
-    "generate": "._generation",
-    "perceive": "._perception",
-    "reconstruct": "._reconstruction",
-    "signal_to_noise": "._snr",
-    "verify": ".verification",
-}
-
 __all__ = [
     "BallForce",
     "BallShear",
@@ -78,4 +54,4 @@ __all__ = [
 ]
 
 if not TYPE_CHECKING:  # with __getattr__, type checkers would accept any name
-    __getattr__, __dir__ = load_on_first_use(__name__, _HOMES)
+    __getattr__, __dir__ = load_on_first_use(__name__, __file__)
