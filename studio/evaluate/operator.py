@@ -177,7 +177,7 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
         return {"FINISHED"}
 
 
-def draw_again(scene: bpy.types.Scene) -> None:
+def draw_again(scene: bpy.types.Scene, _: str | None) -> None:
     """Trace the chief rays of a sensor that replaced another one, without waiting."""
     name = scene.name
 

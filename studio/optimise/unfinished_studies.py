@@ -87,7 +87,7 @@ def _loaded(*_: Any) -> None:
         offer(bpy.context.scene)
 
 
-def _opened(scene: bpy.types.Scene) -> None:
+def _opened(scene: bpy.types.Scene, _: str | None) -> None:
     if not bpy.app.background:
         offer(scene)
 

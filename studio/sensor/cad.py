@@ -179,8 +179,8 @@ class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
             now().bodies.clear()
             notes = result["notes"]
 
-            def tell(scene: bpy.types.Scene) -> None:
-                tell_opened(scene)
+            def tell(scene: bpy.types.Scene, draft: str | None) -> None:
+                tell_opened(scene, draft)
                 session.state().note = "; ".join(notes) or session.state().note
 
             open_stage(scene, stage, wait=wait, then=tell)

@@ -18,18 +18,15 @@ from ..scene.startup import clear_startup
 from ..scene.views import show_design
 from .warming import warm_up
 
-when_opened: list[Callable[[bpy.types.Scene], None]] = []
-"""Callbacks for a sensor being opened: a built-in one, a folder of the user, or CAD files."""
+when_opened: list[Callable[[bpy.types.Scene, str | None], None]] = []
+"""Callbacks for a sensor being opened (a built-in one, a folder of the user, or CAD files), and the
+file of the engine's draft of it, which only built-in sensors have."""
 
 
-draft: str | None = None
-"""File of the engine's draft of the sensor that was opened last, if it is a built-in one."""
-
-
-def tell_opened(scene: bpy.types.Scene) -> None:
+def tell_opened(scene: bpy.types.Scene, draft: str | None) -> None:
     """Call these callbacks."""
     for each in when_opened:
-        each(scene)
+        each(scene, draft)
 
 
 def new_stage() -> Path:
@@ -75,7 +72,7 @@ def open_stage(
     wait: bool,
     folder: str = "",
     keep_others: bool = False,
-    then: Callable[[bpy.types.Scene], None] | None = None,
+    then: Callable[[bpy.types.Scene, str | None], None] | None = None,
 ) -> bool:
     """Open the design that the engine wrote into a folder, as the job that the panels show; return
     whether it ended well, or still runs.
@@ -85,16 +82,14 @@ def open_stage(
         wait: block until the sensor is open.
         folder: the user's own folder of the design; empty if it is not saved.
         keep_others: keep the contacts and references, the view, and the selection and visibility.
-        then: called with the scene when the sensor is open.
+        then: called with the scene and the engine's draft when the sensor is open.
     """
     name = scene.name
 
     def opened(result: dict[str, Any]) -> None:
-        global draft
         scene = bpy.data.scenes.get(name)
         if scene is None:
             return
-        draft = result.get("draft")
         document = design_transfer.without_nulls(result["data"])
         parts = document["parts"].items()
         clear_startup(scene)
@@ -114,7 +109,7 @@ def open_stage(
         warnings = result.get("warnings") or []
         session.state().note = "; ".join(each.get("message", "") for each in warnings)
         if then is not None:
-            then(scene)
+            then(scene, result.get("draft"))
         session.push_undo(f"Open {document['name']}")
         session.redraw()
 

@@ -107,7 +107,7 @@ def _ask() -> None:
         (_ignored if first else _refused)(error)
 
 
-def _first(scene: bpy.types.Scene) -> None:
+def _first(scene: bpy.types.Scene, draft: str | None) -> None:
     """Show a stored draft of an opened sensor, and schedule its first draft.
 
     The first draft is made even if drafts are switched off. Scripts ask for what they need.
@@ -115,7 +115,7 @@ def _first(scene: bpy.types.Scene) -> None:
     global _opened
     if not bpy.app.background:
         if not stored_drafts.show_kept(scene):
-            stored_drafts.show_built_in(scene, opening.draft)
+            stored_drafts.show_built_in(scene, draft)
         _opened = True
 
 

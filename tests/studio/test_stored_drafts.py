@@ -44,19 +44,27 @@ def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
     assert not stored_drafts.show_kept(mini)
 
 
-def test_a_built_in_sensor_shows_the_draft_of_the_engine_at_once(mini: Any, tmp_path: Path) -> None:
+def test_a_built_in_sensor_shows_the_draft_of_the_engine_at_once(
+    mini: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     now = bpy.context.window_manager.optisense_picture
+    found: list[str | None] = []
+
+    def tell(scene: bpy.types.Scene, draft: str | None) -> None:
+        found.append(draft)
+
+    monkeypatch.setattr(opening, "when_opened", [tell])
     assert bpy.ops.optisense.new(sensor="digit") == {"FINISHED"}
     picture.show(np.zeros((4, 4, 4), dtype=np.float32))
-    assert opening.draft is not None and stored_drafts.show_built_in(mini, opening.draft)
+    assert found[0] is not None and stored_drafts.show_built_in(mini, found[0])
     assert now.is_stored and not now.is_before
-    pixels = picture.enlarged(np.load(opening.draft), exposure.shown_size(mini) or (0, 0))
+    pixels = picture.enlarged(np.load(found[0]), exposure.shown_size(mini) or (0, 0))
     assert np.allclose(shown(), pixels, atol=1e-6)
     mini.optisense_simulation.auto_exposure = False
-    assert not stored_drafts.show_built_in(mini, opening.draft), "it has the automatic exposure"
+    assert not stored_drafts.show_built_in(mini, found[0]), "it has the automatic exposure"
     mini.optisense_simulation.auto_exposure = True
 
     mini.optisense.light_groups[0].flux *= 2.0
     assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "own")) == {"FINISHED"}
     assert bpy.ops.optisense.open(filepath=str(tmp_path / "own")) == {"FINISHED"}
-    assert not stored_drafts.show_built_in(mini, opening.draft), "it is another sensor"
+    assert not stored_drafts.show_built_in(mini, found[1]), "it is another sensor"
