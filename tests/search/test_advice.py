@@ -8,7 +8,7 @@ import pytest
 import optisense as ots
 from optisense.design import set_value
 from optisense.optics import OpticalModel
-from optisense.search.study.advice import advice, changes_no_ray
+from optisense.search.study.advice import advice, changes_no_ray, moved_start_note
 
 BRIGHT = [
     "coating.specularity",
@@ -56,3 +56,21 @@ def test_nothing_is_said_against_what_may_succeed() -> None:
     assert advice(["coating.specularity"], ["aoap", "normdiff"]) is None
     assert advice(["coating.specularity"], ["mine.py:own"]) is None
     assert advice(["coating.specularity"], ["no-such-objective"]) is None  # told by others
+
+
+def test_a_design_outside_the_search_space_is_told() -> None:
+    """The start is moved to the nearest bound, and from an unknown name to the first option."""
+    design = ots.load("gelsight-mini-ideal")
+    inside = ots.SearchSpace({"camera.fov": (1.0, 170.0), "cages.skin.points": (-30.0, 30.0)})
+    assert moved_start_note(inside.bind(design)) is None
+    space = {"camera.fov": (80.0, 90.0), "coating.library": ["semi-specular", "diffuse-grey"]}
+    text = moved_start_note(ots.SearchSpace(space).bind(design))
+    assert text is not None and "camera.fov begins with 80 (the design has " in text
+    assert "coating" not in text
+    space = {"coating.library": ["semi-specular", "mirror-like"]}
+    text = moved_start_note(ots.SearchSpace(space).bind(design))
+    assert text is not None and "begins with semi-specular (the design has diffuse-grey)" in text
+    move = ots.SearchSpace({"parts.tray.shift.x": (1.0, 2.0)}).bind(design)
+    assert moved_start_note(move) == (
+        "the design is not in the search space: parts.tray.shift.x begins with 1 (the design has 0)"
+    )

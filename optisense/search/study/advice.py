@@ -1,12 +1,17 @@
-"""Warning, before a search begins, that its parameters can't change its objective."""
+"""Warnings that the parameters of a search can't change its objective, or leave out its design."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable
+from typing import Any
 
+from optisense.design import get_value
 from optisense.errors import OptiSenseError
 from optisense.objectives.named import are_rays_only, named_in
+from optisense.search.space.parameters import Choice
+from optisense.search.space.search_space import BoundSpace
 
 _NO_RAY_TURNS = re.compile(
     r"coating\..+"
@@ -56,6 +61,31 @@ def advice(paths: Iterable[str], objectives: Iterable[str]) -> str | None:
         f"{'does' if len(varied) == 1 else 'do'} not change: all trials will score alike. Maximise "
         f"{' or '.join(LIGHT_OBJECTIVES)}, or vary shapes, mirrors, lights' places or the camera"
     )
+
+
+def moved_start_note(space: BoundSpace) -> str | None:
+    """Return a note on the values of a design that a search space leaves out, so that the search
+    starts with others; None if the space has them all.
+    """
+    moved = []
+    for parameter, start in zip(space.parameters, space.start.tolist(), strict=True):
+        kind, expected = parameter.kind, start
+        if parameter.variable is not None:
+            own: Any = parameter.variable.start(space.design)
+        else:
+            target = parameter.targets[0]
+            own = get_value(space.prepared, target.path)
+            expected = target.scale * start + target.offset
+        if isinstance(kind, Choice):
+            begins, stays = kind.labels[round(start)], own in kind.options
+        else:
+            begins, stays = f"{expected:g}", math.isclose(own, expected, abs_tol=1e-9)
+        if not stays:
+            shown = f"{own:g}" if isinstance(own, float) else str(own)
+            moved.append(f"{parameter.name} begins with {begins} (the design has {shown})")
+    if not moved:
+        return None
+    return f"the design is not in the search space: {_listed(moved)}"
 
 
 def _listed(texts: list[str]) -> str:

@@ -22,6 +22,7 @@ from optisense.search.study._evaluators import evaluators, usual_times
 from optisense.search.study._promotion import promote
 from optisense.search.study._reading_watch import ReadingWatch
 from optisense.search.study._tally import Tally
+from optisense.search.study.advice import moved_start_note
 from optisense.search.study.best import tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
 from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
@@ -167,7 +168,7 @@ class StudyRun:
             raise self._tally.all_failed()
         several = self.method.multi_objective  # the result is a front, not one best trial
         tie = None if several else tie_note(study.trials)
-        found_notes = [tie, condition_note(study.trials)]
+        found_notes = [moved_start_note(study.space), tie, condition_note(study.trials)]
         found_notes += [] if several else [worsened_note(study.best, study.start)]
         notes = [
             *self._notes,
