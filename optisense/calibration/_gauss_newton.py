@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from optisense.array_types import FloatArray
-from optisense.calibration._correlated_errors import PHOTOGRAPH_NOISE, ErrorScale, error_scale
 from optisense.calibration._covered_view import outline_of, with_smooth_outline
+from optisense.calibration._expected_errors import HUBER, Scales, expected_errors
 from optisense.calibration._far_field import without_drift
 from optisense.calibration._layered_pictures import (
     LayeredPictures,
@@ -40,11 +40,6 @@ from optisense.calibration.seen_contacts import SeenContact
 NEAR = 2.2
 """Radius within which the response of a press counts, in radii of its contact; beyond, there is
 noise.
-"""
-
-HUBER = 2.0
-"""Residual, in units of the usual error, beyond which it counts linearly instead of quadratically
-(Huber 1964): 5 % of normally distributed residuals are larger.
 """
 
 LEVELS = 12.0, 253.0
@@ -71,15 +66,6 @@ off. Errors at one place of all pictures are not regarded as independent: those 
 same in all, and those of the background are in each response.
 """
 
-OUTLINE_ERROR = 0.08
-"""Expected error of a pixel at the outline of the skin, relative to the difference between skin and
-rest there: the RMS of simulated GelSight360 and GelSight Svelte, whose true designs were known."""
-
-NOISE_EXTENT = 6.0
-"""Standard deviation, pixels, of the neighbourhood over which squares of the noise of the light are
-averaged: there is only one sample of it, and shadows, where it changes, are about as wide.
-"""
-
 MOST_STEPS = 20
 """Largest number of damped steps of one descent; several times as many as a fit needs."""
 
@@ -98,30 +84,6 @@ TRUST = 2.5
 """Largest change over which layers are extrapolated by their difference quotients, in plausible
 ranges; the next round renders them anew.
 """
-
-
-@dataclass(frozen=True)
-class Scales:
-    """Sizes of the errors.
-
-    Attributes:
-        expected: errors (h, w, 3) of the background and of each response that are expected from
-            noise, levels.
-        ground, pressed: ratio of the errors of the background and of the responses to the expected
-            ones, and the extent over which they are correlated.
-    """
-
-    expected: list[FloatArray]
-    ground: ErrorScale
-    pressed: ErrorScale
-
-    def of(self, index: int) -> ErrorScale:
-        """Return the scale of the background (index -1) or of a press."""
-        return self.ground if index < 0 else self.pressed
-
-    def like(self, other: Scales) -> bool:
-        """Return whether the scales are close to others."""
-        return self.ground.like(other.ground) and self.pressed.like(other.pressed)
 
 
 @dataclass(frozen=True)
@@ -314,32 +276,6 @@ class LayeredFit:
         stuck = (steps <= self._low) & (slope > 0.0) | (steps >= self._high) & (slope < 0.0)
         return np.concatenate([~stuck, np.ones(len(gradient) - self.count, dtype=bool)])
 
-    def _expected(
-        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
-    ) -> list[FloatArray]:
-        """Return the expected errors (h, w, 3) of the background and of the responses, in levels.
-
-        They come from the noise of the photographs and of the light, and, at the outline of the
-        skin, from the brightness of the skin, which is that of the nearest pixel inside.
-        """
-        noise = [np.zeros_like(shown) for shown in pictures]
-        if self._noise is not None:
-            for index, shown in enumerate(pictures[1:]):
-                noise[index + 1] = self._shown(index, steps, contacts[index], self._noise) - shown
-            noise[0] = self._shown(-1, steps, None, self._noise) - pictures[0]
-            noise[1:] = [each - noise[0] for each in noise[1:]]
-        expected = [
-            np.sqrt(
-                PHOTOGRAPH_NOISE**2 + gaussian_filter(each**2, (NOISE_EXTENT, NOISE_EXTENT, 0.0))
-            )
-            for each in noise
-        ]
-        if self._outline is not None:
-            where = self._outline.where
-            (contrast,) = self._outline.contrast(pictures[0][None])
-            expected[0][where] = np.hypot(expected[0][where], OUTLINE_ERROR * contrast)
-        return expected
-
     def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:
         ground = float(np.sqrt(((pictures[0] - self._real) ** 2).mean()))
         pressed = self._press_errors(pictures)
@@ -359,18 +295,28 @@ class LayeredFit:
         self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
     ) -> Scales:
         """Return the sizes of the errors, unaffected by dust."""
-        expected = self._expected(pictures, steps, contacts)
-        ground = (pictures[0] - self._real) / expected[0]
-        pressed = [
-            (shown - pictures[0] - real) / own
-            for shown, real, own in zip(pictures[1:], self._responses, expected[1:], strict=True)
-        ]
-        everywhere = np.ones(ground.shape[:2], dtype=bool)
-        return Scales(
-            expected,
-            error_scale([ground], [everywhere], HUBER, self._pixels),
-            error_scale(pressed, self._masks, HUBER, self._pixels),
+        expected = expected_errors(
+            pictures[0], self._noise_of(pictures, steps, contacts), self._outline
         )
+        errors = [pictures[0] - self._real] + [
+            shown - pictures[0] - real
+            for shown, real in zip(pictures[1:], self._responses, strict=True)
+        ]
+        return Scales.of_errors(errors, expected, self._masks, self._pixels)
+
+    def _noise_of(
+        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
+    ) -> list[FloatArray]:
+        """Return a sample of the light's noise, levels (h, w, 3), in the background and in each
+        response.
+        """
+        if self._noise is None:
+            return [np.zeros_like(shown) for shown in pictures]
+        ground = self._shown(-1, steps, None, self._noise) - pictures[0]
+        return [ground] + [
+            self._shown(index, steps, contacts[index], self._noise) - shown - ground
+            for index, shown in enumerate(pictures[1:])
+        ]
 
     def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
         """Return the residuals (k, 3) of the background (index -1), or of a press's pixels near its
