@@ -12,10 +12,9 @@ from optisense.calibration.model_pictures import ModelPictures, model_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import Realism
 from optisense.calibration.seen_contacts import (
+    ContactFinder,
     SeenContact,
     check_shape,
-    doubts,
-    seen_contacts,
 )
 from optisense.errors import CalibrationError
 from optisense.quality import PICTURE_PHOTONS
@@ -56,8 +55,9 @@ def usable(
         CalibrationError: no photograph shows a contact.
     """
     small = photographs.scaled()
-    notes = [*small.warnings(), *doubts(small)]
-    found = seen_contacts(small, refine=refine)
+    finder = ContactFinder(small)
+    notes = [*small.warnings(), *finder.doubts()]
+    found = finder.contacts(refine=refine)
     kept = [index for index, place in enumerate(found) if place is not None]
     if not kept:
         raise CalibrationError(

@@ -51,110 +51,130 @@ class SeenContact:
     radius: float
 
 
-def seen_contacts(photographs: Photographs, *, refine: bool = True) -> list[SeenContact | None]:
-    """Return the contact in each photograph.
+class ContactFinder:
+    """Contacts in photographs; each is searched once."""
 
-    Args:
-        refine: whether labelled contacts are also searched, near their labels; hand labels are off
-            by pixels. If the picture beside a label does not look like a ball, while it does at
-            another place, that place is taken; if it does nowhere, the label is kept. A place at
-            which other photographs show the same is not taken, as it is a blemish of the
-            background, such as dust.
+    def __init__(self, photographs: Photographs) -> None:
+        """Store the photographs; nothing is searched yet."""
+        self._background, self._presses = photographs.background, photographs.presses
+        self._found: dict[tuple[object, ...], FoundContact | None] = {}
 
-    Returns:
-        Contacts, with None for a photograph that shows no contact.
-    """
-    found: list[SeenContact | None] = []
-    for press in photographs.presses:
-        centre, radius = press.centre, press.radius
-        if centre is not None and radius is not None and not refine:
-            found.append(SeenContact(centre, radius))
-            continue
-        seen = find_contact(press.picture, photographs.background, centre, radius)
-        if centre is not None and seen is not None and seen.asymmetry > DOUBTFUL:
-            free = find_contact(press.picture, photographs.background)
-            looks_right = free is not None and free.asymmetry < DOUBTFUL
-            if free is not None and looks_right and not _is_blemish(photographs, press, free):
-                seen = free
-            elif radius is not None:
+    def _strongest(self, press: PhotographedPress) -> FoundContact | None:
+        """Return the contact with the strongest response in a photograph."""
+        return self._contact(press, None, None)
+
+    def _at_label(self, press: PhotographedPress) -> FoundContact | None:
+        """Return the contact near the label of a photograph; the strongest if it has none."""
+        return self._contact(press, press.centre, press.radius)
+
+    def _contact(
+        self, press: PhotographedPress, near: tuple[float, float] | None, radius: float | None
+    ) -> FoundContact | None:
+        key = id(press), near, radius
+        if key not in self._found:
+            self._found[key] = find_contact(press.picture, self._background, near, radius)
+        return self._found[key]
+
+    def contacts(self, *, refine: bool = True) -> list[SeenContact | None]:
+        """Return the contact in each photograph.
+
+        Args:
+            refine: whether labelled contacts are also searched, near their labels; hand labels are
+                off by pixels. If the picture beside a label does not look like a ball, while it
+                does at another place, that place is taken; if it does nowhere, the label is kept. A
+                place at which other photographs show the same is not taken, as it is a blemish of
+                the background, such as dust.
+
+        Returns:
+            Contacts, with None for a photograph that shows no contact.
+        """
+        found: list[SeenContact | None] = []
+        for press in self._presses:
+            centre, radius = press.centre, press.radius
+            if centre is not None and radius is not None and not refine:
                 found.append(SeenContact(centre, radius))
                 continue
-        found.append(None if seen is None else SeenContact(seen.centre, seen.radius))
-    return found
+            seen = self._at_label(press)
+            if centre is not None and seen is not None and seen.asymmetry > DOUBTFUL:
+                free = self._strongest(press)
+                looks_right = free is not None and free.asymmetry < DOUBTFUL
+                if free is not None and looks_right and not self._is_blemish(press, free):
+                    seen = free
+                elif radius is not None:
+                    found.append(SeenContact(centre, radius))
+                    continue
+            found.append(None if seen is None else SeenContact(seen.centre, seen.radius))
+        return found
 
+    def _is_blemish(self, press: PhotographedPress, found: FoundContact) -> bool:
+        """Return whether two or more other photographs have their strongest response where one is
+        found in a press, but no label there.
+        """
+        same = 0
+        for other in self._presses:
+            if other is press or other.centre is None:
+                continue
+            seen = self._strongest(other)
+            if seen is None:
+                continue
+            size = max(seen.radius, found.radius)
+            is_near = math.dist(seen.centre, found.centre) < size
+            same += is_near and math.dist(other.centre, found.centre) > size
+        return same >= 2
 
-def _is_blemish(photographs: Photographs, press: PhotographedPress, found: FoundContact) -> bool:
-    """Return whether two or more other photographs have their strongest response where one is found
-    in a press, but no label there.
-    """
-    same = 0
-    for other in photographs.presses:
-        if other is press or other.centre is None:
-            continue
-        seen = find_contact(other.picture, photographs.background)
-        if seen is None:
-            continue
-        size = max(seen.radius, found.radius)
-        is_near = math.dist(seen.centre, found.centre) < size
-        same += is_near and math.dist(other.centre, found.centre) > size
-    return same >= 2
-
-
-def doubts(photographs: Photographs) -> list[str]:
-    """Return warnings about presses: no visible contact, or labels that contradict it."""
-    found = []
-    twice = 0
-    denied: list[FoundContact] = []
-    for press in photographs.presses:
-        seen = free = find_contact(press.picture, photographs.background)
-        if press.centre is not None:
-            labelled = find_contact(
-                press.picture, photographs.background, press.centre, press.radius
-            )
-            if labelled is not None and labelled.asymmetry < DOUBTFUL:
-                seen = labelled
-        if seen is not None:
-            wide = replace(seen, radius=max(seen.radius, press.radius or 0.0))
-            other = find_another(press.picture, photographs.background, wide)
-            twice += other is not None and other.asymmetry < DOUBTFUL
-        if seen is None:
-            found.append(f"{press.name}: it shows no contact and is left out")
-            continue
-        if seen.asymmetry > DOUBTFUL:
-            found.append(
-                f"{press.name}: its difference from the background does not look like the contact "
-                "of a ball"
-            )
-        if press.centre is not None:
-            off = math.dist(press.centre, seen.centre)
-            if off > LABEL_OFF * max(seen.radius, press.radius or 0.0):
-                denied.append(seen)
+    def doubts(self) -> list[str]:
+        """Return warnings about presses: no visible contact, or labels that contradict it."""
+        found = []
+        twice = 0
+        denied: list[FoundContact] = []
+        for press in self._presses:
+            seen = free = self._strongest(press)
+            if press.centre is not None:
+                labelled = self._at_label(press)
+                if labelled is not None and labelled.asymmetry < DOUBTFUL:
+                    seen = labelled
+            if seen is not None:
+                wide = replace(seen, radius=max(seen.radius, press.radius or 0.0))
+                other = find_another(press.picture, self._background, wide)
+                twice += other is not None and other.asymmetry < DOUBTFUL
+            if seen is None:
+                found.append(f"{press.name}: it shows no contact and is left out")
+                continue
+            if seen.asymmetry > DOUBTFUL:
                 found.append(
-                    f"{press.name}: its label is {off:.0f} pixels away from the contact that the "
-                    "picture shows; check whether it is that of another photograph"
+                    f"{press.name}: its difference from the background does not look like the "
+                    "contact of a ball"
                 )
-        shown = seen.radius  # that of a contact at the label depends on the label's radius
-        if free is not None and math.dist(free.centre, seen.centre) < seen.radius:
-            shown = free.radius
-        size = shown if press.radius is None else press.radius
-        if not 1.0 / (1.0 + LABEL_OFF) < size / max(shown, 1e-9) < 1.0 + LABEL_OFF:
-            found.append(
-                f"{press.name}: its label has a radius of {size:.0f} pixels, and the contact "
-                f"in the picture one of {shown:.0f}"
+            if press.centre is not None:
+                off = math.dist(press.centre, seen.centre)
+                if off > LABEL_OFF * max(seen.radius, press.radius or 0.0):
+                    denied.append(seen)
+                    found.append(
+                        f"{press.name}: its label is {off:.0f} pixels away from the contact that "
+                        "the picture shows; check whether it is that of another photograph"
+                    )
+            shown = seen.radius  # that of a contact at the label depends on the label's radius
+            if free is not None and math.dist(free.centre, seen.centre) < seen.radius:
+                shown = free.radius
+            size = shown if press.radius is None else press.radius
+            if not 1.0 / (1.0 + LABEL_OFF) < size / max(shown, 1e-9) < 1.0 + LABEL_OFF:
+                found.append(
+                    f"{press.name}: its label has a radius of {size:.0f} pixels, and the contact "
+                    f"in the picture one of {shown:.0f}"
+                )
+        common = _common_place(denied)
+        if 2 * twice > len(self._presses):
+            found.insert(0, _background_contact("most photographs show two"))
+        elif common is not None:
+            column, row = common
+            found.insert(
+                0,
+                _background_contact(
+                    f"several photographs show one at column {column:.0f}, row {row:.0f}, where "
+                    "they have no label"
+                ),
             )
-    common = _common_place(denied)
-    if 2 * twice > len(photographs.presses):
-        found.insert(0, _background_contact("most photographs show two"))
-    elif common is not None:
-        column, row = common
-        found.insert(
-            0,
-            _background_contact(
-                f"several photographs show one at column {column:.0f}, row {row:.0f}, where they "
-                "have no label"
-            ),
-        )
-    return found
+        return found
 
 
 def _background_contact(reason: str) -> str:

@@ -26,14 +26,15 @@ def contacts(
     if out.is_dir():
         raise typer.BadParameter(f"'{out}' is a folder", param_hint="--out")
     from optisense.calibration import read_photographs
-    from optisense.calibration.seen_contacts import doubts, seen_contacts
+    from optisense.calibration.seen_contacts import ContactFinder
     from optisense.cli.output_folder import ensure_writable
     from optisense.report.contacts import write_contacts
 
     photographs = read_photographs(photos, options.ball).scaled()
     ensure_writable(out.parent)
-    found = seen_contacts(photographs, refine=not options.as_labelled)
-    notes = [*photographs.warnings(), *doubts(photographs)]
+    finder = ContactFinder(photographs)
+    found = finder.contacts(refine=not options.as_labelled)
+    notes = [*photographs.warnings(), *finder.doubts()]
     write_contacts(out, photos.name, photographs, found, notes)
     for note in notes:
         messages.print(f"note: {note}", markup=False)

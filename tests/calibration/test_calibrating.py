@@ -23,7 +23,7 @@ from optisense.calibration.families import chosen_families
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import distances
-from optisense.calibration.seen_contacts import SeenContact, seen_contacts
+from optisense.calibration.seen_contacts import ContactFinder, SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.cli import app
 from optisense.design import Status, get_value, set_value
@@ -53,7 +53,7 @@ HIDDEN = {
 
 @pytest.fixture(scope="module")
 def seen(photographs: Photographs) -> list[SeenContact]:
-    found = [place for place in seen_contacts(photographs) if place is not None]
+    found = [place for place in ContactFinder(photographs).contacts() if place is not None]
     assert len(found) == len(photographs.presses)
     return found
 

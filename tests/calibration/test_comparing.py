@@ -26,7 +26,7 @@ from optisense.calibration._far_field import without_noise
 from optisense.calibration.contact_finding import find_contact
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.realism import realism, similarity
-from optisense.calibration.seen_contacts import SeenContact, contact_of, doubts, seen_contacts
+from optisense.calibration.seen_contacts import ContactFinder, SeenContact, contact_of
 from optisense.cli import app
 from optisense.design import set_value
 from optisense.errors import CalibrationError
@@ -131,7 +131,7 @@ def test_contacts_of_a_model_are_found_where_they_press(
 ) -> None:
     rays = mini.chief_rays(photographs.size)
     for place, press, seen in zip(
-        PLACES, photographs.presses, seen_contacts(photographs), strict=True
+        PLACES, photographs.presses, ContactFinder(photographs).contacts(), strict=True
     ):
         assert seen is not None
         contact = contact_of(press, seen, mini, rays)
@@ -188,11 +188,14 @@ def test_wrong_labels_and_missing_contacts_are_told(photographs: Photographs) ->
             third,
         ),
     )
-    words = doubts(odd)
+    words = ContactFinder(odd).doubts()
     assert "away from the contact" in words[0]
     assert "it shows no contact" in words[1]
     assert len(words) == 2
-    (used, missing, _), (true, *_) = seen_contacts(odd), seen_contacts(photographs)
+    (used, missing, _), (true, *_) = (
+        ContactFinder(odd).contacts(),
+        ContactFinder(photographs).contacts(),
+    )
     assert missing is None
     assert used is not None and true is not None
     assert math.dist(used.centre, true.centre) < 0.1 * true.radius
@@ -210,17 +213,19 @@ def test_a_blemish_of_the_background_replaces_no_label() -> None:
         presses.append(PhotographedPress("a.png", picture, 6.0, place, 10.0))
     background = np.round(plain - cone((30.0, 90.0), 8.0)).astype(np.uint8)
     photographs = Photographs(background, tuple(presses))
-    found = seen_contacts(photographs)
+    found = ContactFinder(photographs).contacts()
     for seen, place in zip(found, places, strict=True):
         assert seen is not None and math.dist(seen.centre, place) < 1.0
-    alone = seen_contacts(photographs.subset([3]))[0]
+    alone = ContactFinder(photographs.subset([3])).contacts()[0]
     assert alone is not None and math.dist(alone.centre, (30.0, 90.0)) < 1.0
 
 
 def test_a_background_with_a_contact_is_told(photographs: Photographs) -> None:
-    assert doubts(photographs) == []
+    assert ContactFinder(photographs).doubts() == []
     first, *others = photographs.presses
-    words = doubts(replace(photographs, background=first.picture, presses=tuple(others)))
+    words = ContactFinder(
+        replace(photographs, background=first.picture, presses=tuple(others))
+    ).doubts()
     assert any("seems to show a contact" in note for note in words)
 
 
@@ -229,7 +234,7 @@ def test_a_contact_of_the_background_is_told_where_labels_deny_it(
 ) -> None:
     presses = [replace(press, centre=(16.0 + 8.0 * number, 16.0), radius=12.0)
                for number, press in enumerate((photographs.presses[0],) * 3)]  # fmt: skip
-    words = doubts(replace(photographs, presses=tuple(presses)))
+    words = ContactFinder(replace(photographs, presses=tuple(presses))).doubts()
     assert "several photographs show one at column" in words[0]
 
 

@@ -18,7 +18,7 @@ from optisense.calibration._layered_pictures import (
 )
 from optisense.calibration._solution import jackknife_covariance
 from optisense.calibration.quantities import quantities_of
-from optisense.calibration.seen_contacts import seen_contacts
+from optisense.calibration.seen_contacts import ContactFinder
 from optisense.optics import OpticalModel
 
 CLUSTERS, ROWS, UNKNOWNS = 12, 200, 5
@@ -59,7 +59,7 @@ def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
     mini: OpticalModel, photographs: Photographs
 ) -> None:
     """The tone curve is steep in the dark, and makes errors of the light large there."""
-    seen = [place for place in seen_contacts(photographs) if place is not None]
+    seen = [place for place in ContactFinder(photographs).contacts() if place is not None]
     layers = layered_pictures(mini, photographs, seen, 100_000, 5)
     rng = np.random.default_rng(4)
 
