@@ -95,11 +95,7 @@ class FolderLock:
             raise
 
     def check_empty(self) -> None:
-        """Check that the folder is empty except for the lock.
-
-        Raises:
-            OutputError: the folder contains something.
-        """
+        """Raise OutputError if the folder contains something other than the lock."""
         if not is_empty(self.folder):
             raise OutputError(
                 "the folder is not empty",

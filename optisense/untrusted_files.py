@@ -107,11 +107,7 @@ def read_bytes(path: Path, most: int, error: Error, what: str = "the file") -> b
 
 
 def check_size(path: Path, most: int, error: Error, what: str = "the file") -> None:
-    """Check that a file which another library reads is regular and not too large.
-
-    Raises:
-        error: the file is missing, not regular, or too large.
-    """
+    """Raise `error` if a file which another library reads is missing, not regular, or too large."""
     try:
         found = path.stat()
     except (OSError, ValueError) as failed:

@@ -196,11 +196,7 @@ def _common_place(contacts: Sequence[FoundContact]) -> tuple[float, float] | Non
 
 
 def check_shape(photographs: Photographs, model: OpticalModel) -> None:
-    """Check that photographs have the aspect ratio of the model's pictures.
-
-    Raises:
-        CalibrationError: the photographs are wider or narrower.
-    """
+    """Raise CalibrationError if photographs are wider or narrower than the model's pictures."""
     width, height = photographs.size
     own_width, own_height = model.design.camera.resolution
     if abs(width * own_height / (height * own_width) - 1.0) > 1.5 / min(width, height):

@@ -85,11 +85,7 @@ def add_entry(
 
 
 def _refuse(given: IesOptions | TuningOptions, why: str) -> None:
-    """Refuse options that were given.
-
-    Raises:
-        typer.BadParameter: an option was given.
-    """
+    """Raise typer.BadParameter if one of these options was given."""
     for option in given.model_fields_set - {"status"}:
         raise typer.BadParameter(why, param_hint=f"--{option}")
 

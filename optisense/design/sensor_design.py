@@ -276,11 +276,7 @@ class SensorDesign(Model):
 
 
 def refuse_no_design(given: object) -> None:
-    """Refuse an argument that is not a design, such as the name of one.
-
-    Raises:
-        DesignError: the argument is no `SensorDesign`; the hint says how to load one.
-    """
+    """Raise DesignError if an argument is no `SensorDesign`, such as the name of one."""
     if isinstance(given, SensorDesign):
         return
     named = repr(str(given)) if isinstance(given, str | Path) else "FOLDER_OR_NAME"

@@ -114,11 +114,7 @@ class Job:
             self.send("progress", fraction=round(fraction, 4), text=text, **content)
 
     def check(self) -> None:
-        """Raise an error if the request was cancelled: a safe point.
-
-        Raises:
-            Cancelled: the request was cancelled.
-        """
+        """Raise Cancelled if the request was cancelled: a safe point."""
         if self._cancelled.is_set():
             raise Cancelled
 

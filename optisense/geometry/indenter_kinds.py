@@ -74,11 +74,7 @@ class Quantity:
     high: float = math.inf
 
     def check(self, owner: str, name: str, value: float) -> None:
-        """Check a value.
-
-        Raises:
-            ContactError: the value is not a finite number or is outside the limits.
-        """
+        """Raise ContactError if a value is not a finite number or is outside the limits."""
         if math.isfinite(value) and self.low <= value <= self.high:
             return
         if self.low == ABOVE_ZERO:
@@ -130,11 +126,7 @@ class IndenterKind(ABC):
     convex: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
-        """Check the numbers.
-
-        Raises:
-            ContactError: a number is outside its limits.
-        """
+        """Raise ContactError if a number is outside its limits."""
         for name, each in self.quantities().items():
             each.check(self.kind, name, getattr(self, name))
 

@@ -68,10 +68,8 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
 
 
 def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
-    """Check an open mesh for defects that prevent walking from face to face.
-
-    Raises:
-        MeshError: an edge has more than two faces, or faces cut through each other.
+    """Raise MeshError if an open mesh can't be walked from face to face, as an edge has more than
+    two faces, or faces cut through each other.
     """
     _refuse_crowded_edges(mesh.welded(), f"part {name}")
     _refuse_crossings(mesh.welded(), f"part {name}")

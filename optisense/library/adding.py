@@ -191,10 +191,8 @@ def add_tuning(
 
 
 def check_new_name(name: str) -> None:
-    """Check that a part can be given this name.
-
-    Raises:
-        LibraryError: the name has other characters than letters, digits, '-' and '_', or is taken.
+    """Raise LibraryError if a part can't be given this name, as it has other characters than
+    letters, digits, '-' and '_', or is taken.
     """
     if NAME.fullmatch(name) is None:
         raise LibraryError(

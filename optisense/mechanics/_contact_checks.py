@@ -21,11 +21,7 @@ tested for whether it touches the skin: the middles of five equal parts."""
 
 
 def refuse_shared_skin(one: Footprint, other: Footprint) -> None:
-    """Raise if two indenters overlap where they meet the undeformed skin.
-
-    Raises:
-        ContactError: a piece of skin lies inside both.
-    """
+    """Raise ContactError if a piece of the undeformed skin lies inside two indenters."""
     x, y = np.meshgrid(one.x, one.y)
     inside = one.overlap > SHALLOWEST
     flat = np.column_stack([x[inside], y[inside], np.zeros(int(inside.sum()))])

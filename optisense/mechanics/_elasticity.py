@@ -24,11 +24,7 @@ class Elasticity:
     friction: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check the constants.
-
-        Raises:
-            ContactError: one of them has no physical meaning.
-        """
+        """Raise ContactError if one of the constants has no physical meaning."""
         if not (math.isfinite(self.youngs_modulus) and self.youngs_modulus > 0.0):
             raise ContactError(
                 f"Young's modulus of a gel is {self.youngs_modulus:g} MPa",

@@ -169,10 +169,8 @@ class Press:
 
 
 def refuse_kind(kind: str) -> None:
-    """Check the kind of colours, before anything is rendered for them.
-
-    Raises:
-        ObjectiveError: there is no such kind.
+    """Raise ObjectiveError if there is no such kind of colours, before anything is rendered for
+    them.
     """
     if kind not in ("picture", "response"):
         raise _no_such(kind)

@@ -113,11 +113,7 @@ def _measured(
 
 
 def _refuse_unknown_part(quantity: ScoreTerm, numbers: Collection[str]) -> None:
-    """Refuse the name of a part that is not among the numbers of its objective.
-
-    Raises:
-        UnknownPartError: there is no such number.
-    """
+    """Raise UnknownPartError if the name of a part is not among the numbers of its objective."""
     if quantity.part and quantity.part not in numbers:
         raise UnknownPartError(
             f"{quantity.objective} has no part '{quantity.part}'",

@@ -31,11 +31,7 @@ class View:
     skin: float
 
     def refuse_less(self, settings: Settings) -> None:
-        """Check that the camera sees enough for a meaningful score.
-
-        Raises:
-            ObjectiveError: a share is below its limit in the settings.
-        """
+        """Raise ObjectiveError if the camera sees less than the settings require for a score."""
         if self.picture == 0.0:
             raise ObjectiveError(
                 "the camera sees nothing of the sensing surface",

@@ -36,10 +36,8 @@ def place_aside(rng: np.random.Generator, aside: float) -> tuple[float, float]:
 def try_corners(
     model: OpticalModel, indenters: Iterable[Indenter], aside: float, depth: float
 ) -> None:
-    """Check that indenters can be placed at the corners of the square of `place_aside`.
-
-    Raises:
-        ContactError: an indenter is off the surface or deeper than the gel.
+    """Raise ContactError if an indenter is off the surface, or deeper than the gel, at a corner of
+    the square of `place_aside`.
     """
     for indenter in indenters:
         for u in (-aside, aside):
@@ -71,10 +69,8 @@ class BallPress:
             )
 
     def check(self, model: OpticalModel) -> None:
-        """Check the deepest press at the corners of the square.
-
-        Raises:
-            ContactError: a press is off the surface or deeper than the gel.
+        """Raise ContactError if the deepest press is off the surface, or deeper than the gel, at a
+        corner of the square.
         """
         try_corners(model, [Sphere(self.radius)], self.aside, self.most)
 

@@ -147,11 +147,7 @@ def _alike_and_nested(one: list[Any], other: list[Any]) -> bool:
 def refuse_differences(
     what: str, folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]
 ) -> None:
-    """Raise if a folder was begun with other settings.
-
-    Raises:
-        TaskError: the settings differ; the message lists the differences.
-    """
+    """Raise TaskError if a folder was begun with other settings; the message lists them."""
     found = differences(before, now)
     if not found:
         return

@@ -25,11 +25,7 @@ SIZES = (("n<1K", 1_000), ("1K<n<10K", 10_000), ("10K<n<100K", 100_000), ("100K<
 
 
 def check_licence(licence: str | None) -> None:
-    """Check that a licence is an identifier.
-
-    Raises:
-        TaskError: the licence is not an identifier such as cc-by-4.0.
-    """
+    """Raise TaskError if a licence is not an identifier such as cc-by-4.0."""
     if licence is not None and not LICENCE.fullmatch(licence):
         raise TaskError(
             f"'{licence}' is no identifier of a licence",

@@ -61,11 +61,7 @@ NUMBERS = {each: RENAMED.get(each, each) for each in NUMBER_COLUMNS}
 
 
 def require_parquet() -> None:
-    """Check that Parquet files can be written.
-
-    Raises:
-        SetupError: the extra is not installed.
-    """
+    """Raise SetupError if the extra that writes Parquet files is not installed."""
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError as error:

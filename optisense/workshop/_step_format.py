@@ -27,11 +27,7 @@ from optisense.workshop.shapes import Shape
 
 
 def require_step() -> None:
-    """Check whether STEP files can be written.
-
-    Raises:
-        SetupError: the extra is not installed.
-    """
+    """Raise SetupError if the extra that writes STEP files is not installed."""
     try:
         import OCP.STEPCAFControl  # noqa: F401
     except ImportError as error:

@@ -202,11 +202,7 @@ class ObjectIndenter(IndenterKind):
     scale: float = quantity("", "The factor on the object's real size.", 1.0, low=0.01, high=100.0)
 
     def __post_init__(self) -> None:
-        """Check the name and the scale.
-
-        Raises:
-            ContactError: there is no such object, or the scale is outside its limits.
-        """
+        """Raise ContactError if there is no such object, or the scale is outside its limits."""
         if self.name not in OBJECTS:
             near = suggestion(self.name, OBJECTS)
             raise ContactError(

@@ -169,10 +169,8 @@ def requirements_of(texts: Iterable[str]) -> list[Requirement]:
 
 
 def _refuse_impossible(wanted: Requirement) -> None:
-    """Refuse a limit outside the range of its quantity, where no setting changes that range.
-
-    Raises:
-        SearchError: no design can meet the condition, or it names no objective.
+    """Raise SearchError if no design can meet a limit, as no setting changes the range of its
+    quantity, or if it names no objective.
     """
     measured = wanted.objective()
     if callable(measured.range):

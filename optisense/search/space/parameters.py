@@ -194,11 +194,7 @@ def as_specification(value: object) -> Specification:
 
 
 def check_bounds(low: float, high: float) -> None:
-    """Refuse bounds that are not finite, empty or reversed.
-
-    Raises:
-        SearchError: the bounds are not finite, empty or reversed; the message says which.
-    """
+    """Raise SearchError if bounds are not finite, empty or reversed; the message says which."""
     if not (math.isfinite(low) and math.isfinite(high)):
         raise SearchError(f"the bounds {low:g} to {high:g} are not finite")
     if low > high:

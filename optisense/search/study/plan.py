@@ -123,11 +123,7 @@ class Plan:
         evaluator: DesignEvaluator,
         from_pictures: Sequence[Objective],
     ) -> None:
-        """Refuse coarse scores where they save nothing or can't guide the method.
-
-        Raises:
-            SearchError: they do not fit the plan.
-        """
+        """Raise SearchError if coarse scores save nothing or can't guide the method."""
         if not method.accepts_coarse_scores:
             able = [name for name in method_names() if find(name).accepts_coarse_scores]
             raise SearchError(

@@ -296,11 +296,7 @@ class Store:
         return found
 
     def check_points(self, size: int) -> None:
-        """Check that each trial has a point of `size` numbers.
-
-        Raises:
-            SearchError: a trial has not.
-        """
+        """Raise SearchError if a trial has no point of `size` numbers."""
         with self._read() as db:
             wrong = db.execute(
                 "select number from trials where typeof(vector) != 'blob' or length(vector) != ? "
