@@ -8,21 +8,18 @@ from typing import Annotated
 import typer
 
 from optisense.cli.console import handles_errors, output
+from optisense.cli.options import out_option
 
 
 @handles_errors
 def apply(
     study: Annotated[
         Path,
-        typer.Argument(
-            metavar="STUDY", help="The folder of a search (its --out).", show_default=False
-        ),
+        typer.Argument(metavar="STUDY", help="The folder of a search (its --out)."),
     ],
     out: Annotated[
         Path,
-        typer.Option(
-            "--out", "-o", metavar="DIR", help="The folder to write; it must be new or empty."
-        ),
+        out_option("The folder to write; it must be new or empty."),
     ],
     trial: Annotated[
         str, typer.Option(metavar="best|start|NUMBER", help="The trial whose design is written.")

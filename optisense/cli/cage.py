@@ -10,7 +10,7 @@ import typer
 from rich.table import Table
 
 from optisense.cli.console import handles_errors, messages, output
-from optisense.cli.options import DesignArgument
+from optisense.cli.options import DesignArgument, out_option
 from optisense.errors import DesignError
 
 if TYPE_CHECKING:
@@ -25,12 +25,9 @@ CageArgument = Annotated[
 ]
 OutOption = Annotated[
     Path,
-    typer.Option(
-        "--out",
-        "-o",
-        metavar="DIR",
-        help="Where to write the changed design: a new folder, or the design's own (its "
-        "design.yaml is written anew, with its own comments).",
+    out_option(
+        "Where to write the changed design: a new folder, or the design's own (its "
+        "design.yaml is written anew, with its own comments)."
     ),
 ]
 MoveOption = Annotated[
@@ -55,7 +52,6 @@ def show(
         typer.Argument(
             metavar="[CAGE]",
             help="The name of a cage, whose control points are listed; all cages if left out.",
-            show_default=False,
         ),
     ] = None,
 ) -> None:
@@ -178,7 +174,6 @@ def set_range(
             metavar="WHICH=DX,DY,DZ",
             help="A displacement of c_min relative to the present shape, in mm, written as for "
             "`cage move`. May be given several times.",
-            show_default=False,
         ),
     ] = None,
     high: Annotated[
@@ -187,7 +182,6 @@ def set_range(
             "--max",
             metavar="WHICH=DX,DY,DZ",
             help="The same for c_max.",
-            show_default=False,
         ),
     ] = None,
     blend: Annotated[

@@ -9,7 +9,7 @@ import typer
 
 from optisense.cli.compare import PhotosArgument, reading_lines
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output, table_of
-from optisense.cli.options import DesignArgument, VariantOption
+from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CalibrateOptions, read_range
@@ -33,9 +33,7 @@ JSON_FILE, PAGE_FILE = "calibration.json", "calibration.html"
 def calibrate(
     design: DesignArgument,
     photos: PhotosArgument,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the fitted design.")
-    ],
+    out: Annotated[Path, out_option("Folder for the fitted design.")],
     *,
     options: CalibrateOptions,
     variant: VariantOption = "auto",

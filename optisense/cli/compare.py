@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import handles_errors, messages, output, table_of
-from optisense.cli.options import DesignArgument, VariantOption
+from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CompareOptions
 from optisense.time_left import TimedStep
@@ -27,7 +27,6 @@ PhotosArgument = Annotated[
     typer.Argument(
         metavar="PHOTOS",
         help="Folder with background.png and presses.csv, of gs_sdk, or of Taxim (dataPack.npz).",
-        show_default=False,
     ),
 ]
 
@@ -38,11 +37,11 @@ def compare(
     photos: PhotosArgument,
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="FILE", help="The page to write.", show_default=False),
+        out_option("The page to write.", "FILE"),
     ] = None,
     *,
     options: CompareOptions,
-    as_json: Annotated[bool, typer.Option("--json", help="Print all figures as JSON.")] = False,
+    as_json: Annotated[bool, json_option("Print all figures as JSON.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
     """Measure how much a design differs from photographs of the real sensor.

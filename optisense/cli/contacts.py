@@ -9,13 +9,14 @@ import typer
 
 from optisense.cli.compare import PhotosArgument
 from optisense.cli.console import handles_errors, messages, output, table_of
+from optisense.cli.options import out_option
 from optisense.commands.comparing import PhotographOptions
 
 
 @handles_errors
 def contacts(
     photos: PhotosArgument,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="The page to write.")],
+    out: Annotated[Path, out_option("The page to write.", "FILE")],
     *,
     options: PhotographOptions,
 ) -> None:

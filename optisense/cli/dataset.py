@@ -67,7 +67,6 @@ def dataset(
         typer.Option(
             metavar="ID",
             help="Licence that the card of the dataset names, such as cc-by-4.0.",
-            show_default=False,
         ),
     ] = None,
     variant: VariantOption = "auto",

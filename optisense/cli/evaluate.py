@@ -16,11 +16,7 @@ from optisense.cli.console import (
     output,
     table_of,
 )
-from optisense.cli.options import (
-    DesignArgument,
-    VariantOption,
-    out_option,
-)
+from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
 from optisense.cli.sampling import BUILDING, LOADING, loading_steps
@@ -50,9 +46,7 @@ def evaluate(
         bool,
         typer.Option("--report", help="Also write scores.html, with figures, into the folder."),
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON with all parts instead of a table.")
-    ] = False,
+    as_json: Annotated[bool, json_option("Print JSON with all parts instead of a table.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
     """Score a sensor: how well its images show the shape of what touches it.

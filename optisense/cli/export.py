@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from optisense.cli.console import handles_errors, messages, output
-from optisense.cli.options import DesignArgument
+from optisense.cli.options import DesignArgument, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.robots.formats import ROBOT_FORMATS
 from optisense.workshop import FORMATS
@@ -17,7 +17,7 @@ from optisense.workshop import FORMATS
 @handles_errors
 def export(
     design: DesignArgument,
-    out: Annotated[Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the files.")],
+    out: Annotated[Path, out_option("Folder for the files.")],
     formats: Annotated[
         list[str] | None,
         typer.Option(
@@ -26,7 +26,6 @@ def export(
             metavar="|".join(FORMATS.names()),
             help="File format of the parts' shapes; stl if left out. May be given several "
             "times. step needs the extra 'step'.",
-            show_default=False,
         ),
     ] = None,
     moulds: Annotated[
@@ -38,7 +37,6 @@ def export(
             "--for",
             metavar="|".join(ROBOT_FORMATS.names()),
             help="Write the files for a robot simulator instead. May be given several times.",
-            show_default=False,
         ),
     ] = None,
     mass: Annotated[
@@ -46,7 +44,6 @@ def export(
         typer.Option(
             metavar="GRAMS",
             help="With --for: mass of the whole sensor in g; the sum of its parts if left out.",
-            show_default=False,
         ),
     ] = None,
     density: Annotated[
@@ -54,7 +51,6 @@ def export(
         typer.Option(
             metavar="PART=G/CM3",
             help="With --for: density of a part, in g/cm^3. May be given several times.",
-            show_default=False,
         ),
     ] = None,
 ) -> None:

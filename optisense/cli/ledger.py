@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import handles_errors, output, table_of
-from optisense.cli.options import DesignArgument, VariantOption, out_option
+from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.ledger import LedgerOptions
@@ -43,12 +43,9 @@ def ledger(
             metavar="U,V",
             help="Also explain the light at this point of the skin, in mm from the camera's "
             "axis to the right and to the top of the picture. May be given several times.",
-            show_default=False,
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON with every line instead of a table.")
-    ] = False,
+    as_json: Annotated[bool, json_option("Print JSON with every line instead of a table.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
     """Show how much light of each group reaches the skin, is absorbed, or escapes, by part.

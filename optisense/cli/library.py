@@ -34,7 +34,7 @@ library_app = typer.Typer(
 def list_entries(
     kind: Annotated[
         str | None,
-        typer.Argument(metavar="[KIND]", help=f"One of: {', '.join(KINDS)}.", show_default=False),
+        typer.Argument(metavar="[KIND]", help=f"One of: {', '.join(KINDS)}."),
     ] = None,
 ) -> None:
     """List the entries of the library, including your own."""
@@ -75,7 +75,6 @@ def show_entry(
             metavar="FILE.png",
             help="Also draw the entry into this file: a ball of a material or coating, the "
             "intensity of a light by angle, or the field of view of a camera.",
-            show_default=False,
         ),
     ] = None,
     as_yaml: Annotated[

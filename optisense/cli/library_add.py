@@ -29,9 +29,7 @@ def add_entry(
     *,
     kind: Annotated[
         str | None,
-        typer.Option(
-            metavar="KIND", help="One of: material, coating, light, camera.", show_default=False
-        ),
+        typer.Option(metavar="KIND", help="One of: material, coating, light, camera."),
     ] = None,
     name: Annotated[
         str | None,
@@ -50,7 +48,6 @@ def add_entry(
             metavar="FILE.json",
             help="A tuning file of libcamera, from which noise, shading, colours and tone "
             "curve are read.",
-            show_default=False,
         ),
     ] = None,
     camera: TuningOptions,

@@ -27,7 +27,6 @@ def new(
         typer.Argument(
             metavar="NAME",
             help="A built-in sensor, such as gelsight-mini. Leave it out with --from-meshes.",
-            show_default=False,
         ),
     ],
     folder: Annotated[
@@ -35,7 +34,6 @@ def new(
         typer.Argument(
             metavar="DIR",
             help="The folder to write; it must be new or empty.",
-            show_default=False,
         ),
     ] = None,
     from_meshes: Annotated[
@@ -46,7 +44,6 @@ def new(
             help="Make the sensor of CAD files (STL, OBJ, PLY; STEP with the extra 'step'): a "
             "recipe that says which file is what (.yaml), or the files themselves, about which "
             "questions are asked.",
-            show_default=False,
         ),
     ] = None,
     units: Annotated[
@@ -55,7 +52,6 @@ def new(
             metavar="|".join(UNITS),
             help="With --from-meshes: unit of the files that do not contain one (STL, OBJ, "
             "PLY); mm if left out.",
-            show_default=False,
         ),
     ] = None,
     yes: Annotated[

@@ -14,7 +14,6 @@ DesignArgument = Annotated[
     typer.Argument(
         metavar="DESIGN",
         help="A built-in sensor's name (gelsight-mini, ...) or the folder of a design.",
-        show_default=False,
     ),
 ]
 
@@ -27,7 +26,6 @@ ContactOption = Annotated[
         help="A contact: an indenter, its place on the skin and its depth, for example "
         "sphere:1.5@0,0:0.8 (a ball of 1.5 mm radius, in the middle, 0.8 mm deep). May be given "
         "several times.",
-        show_default=False,
     ),
 ]
 
@@ -59,10 +57,13 @@ WorkersOption = Annotated[
 
 
 def out_option(text: str, metavar: str = "DIR") -> Any:
-    """Return the option ``--out DIR`` for commands that can run without; ``text`` is its help
-    text.
-    """
-    return typer.Option("--out", "-o", metavar=metavar, help=text, show_default=False)
+    """Return the option ``--out``, with this help text."""
+    return typer.Option("--out", "-o", metavar=metavar, help=text)
+
+
+def json_option(text: str) -> Any:
+    """Return the option ``--json``, with this help text."""
+    return typer.Option("--json", help=text)
 
 
 def parse_contacts(texts: list[str] | None) -> list[Contact]:

@@ -13,6 +13,7 @@ from optisense.cli.options import (
     ContactOption,
     DesignArgument,
     VariantOption,
+    out_option,
     parse_contacts,
 )
 from optisense.cli.output_folder import take_folder
@@ -33,9 +34,7 @@ PICTURE = "image.png"
 @handles_errors
 def render(
     design: DesignArgument,
-    out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="DIR", help="Folder for the results.")
-    ],
+    out: Annotated[Path, out_option("Folder for the results.")],
     contact: ContactOption = None,
     *,
     options: RenderOptions,

@@ -31,9 +31,7 @@ with the largest number the page has about 10 MB.
 def report(
     study: Annotated[
         Path,
-        typer.Argument(
-            metavar="STUDY", help="The folder of a search (its --out).", show_default=False
-        ),
+        typer.Argument(metavar="STUDY", help="The folder of a search (its --out)."),
     ],
     out: Annotated[
         Path | None,

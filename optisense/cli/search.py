@@ -14,11 +14,7 @@ import typer
 from optisense.cli import stopping
 from optisense.cli.asking import ask_yes
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
-from optisense.cli.options import (
-    VariantOption,
-    WorkersOption,
-    out_option,
-)
+from optisense.cli.options import VariantOption, WorkersOption, json_option, out_option
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import expect_search, search_progress
 from optisense.commands.searching import SearchOptions
@@ -44,7 +40,6 @@ def search(
             metavar="[DESIGN]",
             help="A built-in sensor's name or the folder of a design. May be left out with "
             "--resume.",
-            show_default=False,
         ),
     ] = None,
     *,
@@ -56,7 +51,6 @@ def search(
             metavar="ADDRESS",
             help="The address of a Dask scheduler whose workers run the trials, such as "
             "tcp://192.0.2.7:8786.",
-            show_default=False,
         ),
     ] = None,
     out: Annotated[Path | None, out_option("The study's folder.", "STUDY")] = None,
@@ -77,12 +71,9 @@ def search(
             help="Whether to run `optisense verify --quick` at the end, which tests whether the "
             "best design reads better than the start; if left out, only after "
             f"{VERIFIED_FROM / 60:.0f} minutes of searching or more.",
-            show_default=False,
         ),
     ] = None,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print the result as JSON instead of text.")
-    ] = False,
+    as_json: Annotated[bool, json_option("Print the result as JSON instead of text.")] = False,
     methods: Annotated[bool, typer.Option("--methods", help="List the methods and exit.")] = False,
 ) -> None:
     """Search for a better design.

@@ -33,7 +33,6 @@ def studio(
         typer.Argument(
             metavar="[DESIGN]",
             help="A built-in sensor's name or the folder of a design, which Blender opens.",
-            show_default=False,
         ),
     ] = None,
     blender: Annotated[
@@ -42,7 +41,6 @@ def studio(
             metavar="PATH",
             help="Blender's executable; if left out, it is looked for on the search path and "
             "in the usual places.",
-            show_default=False,
         ),
     ] = None,
     archive: Annotated[
@@ -51,7 +49,6 @@ def studio(
             "--zip",
             metavar="FILE.zip",
             help="Only write the extension to a file, to install it by hand.",
-            show_default=False,
         ),
     ] = None,
     start: Annotated[bool, typer.Option(help="Start Blender after installing.")] = True,

@@ -12,7 +12,13 @@ import typer
 
 from optisense import tasks
 from optisense.cli.console import handles_errors, messages, output
-from optisense.cli.options import DesignArgument, VariantOption, out_option, parse_contacts
+from optisense.cli.options import (
+    DesignArgument,
+    VariantOption,
+    json_option,
+    out_option,
+    parse_contacts,
+)
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import (
     LOADING,
@@ -48,7 +54,7 @@ OutOption = Annotated[
         "command continues when it was stopped."
     ),
 ]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+JsonOption = Annotated[bool, json_option("Print JSON instead of a table.")]
 
 PICTURES = "pictures"
 """Name of the progress step of reconstructions."""
@@ -220,7 +226,6 @@ def reconstruction(
             metavar="KIND:SIZE@U,V:DEPTH",
             help="What is reconstructed, written as a contact. May be given several times.  "
             "[default: a ball of 3 mm, a cylinder of 2 mm, a pyramid of 30 degrees]",
-            show_default=False,
         ),
     ] = None,
     *,

@@ -15,6 +15,7 @@ from optisense.cli.options import (
     DesignArgument,
     VariantOption,
     WorkersOption,
+    json_option,
     out_option,
 )
 from optisense.cli.output_folder import take_folder
@@ -50,9 +51,7 @@ def tolerance(
         bool,
         typer.Option("--report", help="Also write tolerance.html, with figures, into the folder."),
     ] = False,
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON with every score instead of tables.")
-    ] = False,
+    as_json: Annotated[bool, json_option("Print JSON with every score instead of tables.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
     """Compute how much manufacturing errors change a design's scores.

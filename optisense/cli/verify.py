@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
-from optisense.cli.options import VariantOption, out_option
+from optisense.cli.options import VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
 from optisense.cli.sampling import BUILDING, LOADING, loading_steps, sample_progress, sample_steps
@@ -49,7 +49,6 @@ def verify(
             metavar="STUDY|DESIGN",
             help="The folder of a search (its --out), whose best trial is compared with its start; "
             "or a design, by the folder or the name of a built-in sensor.",
-            show_default=False,
         ),
     ],
     second: Annotated[
@@ -57,7 +56,6 @@ def verify(
         typer.Argument(
             metavar="[DESIGN]",
             help="The design that is compared with the first one.",
-            show_default=False,
         ),
     ] = None,
     trial: Annotated[
@@ -66,7 +64,7 @@ def verify(
     *,
     options: VerifyOptions,
     out: Annotated[Path | None, out_option("Folder for verify.json and verify.html.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    as_json: Annotated[bool, json_option("Print JSON instead of a table.")] = False,
     variant: VariantOption = "auto",
 ) -> None:
     """Test whether a sensor reads shapes better than another, on objects that no score uses.
