@@ -117,7 +117,7 @@ def experiment(
         raise typer.Exit(EXIT_INTERRUPTED) from None
     if page is not None:
         write_page(page, out, chosen)
-        output.print(f"page: {page}", markup=False)
+        output.print(f"page: {page}")
 
 
 MOST_WORKERS = 8
@@ -164,13 +164,13 @@ def _print_result(experiment: Experiment, result: dict[str, Any], out: Path) -> 
     """Print the verdicts, one on each line, and the cost of the experiment."""
     output.print(f"[bold]{experiment.title}[/bold]")
     for claim in result["claims"]:
-        output.print(f"  {claim['verdict']:<15} {claim['says']}", markup=False)
-        output.print(f"                  {claim['here']}", markup=False)
+        output.print(f"  {claim['verdict']:<15} {claim['says']}")
+        output.print(f"                  {claim['here']}")
     if result["gaps"]:
-        output.print(f"  {len(result['gaps'])} cases without a score; see the text", markup=False)
+        output.print(f"  {len(result['gaps'])} cases without a score; see the text")
     minutes = result["seconds"]["processor"] / 60.0
     summary = f"  {result['units']} evaluations, {minutes:.1f} processor minutes"
-    output.print(f"{summary}; results: {out / experiment.name}", markup=False)
+    output.print(f"{summary}; results: {out / experiment.name}")
 
 
 def main() -> None:

@@ -34,9 +34,7 @@ def apply(
     try:
         chosen = opened.trial(trial)
         save_design(design_of(opened, chosen), out, new=True)
-        output.print(f"{out / 'design.yaml'}", markup=False)
-        output.print(
-            f"trial {chosen.number}: {opened.objective} {chosen.unbiased_score:.4g}", markup=False
-        )
+        output.print(f"{out / 'design.yaml'}")
+        output.print(f"trial {chosen.number}: {opened.objective} {chosen.unbiased_score:.4g}")
     finally:
         opened.close()

@@ -36,9 +36,9 @@ def ask(question: str, read: Callable[[str], T], default: str | None = None) -> 
             return read(str(answer).strip())
         except OptiSenseError as error:
             hint = f". {error.hint}" if error.hint else ""
-            messages.print(f"  {error.message}{hint}", markup=False, style="yellow")
+            messages.print(f"  {error.message}{hint}", style="yellow")
         except ValueError as error:
-            messages.print(f"  {error}", markup=False, style="yellow")
+            messages.print(f"  {error}", style="yellow")
 
 
 def ask_word(question: str, words: Iterable[str], default: str) -> str:

@@ -292,7 +292,7 @@ def _show_points(design: SensorDesign, name: str) -> None:
     cage: Cage = get_value(design, f"cages.{name}")
     nx, ny, nz = cage.resolution
     output.print(f"{name}: {nx} x {ny} x {nz} control points over {', '.join(cage.parts)}; "
-                 f"{_shape(design, name)}", markup=False)  # fmt: skip
+                 f"{_shape(design, name)}")  # fmt: skip
     now, offsets = cage.current_points(), offsets_at_rest(cage)
     rows = [["point", "i,j,k", "x, y, z (mm)", "moved by"]]
     ends = None
@@ -308,7 +308,7 @@ def _show_points(design: SensorDesign, name: str) -> None:
     widths = [max(len(cells[k]) for cells in rows) for k in range(len(rows[0]))]
     for cells in rows:  # rich's tables would break lines in a narrow terminal
         line = "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True))
-        output.print(line.rstrip(), markup=False)
+        output.print(line.rstrip())
 
 
 def _numbers(values: object) -> str:
@@ -325,7 +325,7 @@ def _check_ends(design: SensorDesign, name: str) -> None:
 
     for end, share in (("c_min", 0.0), ("c_max", 1.0)):
         for problem in cage_problems(set_value(design, f"cages.{name}.blend", share)):
-            messages.print(f"warning, at {end}: {problem}", markup=False, style="yellow")
+            messages.print(f"warning, at {end}: {problem}", style="yellow")
 
 
 def _write(source: str, design: SensorDesign, cage: str | None, out: Path) -> None:
@@ -340,8 +340,8 @@ def _write(source: str, design: SensorDesign, cage: str | None, out: Path) -> No
     problems = cage_problems(design)
     raise_problems(problems, f"design '{design.name}'")
     for problem in problems:
-        messages.print(f"warning: {problem}", markup=False, style="yellow")
+        messages.print(f"warning: {problem}", style="yellow")
     save_design(design, out, new=not is_own)
     if cage is not None:
-        output.print(f"cage {cage}: {_shape(design, cage)}", markup=False)
-    output.print(f"{out / 'design.yaml'}", markup=False)
+        output.print(f"cage {cage}: {_shape(design, cage)}")
+    output.print(f"{out / 'design.yaml'}")

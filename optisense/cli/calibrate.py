@@ -98,10 +98,10 @@ def calibrate(
             save_design(found.design, out)
         kept.remove()
     for note in (*found.before.notes, *found.notes):
-        messages.print(f"note: {note}", markup=False)
+        messages.print(f"note: {note}")
     print_calibration(found)
-    output.print(f"design: {out}", markup=False)
-    output.print(f"page:   {out / PAGE_FILE}", markup=False)
+    output.print(f"design: {out}")
+    output.print(f"page:   {out / PAGE_FILE}")
 
 
 def print_calibration(found: Calibration) -> None:
@@ -135,7 +135,7 @@ def print_calibration(found: Calibration) -> None:
         "",
     )
     output.print(table)
-    output.print(found.verdict(), markup=False)
+    output.print(found.verdict())
     for line in reading_lines(found.of_presses(found.after.realism, held_out=held)):
         output.print(line)
     output.print(f"exposure of the photographs: {found.exposure:.4g}")

@@ -30,7 +30,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     problems = sensors.check(sensor)
     _describe(sensor)
     for problem in problems[:MOST_WARNINGS]:
-        output.print(f"warning: {problem}", markup=False, style="yellow")
+        output.print(f"warning: {problem}", style="yellow")
     if len(problems) > MOST_WARNINGS:
         output.print(f"warning: {len(problems) - MOST_WARNINGS:,} more like these", style="yellow")
     if any(part.role == "mirror" for part in sensor.parts.values()):
@@ -41,7 +41,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         model = OpticalModel(sensor)
         pressed = model.pressed(contacts, [model.place(each) for each in contacts])
         for warning in pressed.warnings:
-            output.print(f"warning: {warning}", markup=False, style="yellow")
+            output.print(f"warning: {warning}", style="yellow")
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")
@@ -55,13 +55,13 @@ def _print_views(design: SensorDesign) -> None:
 
         views = OpticalModel(design).views_by_mirrors(CHECK_RAYS)
     except SetupError as error:  # the rest of the check needs no renderer
-        output.print(f"note: its mirrors are not checked: {error}", markup=False, style="yellow")
+        output.print(f"note: its mirrors are not checked: {error}", style="yellow")
         return
     if views:
         sentence = f"Views of the sensing surface, by their mirrors: {views_in_words(views)}."
-        output.print(sentence, markup=False)
+        output.print(sentence)
     for problem in mirror_problems(design, views):
-        output.print(f"warning: {problem}", markup=False, style="yellow")
+        output.print(f"warning: {problem}", style="yellow")
 
 
 def _describe(design: SensorDesign) -> None:
@@ -70,9 +70,9 @@ def _describe(design: SensorDesign) -> None:
     from optisense.design.parts import Role
     from optisense.mechanics import elasticity_in_words, is_attached, rims_in_words
 
-    output.print(design.name, style="bold", markup=False)
+    output.print(design.name, style="bold")
     if design.description:
-        output.print(design.description, markup=False)
+        output.print(design.description)
 
     parts = Table("part", "role", "material", "size (mm)", "triangles", box=None, pad_edge=False)
     for name, mesh in design.deformed_meshes().items():
@@ -95,23 +95,21 @@ def _describe(design: SensorDesign) -> None:
     output.print()
     output.print(
         f"camera  {camera.model}, {camera.projection}, {camera.fov:g} degrees across, "
-        f"{camera.resolution[0]} x {camera.resolution[1]} pixels",
-        markup=False,
+        f"{camera.resolution[0]} x {camera.resolution[1]} pixels"
     )
     shares = view_shares(design, design.deformed_meshes())
     if shares is not None:
         output.print(
             f"        without refraction, {100 * shares[0]:.0f} % of the sensing surface is in the "
-            f"picture, and fills {100 * shares[1]:.0f} % of it",
-            markup=False,
+            f"picture, and fills {100 * shares[1]:.0f} % of it"
         )
     if design.parts_of(Role.ELASTOMER):
-        output.print(f"elasticity  {elasticity_in_words(design)}", markup=False)
+        output.print(f"elasticity  {elasticity_in_words(design)}")
         if not is_attached(design):
             sentence = "warning: the gel touches no rigid part; its elastic skin can't be pressed"
             output.print(sentence, style="yellow")
         elif limits := rims_in_words(design):
-            output.print(f"            {limits}", markup=False)
+            output.print(f"            {limits}")
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")

@@ -80,14 +80,14 @@ def compare(
             line.say(WRITING)
             write_comparison(out, sensor, found)
     for note in found.notes:
-        messages.print(f"note: {note}", markup=False)
+        messages.print(f"note: {note}")
     if as_json:
         data = {"notes": list(found.notes), **found.realism.as_data()}
         print(json.dumps(data, indent=2, allow_nan=False))
         return
     print_comparison(found)
     if out is not None:
-        output.print(f"page: {out}", markup=False)
+        output.print(f"page: {out}")
 
 
 def reading_lines(found: Realism) -> list[str]:

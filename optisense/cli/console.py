@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import typer
 from rich.console import Console, ConsoleOptions, RenderableType
@@ -36,11 +36,15 @@ EXIT_INTERRUPTED = 130
 
 
 class PlainConsole(Console):
-    """Console that prints control characters in text, which may come from a stranger, as visible
-    symbols.
+    """Console for text that may come from a stranger: brackets in it are no markup, and control
+    characters are printed as visible symbols.
 
     Colours and bars consist of control segments and styles, which are kept.
     """
+
+    def __init__(self, **settings: Any) -> None:
+        """See `rich.console.Console`."""
+        super().__init__(markup=False, highlight=False, **settings)
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
@@ -53,8 +57,8 @@ class PlainConsole(Console):
                 yield Segment(visible(segment.text), segment.style)
 
 
-output = PlainConsole(highlight=False, soft_wrap=True)
-messages = PlainConsole(stderr=True, highlight=False, soft_wrap=True)
+output = PlainConsole(soft_wrap=True)
+messages = PlainConsole(stderr=True, soft_wrap=True)
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -87,11 +91,11 @@ def table_of(*heads: str, texts: int = 1) -> Table:
 def print_error(message: str, *, where: str | None = None, hint: str | None = None) -> None:
     """Print an error: the problem, its place, and the remedy."""
     messages.print("error:", style="bold red", end=" ")
-    messages.print(message, markup=False)
+    messages.print(message)
     if where:
-        messages.print(f"  where: {where}", markup=False)
+        messages.print(f"  where: {where}")
     if hint:
-        messages.print(f"  try:   {hint}", markup=False)
+        messages.print(f"  try:   {hint}")
 
 
 def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
@@ -161,4 +165,4 @@ def output_error(error: OSError) -> OutputError:
 
 def _show_traceback() -> None:
     if _debug:
-        messages.print(traceback.format_exc(), markup=False)
+        messages.print(traceback.format_exc())

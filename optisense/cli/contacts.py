@@ -38,7 +38,7 @@ def contacts(
     notes = [*photographs.warnings(), *finder.doubts()]
     write_contacts(out, photos.name, photographs, found, notes)
     for note in notes:
-        messages.print(f"note: {note}", markup=False)
+        messages.print(f"note: {note}")
     table = table_of("press", "column", "row", "radius (pixels)")
     for press, place in zip(photographs.presses, found, strict=True):
         if place is None:
@@ -47,4 +47,4 @@ def contacts(
         numbers = (*place.centre, place.radius)
         table.add_row(press.name, *(f"{value / photographs.scale:.1f}" for value in numbers))
     output.print(table)
-    output.print(f"page: {out}", markup=False)
+    output.print(f"page: {out}")

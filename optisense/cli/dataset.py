@@ -125,14 +125,13 @@ def _print_summary(made: Dataset, count: int) -> None:
         typer.Exit: there is no sample.
     """
     reasons = Counter(row["reason"] for row in made.failures if int(row["index"]) < count)
-    output.print(f"dataset: {made.folder}, {len(made)} samples", markup=False)
+    output.print(f"dataset: {made.folder}, {len(made)} samples")
     if reasons:
         failed, (reason, times) = reasons.total(), reasons.most_common(1)[0]
         mostly = "" if times == failed else f", {times} times"
         output.print(
             f"{failed} contacts could not be made: {reason}{mostly} "
             f"({made.folder / 'failures.csv'} lists them)",
-            markup=False,
             style="yellow",
         )
     if not len(made):

@@ -42,10 +42,10 @@ def doctor() -> None:
     ill = False
     for finding in examine():
         ill = ill or finding.state == "bad"
-        output.print(f"{_MARKS[finding.state]} {finding.subject:<14}", end=" ")
-        output.print(finding.text, markup=False)
+        output.print(f"{_MARKS[finding.state]} {finding.subject:<14}", end=" ", markup=True)
+        output.print(finding.text)
         if finding.hint:
-            output.print(f"{'':<22} {finding.hint}", markup=False, style="bold")
+            output.print(f"{'':<22} {finding.hint}", style="bold")
     if ill:
         raise typer.Exit(EXIT_FAILURE)
     output.print("Everything needed is here.", style="green")

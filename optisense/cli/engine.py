@@ -14,8 +14,7 @@ def engine() -> None:
     if sys.stdin.isatty():
         messages.print(
             "This command serves programs, which write requests to its standard input, one JSON "
-            "object per line. Ctrl-D ends it.",
-            markup=False,
+            "object per line. Ctrl-D ends it."
         )
     from optisense.engine.server import serve
 

@@ -101,9 +101,9 @@ def evaluate(
     else:
         _print_table(scored)
         if out is not None:
-            output.print(f"scores: {out / JSON_FILE}", markup=False)
+            output.print(f"scores: {out / JSON_FILE}")
             if report:
-                output.print(f"report: {out / REPORT_FILE}", markup=False)
+                output.print(f"report: {out / REPORT_FILE}")
     if interrupted:
         messages.print("interrupted: only these scores are finished")
         raise typer.Exit(EXIT_INTERRUPTED)
@@ -148,15 +148,18 @@ def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
 
 
 def _print_table(scored: Scored) -> None:
+    from rich.text import Text
+
     several = len(scored.runs) > 1
     table = table_of("objective", "score", *(["spread"] if several else []), "seconds")
     table.add_column("")
     for name, score in scored.scores.items():
+        shown: str | Text
         if score.failure is not None:
-            shown, note = "[red]failed[/red]", ""
+            shown, note = Text("failed", style="red"), ""
         else:
             shown, note = f"{scored.mean(name):.4g}", scored.beside(name)
-        row = [score.name, shown]
+        row: list[str | Text] = [score.name, shown]
         if several:
             spread = scored.spread(name)
             row.append("" if spread is None else f"± {spread:.2g}")
@@ -164,7 +167,7 @@ def _print_table(scored: Scored) -> None:
     output.print(table)
     for score in scored.scores.values():
         if score.failure is not None:
-            output.print(f"{score.name} failed: {score.failure}", markup=False)
+            output.print(f"{score.name} failed: {score.failure}")
 
 
 SCORING = "scoring"

@@ -95,18 +95,16 @@ def export(
     files = write(sensor, out, wanted, notes, with_moulds=moulds)
     sheets = [shape.name for shape in shapes(sensor) if not shape.is_solid]
     for file in files:
-        output.print(str(file), markup=False)
+        output.print(str(file))
     for note in notes:
-        output.print(note, markup=False, style="dim")
+        output.print(note, style="dim")
     if sheets:
         output.print(
-            f"sheets without thickness, not to be printed: {', '.join(sheets)}",
-            markup=False,
-            style="dim",
+            f"sheets without thickness, not to be printed: {', '.join(sheets)}", style="dim"
         )
     air = [name for name in sensor.parts if is_air(sensor, name)]
     if air:
-        output.print(f"left out, since they are air: {', '.join(air)}", markup=False, style="dim")
+        output.print(f"left out, since they are air: {', '.join(air)}", style="dim")
     output.print("Lengths are in mm.", style="dim")
 
 
@@ -128,9 +126,9 @@ def _export_robot(
     take_folder(out)
     notes: list[str] = []
     for file in export_robot(sensor, out, names, notes, mass=mass, densities=densities):
-        output.print(str(file), markup=False)
+        output.print(str(file))
     for note in notes:
-        output.print(note, markup=False, style="dim")
+        output.print(note, style="dim")
     output.print("Lengths are in m, masses in kg.", style="dim")
 
 

@@ -87,8 +87,8 @@ def ledger(
     for place in section.places:
         _print_place(place)
     if out is not None:
-        output.print(f"numbers: {out / JSON_FILE}", markup=False)
-        output.print(f"page:    {out / PAGE_FILE}", markup=False)
+        output.print(f"numbers: {out / JSON_FILE}")
+        output.print(f"page:    {out / PAGE_FILE}")
 
 
 def _print(found: LightLedger, seen: CameraLight) -> None:

@@ -57,7 +57,7 @@ def list_entries(
             table.add_row(each, name, *row, entry.description)
     _print_table(table)
     for problem in broken:
-        messages.print(f"warning: an entry is left out: {problem}", markup=False, style="yellow")
+        messages.print(f"warning: an entry is left out: {problem}", style="yellow")
 
 
 @library_app.command("show")
@@ -106,14 +106,14 @@ def show_entry(
             from optisense.library.reading import KINDS as MODELS
 
             head = next(HEADS[each] for each in MODELS if each == kind)
-            output.print(to_yaml(entry, head), end="", markup=False)
+            output.print(to_yaml(entry, head), end="")
         else:
             _describe(f"{kind} {name}", entry, own=library.is_own(kind, name))
         if out is not None:
             from optisense.library import previews
 
             previews.save(previews.draw(name, entry), out)
-            messages.print(f"picture: {out}", markup=False)
+            messages.print(f"picture: {out}")
 
 
 library_app.command("add")(add_entry)
@@ -125,17 +125,17 @@ def _print_table(table: Table) -> None:
     if output.is_terminal:
         output.print(table, soft_wrap=False)
     else:
-        PlainConsole(file=output.file, width=PIPED_WIDTH, highlight=False).print(table)
+        PlainConsole(file=output.file, width=PIPED_WIDTH).print(table)
 
 
 def _describe(title: str, entry: AnyEntry, own: bool) -> None:
     """Print an entry, and the source of each number."""
     from optisense.library.facts import consequences, facts
 
-    output.print(title + (" (yours)" if own else ""), style="bold", markup=False)
-    output.print(entry.description, markup=False)
+    output.print(title + (" (yours)" if own else ""), style="bold")
+    output.print(entry.description)
     if entry.maker:
-        output.print(f"made by {entry.maker}", markup=False)
+        output.print(f"made by {entry.maker}")
     table = Table(box=None, pad_edge=False)
     for title in ("", "value", "status"):
         table.add_column(title, no_wrap=True)
@@ -152,4 +152,4 @@ def _describe(title: str, entry: AnyEntry, own: bool) -> None:
     if lines:
         output.print()
     for line in lines:
-        output.print(line, markup=False)
+        output.print(line)

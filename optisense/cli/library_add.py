@@ -181,10 +181,8 @@ def _from_tuning(
 
 
 def _print_added(added: Added) -> None:
-    output.print(f"{added.kind} {added.name}: {added.file}", markup=False)
+    output.print(f"{added.kind} {added.name}: {added.file}")
     unsourced = added.entry.unsourced()
     if unsourced:
-        output.print(
-            f"warning: no source is given for: {', '.join(unsourced)}", markup=False, style="yellow"
-        )
-    output.print(f"Look at it:  optisense library show {added.name}", markup=False, style="dim")
+        output.print(f"warning: no source is given for: {', '.join(unsourced)}", style="yellow")
+    output.print(f"Look at it:  optisense library show {added.name}", style="dim")

@@ -145,16 +145,15 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
             what = "Your answers are" if asked else "The guessed recipe is"
             messages.print(
                 f"{what} saved in {folder / RECIPE_FILE}. Correct it or the CAD files, then:\n"
-                f"  optisense new --from-meshes {folder / RECIPE_FILE} {folder} --overwrite",
-                markup=False,
+                f"  optisense new --from-meshes {folder / RECIPE_FILE} {folder} --overwrite"
             )
         raise
     save_design(made.design, folder, new=is_new)
     save_recipe(recipe, folder / RECIPE_FILE)
     for note in made.notes:
-        messages.print(f"note: {note}", markup=False, style="yellow")
+        messages.print(f"note: {note}", style="yellow")
     for problem in problems:
-        messages.print(f"warning: {problem}", markup=False, style="yellow")
+        messages.print(f"warning: {problem}", style="yellow")
     _print_guesses(recipe, guessed)
     _print_next_steps(folder, folder / RECIPE_FILE)
 
@@ -197,22 +196,19 @@ def _print_guesses(recipe: Recipe, guessed: bool) -> None:
         faces += ", and those that continue them smoothly" if part.tangent else ""
         source = part.file or faces
         source += f", body {part.solid}" if part.solid else ""
-        messages.print(f"guessed: {name} is {part.role.value} ({source})", markup=False)
+        messages.print(f"guessed: {name} is {part.role.value} ({source})")
     groups = ", ".join(recipe.lights)
-    messages.print(f"guessed: lights {groups}; camera {recipe.camera.model}", markup=False)
+    messages.print(f"guessed: lights {groups}; camera {recipe.camera.model}")
 
 
 def _print_next_steps(folder: Path, recipe: Path | None = None) -> None:
-    output.print(f"{folder / 'design.yaml'}", markup=False)
+    output.print(f"{folder / 'design.yaml'}")
     if recipe is not None:
-        output.print(f"{recipe}", markup=False)
+        output.print(f"{recipe}")
         messages.print(
             f"Change it:   edit the recipe, then optisense new --from-meshes {recipe} {folder} "
             "--overwrite",
-            markup=False,
             style="dim",
         )
-    messages.print(f"Look at it:  optisense check {folder}", markup=False, style="dim")
-    messages.print(
-        f"Render it:   optisense render {folder} --out picture", markup=False, style="dim"
-    )
+    messages.print(f"Look at it:  optisense check {folder}", style="dim")
+    messages.print(f"Render it:   optisense render {folder} --out picture", style="dim")

@@ -101,7 +101,7 @@ def ask_recipe(source: Path, units: Units | None) -> Recipe:
 
 def say(text: str) -> None:
     """Print a text between questions."""
-    messages.print(text, markup=False)
+    messages.print(text)
 
 
 def _ask_units(found: list[CadBody]) -> Units | None:

@@ -158,7 +158,7 @@ class ProgressLine:
         parts = [f"{self._what} {self._count}".strip(), f"{duration(now - self._began)} so far"]
         if math.isfinite(self.seconds_left):
             parts.append(f"{duration(self.seconds_left)} left")
-        messages.print(", ".join([*parts, *self._notes]), markup=False)
+        messages.print(", ".join([*parts, *self._notes]))
 
 
 @contextmanager

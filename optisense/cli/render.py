@@ -221,6 +221,6 @@ def _print_summary(image: TactileImage, folder: Path) -> None:
     facts.append(f"{settings['seconds']['total']:.2g} s")
     output.print(", ".join(facts), style="dim")
     for warning in image.pressed.warnings if image.pressed is not None else ():
-        output.print(f"warning: {warning}", markup=False, style="yellow")
-    output.print(f"picture: {folder / PICTURE}", markup=False)
-    output.print(f"report:  {folder / REPORT_FILE}", markup=False)
+        output.print(f"warning: {warning}", style="yellow")
+    output.print(f"picture: {folder / PICTURE}")
+    output.print(f"report:  {folder / REPORT_FILE}")

@@ -105,7 +105,7 @@ def report(
             write_study_report(page, opened, views, pictures=shown, named=str(study))
     finally:
         opened.close()
-    output.print(f"report: {page}", markup=False)
+    output.print(f"report: {page}")
 
 
 WRITING, TRIALS = "writing the page", "rendering trials"

@@ -38,7 +38,7 @@ def watch(study: Path, port: int, pictures: bool) -> None:
         try:
             watched = _Watched(opened, str(study), server, pictures)
             watched.refresh()
-            output.print(f"watching: {server.address}", markup=False)
+            output.print(f"watching: {server.address}")
             messages.print("Open it in a browser of this machine. Ctrl-C ends it.")
             while True:
                 watched.answer()

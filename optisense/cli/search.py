@@ -114,9 +114,7 @@ def search(
             print_result(result, out)
     if result.interrupted:
         messages.print(
-            f"interrupted: all trials are kept; continue with "
-            f"optisense search --resume --out {out}",
-            markup=False,
+            f"interrupted: all trials are kept; continue with optisense search --resume --out {out}"
         )
         raise typer.Exit(EXIT_INTERRUPTED)
     long = time.monotonic() - began >= VERIFIED_FROM
@@ -149,7 +147,7 @@ def _verify(study: Path, variant: str) -> None:
             folder,
         )
     except OptiSenseError as error:
-        messages.print(f"the best design can't be verified: {error}", style="yellow", markup=False)
+        messages.print(f"the best design can't be verified: {error}", style="yellow")
 
 
 def _new_study(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:
@@ -169,7 +167,7 @@ def _new_study(out: Path, design: str | None, options: SearchOptions, line: Prog
     plan = options.plan()
     hint = advice(plan.space.parameters, options.objectives)
     if hint is not None:
-        messages.print(f"hint: {hint}", style="yellow", markup=False)
+        messages.print(f"hint: {hint}", style="yellow")
     return Study.create(out, sensor, plan)
 
 
@@ -196,7 +194,7 @@ def _ask_trust(strange: list[str]) -> bool:
         return False
     messages.print("This study runs Python code that you did not name:", style="yellow")
     for each in strange:
-        messages.print(f"  {each}", markup=False)
+        messages.print(f"  {each}")
     return ask_yes("Do you trust it", default=False)
 
 
@@ -204,4 +202,4 @@ def _print_methods() -> None:
     from optisense.search.methods import find, names
 
     for name in names():
-        output.print(f"{name:<14} {find(name).summary}", markup=False)
+        output.print(f"{name:<14} {find(name).summary}")

@@ -67,17 +67,17 @@ def print_result(result: SearchResult, out: Path) -> None:
 
     study = result.study
     for note in result.notes:
-        messages.print(f"note: {note}", markup=False, style="yellow")
+        messages.print(f"note: {note}", style="yellow")
     best, start = study.best, study.start
     failed = [trial for trial in result.trials if trial.failure is not None]
     if failed:
-        output.print(_failures(failed), markup=False)
+        output.print(_failures(failed))
     if best is None:
         _print_nearest(result.trials)
         return
     name = study.objective
     said = "best so far" if result.interrupted else "best"
-    output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}", markup=False)
+    output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}")
     if best.unbiased_score != best.score:
         by = "its coarse score" if study.settings.coarse_first else "the search's own seed"
         output.print(f"  {best.score:.4g} by {by}, which selected it")
@@ -85,11 +85,11 @@ def print_result(result: SearchResult, out: Path) -> None:
         *_beside(study, best, start),
         *(f"  {each}" for each in condition_lines(best, start)),
     ]:
-        output.print(line, markup=False)
+        output.print(line)
     values = list(best.values.items())
     for path, value in values[:MOST_VALUES]:
         shown = f"{value:.6g}" if isinstance(value, float) else str(value)
-        output.print(f"  {path} = {shown}", markup=False)
+        output.print(f"  {path} = {shown}")
     if len(values) > MOST_VALUES:
         output.print(f"  and {len(values) - MOST_VALUES} more")
     if _several(result):
@@ -112,7 +112,7 @@ def _print_nearest(trials: Sequence[Trial]) -> None:
         return
     output.print(f"no trial meets the conditions; nearest: trial {close.number}")
     for line in condition_lines(close, None):
-        output.print(f"  {line}", markup=False)
+        output.print(f"  {line}")
 
 
 def _headline(best: Trial, start: Trial | None) -> str:

@@ -71,7 +71,7 @@ def search_progress(workers: int) -> Iterator[SearchLine]:
         def show(progress: SearchProgress) -> None:
             last[:] = [progress]
             for warning in warnings.of(progress):
-                messages.print(f"note: {warning}", markup=False, style="yellow")
+                messages.print(f"note: {warning}", style="yellow")
             line.show(*stage_text(progress), progress.seconds_left, notes(progress))
 
         yield SearchLine(line, show)

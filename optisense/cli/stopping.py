@@ -86,7 +86,7 @@ def print_wait() -> None:
         said = f"SIGTERM: {what}; another one stops at once"
     else:
         said = f"Ctrl-C: {what}; press again to stop at once"
-    messages.print(said, style="yellow", markup=False)
+    messages.print(said, style="yellow")
 
 
 def exit_code(code: int) -> int:

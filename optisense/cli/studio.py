@@ -58,11 +58,11 @@ def studio(
         if archive.suffix.lower() != ".zip":
             raise typer.BadParameter(f"'{archive}' must end in .zip", param_hint="--zip")
         write_zip(archive)
-        output.print(str(archive), markup=False)
+        output.print(str(archive))
         return
     wanted = None if design is None else _to_open(design)
     program, version = find_blender(blender)
-    messages.print(f"Blender {version}: {program}", markup=False)
+    messages.print(f"Blender {version}: {program}")
     with tempfile.TemporaryDirectory(prefix="optisense-") as folder:
         built = Path(folder) / f"optisense_studio-{version_of(source_folder())}.zip"
         write_zip(built)

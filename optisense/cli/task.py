@@ -327,4 +327,4 @@ def _print_json(values: dict[str, Any]) -> None:
 
 def _print_folder(out: Path | None) -> None:
     if out is not None:
-        output.print(f"results: {out}", markup=False)
+        output.print(f"results: {out}")

@@ -109,12 +109,11 @@ def tolerance(
         _print(found)
         if out is not None:
             for name in [JSON_FILE, *([REPORT_FILE] if report else [])]:
-                output.print(f"written: {out / name}", markup=False)
+                output.print(f"written: {out / name}")
     if found.interrupted:
         kept = "" if out is not None else "; use --out DIR to keep it"
         messages.print(
-            f"interrupted: the result is from the {found.sensors} sensors scored so far{kept}",
-            markup=False,
+            f"interrupted: the result is from the {found.sensors} sensors scored so far{kept}"
         )
         raise typer.Exit(EXIT_INTERRUPTED)
 
@@ -164,7 +163,7 @@ def _print(found: Tolerance) -> None:
     for name, each in found.results.items():
         _print_shares(name, each)
     for reason, count in sorted(found.failures.items(), key=lambda item: -item[1]):
-        output.print(f"{count} of {found.sensors} sensors fail: {reason}", markup=False)
+        output.print(f"{count} of {found.sensors} sensors fail: {reason}")
 
 
 def _print_shares(name: str, found: ScoreDistribution) -> None:

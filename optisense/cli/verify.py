@@ -162,7 +162,7 @@ def print_comparison(compared: ComparisonResult, out: Path | None) -> None:
     print_conditions(compared.conditions)
     if out is not None:
         for name in (JSON_FILE, REPORT_FILE):
-            output.print(f"written: {out / name}", markup=False)
+            output.print(f"written: {out / name}")
 
 
 SIDES = ("first sensor", "second sensor")

@@ -38,8 +38,8 @@ def print_verification(found: Verification) -> None:
         style="dim",
     )
     for note in found.notes():
-        output.print(f"note: {note}", markup=False, style="yellow")
-    output.print(f"{found.in_words()}.", markup=False)
+        output.print(f"note: {note}", style="yellow")
+    output.print(f"{found.in_words()}.")
 
 
 def conditions_of(folder: str, which: str) -> list[dict[str, Any]]:
