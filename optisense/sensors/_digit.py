@@ -149,7 +149,6 @@ def digit(size: DigitDimensions) -> SensorDesign:
     _check_lights(edge, size.window_thickness, size.led_height, size.led_pitch, size.edge_roughness)
     require(
         size.pupil_distance > size.gel_thickness + size.window_thickness,
-        NAME,
         f"the camera's pupil, {size.pupil_distance:g} mm under the top of the gel, is inside the "
         f"acrylic, which ends {-window_bottom:g} mm under it",
         "Make pupil_distance larger, or window_thickness or gel_thickness smaller",
@@ -214,21 +213,18 @@ def _check(outline: HalfRound, thickness: float, curved: float, inset: float) ->
     """Check lengths in mm; `curved` is the height of wall and dome together."""
     require(
         outline.straight > outline.radius + CORNERS[0],
-        NAME,
         f"straight_length {outline.straight:g} mm leaves no straight side: the half round takes "
         f"{outline.radius:g} mm of it",
         "Make straight_length larger or gel_width smaller",
     )
     require(
         curved < thickness,
-        NAME,
         f"wall_height and dome_rise are together {curved:g} mm, the gel is only "
         f"{thickness:g} mm thick",
         "Make gel_thickness larger, or wall_height or dome_rise smaller",
     )
     require(
         inset < 0.5 * outline.radius,
-        NAME,
         f"edge_inset {inset:g} mm leaves no dome on a gel {outline.width:g} mm wide",
         "Make edge_inset smaller",
     )
@@ -240,20 +236,17 @@ def _check_lights(
     """Check the positions of the LEDs, all lengths in mm."""
     require(
         0.0 < height < thickness,
-        NAME,
         f"led_height {height:g} mm is not on the acrylic's edge, {thickness:g} mm high",
         f"Give a height between 0 and {thickness:g} mm",
     )
     require(
         pitch <= edge.half_way,
-        NAME,
         f"led_pitch {pitch:g} mm passes the middle of the half round, which is "
         f"{edge.half_way:.4g} mm from the blue LED",
         "Make led_pitch smaller",
     )
     require(
         0.0 <= roughness <= 1.0,
-        NAME,
         f"edge_roughness is {roughness:g}",
         "Give a GGX alpha from 0 (polished) to 1",
     )

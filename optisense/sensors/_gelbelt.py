@@ -37,7 +37,6 @@ from optisense.sensors._belt_path import (
 )
 from optisense.sensors._gelbelt_checks import (
     LED_LENGTH,
-    SENSOR,
     check_camera,
     check_green,
     check_leds,
@@ -56,6 +55,7 @@ from optisense.sensors.dimensions import (
     builds,
 )
 
+SENSOR = "gelbelt"
 GEL, TAPE, FILM, WINDOW, BLACK = (
     "silicone-xp565",
     "clear-tape",

@@ -9,8 +9,6 @@ import numpy as np
 from optisense.sensors._belt_path import BeltHalf
 from optisense.sensors.dimensions import require
 
-SENSOR = "gelbelt"
-
 LED_WINDOW = 2.4
 """Diameter of the emitting window of an SMD 3528 LED, as in the library, mm."""
 LED_LENGTH = 3.5
@@ -33,40 +31,30 @@ def check_numbers(
     """Check numbers that have a range of their own; `coat` is reflectance and specularity."""
     for flux in led_flux:
         require(
-            0.0 <= flux < math.inf,
-            SENSOR,
-            f"led_flux has {flux:g}",
-            "Give three powers in mW, 0 or more",
+            0.0 <= flux < math.inf, f"led_flux has {flux:g}", "Give three powers in mW, 0 or more"
         )
     for name, value in zip(("reflectance", "specularity"), coat, strict=True):
-        require(0.0 <= value <= 1.0, SENSOR, f"{name} is {value:g}", f"Give a {name} from 0 to 1")
+        require(0.0 <= value <= 1.0, f"{name} is {value:g}", f"Give a {name} from 0 to 1")
     require(
         light_design in (1, 2, 3),
-        SENSOR,
         f"there is no light_design {light_design}",
         "Give 1 (sides of the acrylic), 2 (sides of the belt) or 3 (belt bent over a roller)",
     )
     require(
         film_thickness == 0.0 or film_thickness >= LEAST_FILM,
-        SENSOR,
         f"film_thickness is {film_thickness:g} mm",
         f"Give 0 for optical contact or at least {LEAST_FILM:g} mm",
     )
     require(
-        0.0 < fov < 180.0,
-        SENSOR,
-        f"fov is {fov:g} degrees",
-        "Give more than 0 and less than 180 degrees",
+        0.0 < fov < 180.0, f"fov is {fov:g} degrees", "Give more than 0 and less than 180 degrees"
     )
     require(
         0.0 < deflection <= 60.0,
-        SENSOR,
         f"deflection is {deflection:g} degrees",
         "Give more than 0 and at most 60 degrees",
     )
     require(
         0.0 <= green_angle < 80.0,
-        SENSOR,
         f"green_angle is {green_angle:g} degrees",
         "Give 0 to 80 degrees from the normal of the belt",
     )
@@ -78,13 +66,11 @@ def check_camera(pupil_distance: float, window_bottom: float, loop: float) -> No
     """
     require(
         pupil_distance > window_bottom,
-        SENSOR,
         f"the camera is inside the belt or the window, which reach {window_bottom:g} mm deep",
         "Make pupil_distance larger",
     )
     require(
         pupil_distance + CAMERA_DEPTH <= loop,
-        SENSOR,
         f"a camera {pupil_distance:g} mm from the sensing surface and {CAMERA_DEPTH:g} mm deep "
         f"meets the returning belt at {loop:g} mm",
         "Make wheel_radius larger or pupil_distance smaller",
@@ -98,7 +84,6 @@ def check_wheels(
     flat = float(half.points[half.starts[1]][0])
     require(
         flat > corner[0],
-        SENSOR,
         f"the flat run of the belt ends {flat:g} mm from the middle, the window only at "
         f"{corner[0]:g} mm",
         "Make wheel_distance larger or the window shorter",
@@ -112,7 +97,6 @@ def check_wheels(
         share = np.clip(from_pupil @ view / (view @ view), 0.0, 1.0)
         require(
             away > radius and float(np.linalg.norm(from_pupil - share * view)) > radius,
-            SENSOR,
             f"a wheel of radius {radius:g} mm cuts into the window or the camera's view of it",
             "Make wheel_distance (in light design 3: incline) larger, or wheel_radius smaller",
         )
@@ -124,7 +108,6 @@ def check_green(half: BeltHalf, place: tuple[float, float]) -> None:
         radius = float(np.linalg.norm(half.points[half.starts[number]] - (x, z)))
         require(
             math.hypot(place[0] - x, place[1] - z) > radius,
-            SENSOR,
             f"the green LEDs would be inside a wheel of radius {radius:g} mm",
             "Make roller_radius, wheel_radius or green_distance smaller, or incline larger",
         )
@@ -136,14 +119,12 @@ def check_leds(length: float, window_size: tuple[float, float], thickness: float
     """
     require(
         length <= min(window_size),
-        SENSOR,
         f"a row of LEDs {length:g} mm long is longer than a side of the window "
         f"({window_size[0]:g} x {window_size[1]:g} mm)",
         "Use fewer leds_per_group or a smaller led_pitch",
     )
     require(
         thickness >= LED_WINDOW,
-        SENSOR,
         f"LEDs with windows of {LED_WINDOW:g} mm don't fit beside a layer of {thickness:g} mm",
         "Make the gel (or in light design 1 the window) thicker",
     )

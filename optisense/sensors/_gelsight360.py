@@ -135,16 +135,13 @@ def gelsight360(size: GelSight360Dimensions) -> SensorDesign:
     """
     _check_colours(size.light_colours, size.base_ring)
     for name, number in (("tip_design", size.tip_design), ("resin_design", size.resin_design)):
-        require(
-            0.0 <= number <= DESIGNS, SENSOR, f"{name} is {number:g}", "Give a number from 0 to 10"
-        )
+        require(0.0 <= number <= DESIGNS, f"{name} is {number:g}", "Give a number from 0 to 10")
     _check_layers(size.radius, size.edge_radius, size.gel_thickness, size.shell_thickness)
     shape = TipShape.of_family(
         size.tip_design / DESIGNS, size.radius, size.height, size.edge_radius, size.cone_height
     )
     require(
         shape.shoulder > 0.0,
-        SENSOR,
         f"the tip is {size.height - shape.shoulder:g} mm high, the whole sensor only "
         f"{size.height:g} mm",
         "Make height larger, or cone_height or tip_design smaller",
@@ -237,20 +234,17 @@ def _check_colours(light_colours: str, base_ring: str) -> None:
     hint = f"Give {GROUPS} letters out of R, G and B, such as GRRGGRRG"
     require(
         len(light_colours) == GROUPS,
-        SENSOR,
         f"light_colours '{light_colours}' has {len(light_colours)} letters, {GROUPS} are needed",
         hint,
     )
     for place, letter in enumerate(light_colours, start=1):
         require(
             letter in COLOURS,
-            SENSOR,
             f"light_colours '{light_colours}' has an unknown colour '{letter}' at place {place}",
             hint,
         )
     require(
         base_ring in ("", *COLOURS),
-        SENSOR,
         f"base_ring '{base_ring}' is no colour",
         "Give R, G or B, or an empty text for no ring",
     )
@@ -263,19 +257,16 @@ def _check_layers(radius: float, edge_radius: float, gel: float, shell: float) -
     layers = f"gel_thickness {gel:g} mm and shell_thickness {shell:g} mm"
     require(
         gel + shell < radius,
-        SENSOR,
         f"{layers} are together not thinner than the body, whose radius is {radius:g} mm",
         "Make the shell or the gel thinner, or the radius larger",
     )
     require(
         edge_radius < radius,
-        SENSOR,
         f"edge_radius {edge_radius:g} mm is not smaller than the radius {radius:g} mm",
         "Make edge_radius smaller or the radius larger",
     )
     require(
         gel + shell < edge_radius,
-        SENSOR,
         f"{layers} are together not thinner than edge_radius {edge_radius:g} mm, so that the "
         "innermost surface can't follow the rounded edge",
         "Make the shell or the gel thinner, or edge_radius larger",
@@ -287,13 +278,11 @@ def _check_boards(boards: LedBoards, shape: TipShape, wall: float, base_leds: in
     narrowest = LED[0] + 2.0 * WALL_MARGIN
     require(
         boards.depth >= narrowest,
-        SENSOR,
         f"the LED boards don't fit into a shell of {boards.depth:g} mm",
         f"Make shell_thickness at least {narrowest:g} mm",
     )
     require(
         boards.outermost <= wall - BOARD_CLEARANCE,
-        SENSOR,
         f"the corners of the LED boards are {boards.outermost:.3g} mm off the axis, the shell "
         f"ends at {wall:.3g} mm",
         "Make board_thickness smaller or the radius larger",
@@ -301,21 +290,18 @@ def _check_boards(boards: LedBoards, shape: TipShape, wall: float, base_leds: in
     top = boards.bottom + boards.height
     require(
         boards.bottom >= 0.5 and top <= shape.shoulder,
-        SENSOR,
         f"the LED boards reach from z = {boards.bottom:g} to {top:g} mm, the straight wall from "
         f"0 to {shape.shoulder:g} mm",
         "Keep them 0.5 mm above its foot and below its end with board_bottom and board_height",
     )
     require(
         boards.leds * LED[1] <= boards.height,
-        SENSOR,
         f"{boards.leds} LEDs of {LED[1]:g} mm don't fit on a board of {boards.height:g} mm",
         "Use fewer leds_per_group or a larger board_height",
     )
     pitch = 2.0 * math.pi * boards.radius / base_leds
     require(
         base_leds % BOARDS == 0 and pitch >= LED[1] + BOARD_CLEARANCE,
-        SENSOR,
         f"a ring of {base_leds} LEDs is not possible",
         "Give a multiple of 4 (so that none is below a board) and at most "
         f"{int(2.0 * math.pi * boards.radius / (LED[1] + BOARD_CLEARANCE)) // 4 * 4}",

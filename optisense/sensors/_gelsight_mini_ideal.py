@@ -233,7 +233,6 @@ def _bent(
     thickness = float(-design.meshes["gel"].bounds[0, 2])
     require(
         math.isfinite(height) and share * height > -thickness,
-        NAME,
         f"a rise of {height:g} mm presses the gel, {thickness:g} mm thick, through its tray",
         f"Give more than {-thickness / share:g} mm",
     )
@@ -254,14 +253,12 @@ def _check(size: GelSightMiniDimensions) -> None:
     """Refuse dimensions that contradict one another."""
     require(
         size.gel_size[0] <= size.tray_size[0] and size.gel_size[1] <= size.tray_size[1],
-        NAME,
         f"the gel, {size.gel_size[0]:g} x {size.gel_size[1]:g} mm, is larger than its tray, "
         f"{size.tray_size[0]:g} x {size.tray_size[1]:g} mm",
         "Make gel_size smaller or tray_size larger",
     )
     require(
         size.pupil_distance > size.guide_thickness,
-        NAME,
         f"the camera's pupil, {size.pupil_distance:g} mm behind the tray, is inside the light "
         f"guide, {size.guide_thickness:g} mm thick",
         "Make pupil_distance larger than guide_thickness",
@@ -269,7 +266,6 @@ def _check(size: GelSightMiniDimensions) -> None:
     count, pitch = size.leds_per_group, size.led_pitch
     require(
         (count - 1) * pitch <= min(size.gel_size),
-        NAME,
         f"a row of {count} LEDs {pitch:g} mm apart is longer than the guide's shorter side, "
         f"{min(size.gel_size):g} mm",
         "Use fewer leds_per_group or a smaller led_pitch",
@@ -297,7 +293,6 @@ def _field_of_view(view_width: float, layers: list[tuple[float, float]]) -> floa
         math.isfinite(view_width)
         and view_width > 0.0
         and too_wide(math.sin(math.radians(0.5 * WIDEST_FIELD))),
-        NAME,
         f"no camera at this pupil_distance shows view_width {view_width:g} mm",
         "Give a view_width above 0, smaller, or a larger pupil_distance",
     )

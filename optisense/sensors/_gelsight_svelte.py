@@ -153,14 +153,11 @@ def gelsight_svelte(size: GelSightSvelteDimensions) -> SensorDesign:
     led_flux = balanced_flux(LED) if size.led_flux is None else size.led_flux
     require(
         min(size.m1_grid) >= 2 and size.leds_per_side >= 1 and size.tip_leds >= 0,
-        NAME,
         f"m1_grid {size.m1_grid}, leds_per_side {size.leds_per_side} or tip_leds {size.tip_leds} "
         "is too small",
         "M1 needs 2 x 2 vertices or more, each side one LED or more",
     )
-    require(
-        size.view in VIEWS, NAME, f"there is no view '{size.view}'", f"Give {' or '.join(VIEWS)}"
-    )
+    require(size.view in VIEWS, f"there is no view '{size.view}'", f"Give {' or '.join(VIEWS)}")
     palm = Palm.through(size.palm_outline, size.tessellation)
     inner = palm.offset(size.gel_thickness)
     gel_outline = np.concatenate([palm.points, inner[::-1]])

@@ -88,6 +88,10 @@ def builds(kind: type[D]) -> Callable[[Callable[[D], SensorDesign]], Callable[..
                 return function(size)
             except ValidationError as error:
                 raise _dimension_error(error, kind.sensor) from None
+            except DesignError as error:
+                if error.where is not None:
+                    raise
+                raise DesignError(error.message, where=kind.sensor, hint=error.hint) from None
 
         types = {k: v for each in kind.__mro__ for k, v in inspect.get_annotations(each).items()}
         by_name = inspect.Parameter.KEYWORD_ONLY
@@ -145,14 +149,14 @@ def _dimension_error(error: ValidationError, sensor: str) -> DesignError:
     return DesignError(f"{what}: {message}", where=sensor, hint="Change that argument")
 
 
-def require(condition: bool, sensor: str, message: str, hint: str) -> None:
-    """Check a condition between dimensions.
+def require(condition: bool, message: str, hint: str) -> None:
+    """Check a condition between dimensions, in a function that `builds` decorates.
 
     Raises:
         DesignError: the condition does not hold; `message` names the problem, `hint` the remedy.
     """
     if not condition:
-        raise DesignError(message, where=sensor, hint=hint)
+        raise DesignError(message, hint=hint)
 
 
 def describe_changes(
