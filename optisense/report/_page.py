@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
 from optisense.design.responses import PictureChain
-from optisense.geometry import Contact, TriangleMesh
-from optisense.mechanics import SkinMaps
+from optisense.geometry import Contact
 from optisense.report import _tables as tables
 from optisense.report._files import as_json, page, script
 from optisense.report._mixing import mixing_data
@@ -26,49 +25,14 @@ from optisense.report.pictures import data_uri, mask_overlay, normal_colours, pr
 from optisense.report.real_sensor import RealComparison
 from optisense.writing import write_text
 
-
-class RenderedImage(Protocol):
-    """Properties of a tactile image that a page needs (see `optisense.optics.TactileImage`)."""
-
-    @property
-    def radiance(self) -> NDArray[np.float32]:
-        """Linear radiance (h, w, 3)."""
-
-    @property
-    def layers(self) -> Mapping[str, NDArray[np.float32]]:
-        """Linear radiance (h, w, 3) for each light group."""
-
-    @property
-    def normals(self) -> NDArray[np.float32]:
-        """Unit normals (h, w, 3) in the design's frame."""
-
-    @property
-    def contact_mask(self) -> NDArray[np.bool_]:
-        """Mask (h, w) of the pixels in contact."""
-
-    @property
-    def settings(self) -> Mapping[str, Any]:
-        """Settings of the rendering, which can be written as JSON."""
-
-    @property
-    def indenters(self) -> Mapping[str, TriangleMesh]:
-        """Meshes of the indenters in the design's frame (mm), by a name to show."""
-
-    @property
-    def interrupted(self) -> bool:
-        """True if the rendering was stopped before it was finished."""
-
-    def skin_maps(self) -> SkinMaps | None:
-        """Return the pressure at each pixel, or None if no pressures are known."""
-
-    def picture(self, exposure: float | Literal["auto"] = "auto") -> NDArray[np.uint8]:
-        """Return the picture (h, w, 3) that a camera would give."""
+if TYPE_CHECKING:
+    from optisense.optics import TactileImage
 
 
 def write_report(
     path: str | Path,
     design: SensorDesign,
-    image: RenderedImage,
+    image: TactileImage,
     contacts: Sequence[Contact] = (),
     *,
     exposure: float | Literal["auto"] = "auto",
@@ -103,7 +67,7 @@ def write_report(
 
 def render_page(
     design: SensorDesign,
-    image: RenderedImage,
+    image: TactileImage,
     contacts: Sequence[Contact] = (),
     *,
     exposure: float | Literal["auto"] = "auto",
@@ -141,7 +105,7 @@ def render_page(
 
 
 def _exposure(
-    design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
+    design: SensorDesign, image: TactileImage, exposure: float | Literal["auto"]
 ) -> tuple[float, PictureChain]:
     """Return the factor on the radiance, and the camera without its noise."""
     camera = design.camera.picture_chain().without_noise()
@@ -150,13 +114,13 @@ def _exposure(
 
 
 def _mixing(
-    design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
+    design: SensorDesign, image: TactileImage, exposure: float | Literal["auto"]
 ) -> dict[str, Any]:
     return mixing_data(image.layers, *_exposure(design, image, exposure))
 
 
 def _pictures(
-    design: SensorDesign, image: RenderedImage, exposure: float | Literal["auto"]
+    design: SensorDesign, image: TactileImage, exposure: float | Literal["auto"]
 ) -> list[dict[str, str]]:
     """Return the pictures with their captions; the tactile image comes first."""
     picture = image.picture(exposure)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,12 +16,8 @@ from optisense.objectives.score import Score, shown_number
 from optisense.objectives.scored import Scored
 from optisense.report._files import page
 from optisense.report.camera_rays import CameraRays
+from optisense.report.drawing import figure_uri
 from optisense.writing import write_text
-
-DOTS_PER_INCH = 110
-"""Resolution of figures, in dots per inch, at which they are as wide as the page's text on a usual
-screen.
-"""
 
 Table = tuple[list[str], list[list[str]]]
 """Column heads and rows."""
@@ -137,12 +131,10 @@ def _score(scored: Scored, name: str, score: Score, summary: str) -> dict[str, A
 
 def _figure(score: Score) -> str:
     """Return the score's figure as the address of an ``<img>``; empty if a user's drawing fails."""
-    buffer = io.BytesIO()
     try:
-        score.figure().savefig(buffer, format="png", dpi=DOTS_PER_INCH)
+        return figure_uri(score.figure())
     except Exception:  # the figure of a user's objective is a user's code; the score is kept
         return ""
-    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode("ascii")
 
 
 def _table(value: Any) -> Table | None:
