@@ -43,18 +43,15 @@ def summary(result: SearchResult) -> dict[str, Any]:
 
 
 def _plain(trial: Trial) -> dict[str, Any]:
-    fresh = {name: _or_none(trial.fresh_score(name)) for name in trial.scores}
+    from optisense.objectives.score import json_ready
+
     return {
         "number": trial.number,
-        "scores": {name: _or_none(value) for name, value in trial.scores.items()},
-        "fresh_scores": fresh,
+        "scores": json_ready(trial.scores),
+        "fresh_scores": json_ready({name: trial.fresh_score(name) for name in trial.scores}),
         "conditions": dict(trial.conditions),
         "values": trial.values,
     }
-
-
-def _or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _several(result: SearchResult) -> bool:

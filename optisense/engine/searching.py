@@ -20,7 +20,7 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.scoring import own_objectives
 from optisense.engine.search_process import SearchProcess, is_running, stop_other
 from optisense.engine.session import Session
-from optisense.engine.trial_rows import curve_row, finite, trial_row
+from optisense.engine.trial_rows import curve_row, trial_row
 from optisense.sensors import save_design
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ def trial(session: Session, fields: TrialFields, job: Job) -> dict[str, Any]:
         design = design_of_trial(study, chosen)
         return {
             **trial_row(study, chosen),
-            "fresh_scores": {name: finite(chosen.fresh_score(name)) for name in chosen.scores},
+            "fresh_scores": {name: chosen.fresh_score(name) for name in chosen.scores},
             "data": design.model_dump(mode="json"),
             "folder": str(_absolute(fields.study) / "design"),
             "shapes": bent_shapes(design, files, study.space.design),

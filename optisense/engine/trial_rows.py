@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -14,7 +13,7 @@ def curve_row(trial: Trial) -> dict[str, Any]:
     return {
         "number": trial.number,
         "start": trial.is_start,
-        "scores": {name: finite(value) for name, value in trial.scores.items()},
+        "scores": trial.scores,
         "failure": trial.failure,
         "feasible": trial.failure is None and trial.is_feasible,
     }
@@ -35,8 +34,3 @@ def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
             for text, value, margin in margins(trial)
         ],
     }
-
-
-def finite(value: float) -> float | None:
-    """Return a number as JSON can hold it: None if it is infinite or NaN."""
-    return value if math.isfinite(value) else None

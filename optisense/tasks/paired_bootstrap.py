@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
@@ -57,13 +57,9 @@ class ErrorChange:
     def to_dict(self) -> dict[str, float | str | int]:
         """Return all values, ready for JSON."""
         return {
-            "before": self.before,
-            "after": self.after,
+            **asdict(self),
             "change": self.change,
-            "low": self.low,
-            "high": self.high,
             "confidence": CONFIDENCE,
-            "objects": self.objects,
             "verdict": self.verdict,
         }
 

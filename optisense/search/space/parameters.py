@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from optisense.errors import SearchError
@@ -208,27 +208,27 @@ def check_bounds(low: float, high: float) -> None:
         )
 
 
+_KINDS = {
+    "choice": Choice,
+    "integer": Integer,
+    "around": Around,
+    "continuous": Continuous,
+    "together": Together,
+    "cage-points": CagePoints,
+}
+"""Specifications by their names in files."""
+
+
 def to_plain(spec: Specification) -> dict[str, Any]:
     """Return a specification as values ready for JSON."""
-    if isinstance(spec, Choice):
-        plain = [list(o) if isinstance(o, tuple) else o for o in spec.options]
-        return {"kind": "choice", "options": plain, "labels": list(spec.labels)}
-    if isinstance(spec, Integer):
-        return {"kind": "integer", "low": spec.low, "high": spec.high}
-    if isinstance(spec, Around):
-        return {"kind": "around", "reach": spec.reach, "steps": spec.steps}
-    if isinstance(spec, Continuous):
-        return {"kind": "continuous", "low": spec.low, "high": spec.high, "steps": spec.steps}
-    if isinstance(spec, Together):
-        return {"kind": "together", "range": to_plain(spec.range)}
-    points = None if spec.points is None else list(spec.points)
-    return {
-        "kind": "cage-points",
-        "range": to_plain(spec.range),
-        "points": points,
-        "axes": spec.axes,
-        "symmetry": spec.symmetry,
-    }
+    name = next(name for name, kind in _KINDS.items() if type(spec) is kind)
+    return {"kind": name, **{each.name: _plain(getattr(spec, each.name)) for each in fields(spec)}}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    return to_plain(value) if isinstance(value, Continuous | Integer | Choice | Around) else value
 
 
 def from_plain(data: Mapping[str, Any]) -> Specification:
@@ -238,24 +238,15 @@ def from_plain(data: Mapping[str, Any]) -> Specification:
         SearchError: the values are not what `to_plain` writes.
     """
     try:
-        fields = dict(data)
-        kind = fields.pop("kind")
-        if kind == "together":
-            shared = from_plain(fields.pop("range"))
-            if isinstance(shared, CagePoints | Together):
-                raise SearchError("what varies together needs bounds, options or a reach")
-            return Together(shared, **fields)
-        if kind == "cage-points":
-            inner = from_plain(fields.pop("range"))
-            if not isinstance(inner, Continuous | Around):
-                raise SearchError("cage points need bounds or a reach")
-            return CagePoints(inner, **fields)
-        return {
-            "choice": Choice,
-            "integer": Integer,
-            "around": Around,
-            "continuous": Continuous,
-        }[kind](**fields)
+        given = dict(data)
+        kind = _KINDS[given.pop("kind")]
+        if kind in (Together, CagePoints):
+            given["range"] = from_plain(given["range"])
+        if kind is Together and isinstance(given["range"], CagePoints | Together):
+            raise SearchError("what varies together needs bounds, options or a reach")
+        if kind is CagePoints and not isinstance(given["range"], Continuous | Around):
+            raise SearchError("cage points need bounds or a reach")
+        return kind(**given)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SearchError(f"a parameter can't be read: {error}", where=str(data)[:80]) from None
 

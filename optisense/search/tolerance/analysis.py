@@ -15,7 +15,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
-from optisense.objectives.score import deviation_of
+from optisense.objectives.score import deviation_of, json_ready
 from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.evaluation.outcome import Outcome
@@ -350,19 +350,17 @@ def _size(share: Estimate | None) -> float:
 
 
 def _plain(each: ScoreDistribution) -> dict[str, Any]:
-    def number(value: float) -> float | None:
-        return value if math.isfinite(value) else None
-
-    def estimate(value: Estimate | None) -> dict[str, float | None] | None:
-        if value is None:
-            return None
-        return {name: number(each) for name, each in asdict(value).items()}
-
-    return {
-        "nominal": number(each.nominal),
-        "noise": number(each.noise),
-        "standard_deviation": number(each.deviation),
-        "percentiles": {key: estimate(value) for key, value in each.percentiles.items()},
-        "shares": {source: estimate(value) for source, value in each.shares.items()},
-        "scores": [number(value) for value in each.scores.ravel().tolist()],
-    }
+    plain: dict[str, Any] = json_ready(
+        {
+            "nominal": each.nominal,
+            "noise": each.noise,
+            "standard_deviation": each.deviation,
+            "percentiles": {key: asdict(value) for key, value in each.percentiles.items()},
+            "shares": {
+                source: None if value is None else asdict(value)
+                for source, value in each.shares.items()
+            },
+            "scores": each.scores.ravel(),
+        }
+    )
+    return plain
