@@ -12,10 +12,8 @@ from .operator import TITLE
 
 
 class OPTISENSE_PT_calibrate(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_calibrate"
     bl_label = "Calibrate"
     bl_order = 9
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -31,6 +31,7 @@ class SidebarPanel:
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = TAB
+    bl_options = frozenset({"DEFAULT_CLOSED"})
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

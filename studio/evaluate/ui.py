@@ -28,10 +28,8 @@ editor.
 
 
 class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_evaluate"
     bl_label = "Evaluate"
     bl_order = 6
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -11,10 +11,8 @@ from ..engine.layout import SidebarPanel, show_job, show_outcome
 
 
 class OPTISENSE_PT_export(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_export"
     bl_label = "Report and Export"
     bl_order = 8
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         if show_job(self.layout, "Writing"):

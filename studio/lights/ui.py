@@ -28,10 +28,8 @@ class OPTISENSE_UL_light_groups(bpy.types.UIList):
 
 
 class OPTISENSE_PT_lights(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_lights"
     bl_label = "Lights and Camera"
     bl_order = 4
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -14,10 +14,8 @@ from .operator import KEEPING
 
 
 class OPTISENSE_PT_materials(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_materials"
     bl_label = "Materials"
     bl_order = 3
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

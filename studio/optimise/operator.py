@@ -56,7 +56,6 @@ class OPTISENSE_OT_vary(polls.Designing, bpy.types.Operator):
 class OPTISENSE_MT_vary(bpy.types.Menu):
     """Parameters of the selected object that a search may change"""
 
-    bl_idname = "OPTISENSE_MT_vary"
     bl_label = "Vary ..."
 
     def draw(self, context: bpy.types.Context) -> None:

@@ -28,10 +28,8 @@ class OPTISENSE_UL_vary(bpy.types.UIList):
 
 
 class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_optimise"
     bl_label = "Optimise"
     bl_order = 7
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

@@ -63,7 +63,6 @@ class OPTISENSE_OT_new_empty(polls.Replacing, bpy.types.Operator):
 class OPTISENSE_MT_new(bpy.types.Menu):
     """The built-in sensors"""
 
-    bl_idname = "OPTISENSE_MT_new"
     bl_label = "New Sensor"
 
     def draw(self, context: bpy.types.Context) -> None:

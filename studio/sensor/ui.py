@@ -13,9 +13,9 @@ from .warming import prepare
 
 
 class OPTISENSE_PT_sensor(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_sensor"
     bl_label = "Sensor"
     bl_order = 1
+    bl_options = frozenset()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:

@@ -15,10 +15,8 @@ HOW_TO_CAGE_MORE = "For more parts in a cage: remove it, select all of them, Cre
 
 
 class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_shapes"
     bl_label = "Shapes"
     bl_order = 2
-    bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout

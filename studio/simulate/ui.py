@@ -11,9 +11,9 @@ from . import picture
 
 
 class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
-    bl_idname = "OPTISENSE_PT_simulate"
     bl_label = "Simulate"
     bl_order = 5
+    bl_options = frozenset()
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
