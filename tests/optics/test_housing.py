@@ -25,9 +25,9 @@ LANDED = 0.01
 
 def zone(first: float, last: float) -> TriangleMesh:
     """The part of a sphere between two polar angles (degrees), facing inward."""
-    rows = max(4, round((last - first) / 2))
+    rows = max(4, round((last - first) / 4))
     polar = np.radians(np.linspace(first, last, rows + 1))
-    turn = np.linspace(0.0, 2 * np.pi, 181)
+    turn = np.linspace(0.0, 2 * np.pi, 91)
     p, t = np.meshgrid(polar, turn, indexing="ij")
     points = RADIUS * np.stack([np.sin(p) * np.cos(t), np.sin(p) * np.sin(t), np.cos(p)], axis=-1)
     mesh = TriangleMesh(points.reshape(-1, 3), grid_faces(rows + 1, len(turn))).welded()
@@ -83,7 +83,7 @@ SHARE = (1 - np.cos(np.radians(PORT))) / 2
 """Share of the sphere's area that is the sensing surface."""
 
 
-@pytest.mark.parametrize("reflectance", [0.2, 0.8, 0.95])
+@pytest.mark.parametrize("reflectance", [0.2, 0.95])
 def test_a_white_sphere_sends_its_light_out_of_the_port(reflectance: float) -> None:
     """Every point of a sphere lights all others alike: r f / (1 - r (1 - f))."""
     expected = reflectance * SHARE / (1 - reflectance * (1 - SHARE))

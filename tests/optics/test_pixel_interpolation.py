@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from comparing import same_light
 
-from optisense import Contact, OpticalModel, Sphere
+from optisense import Contact, OpticalModel, Sphere, set_value
 from optisense.optics.imaging import cached
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.transport.chief_rays import ChiefRays
@@ -59,8 +59,9 @@ def test_edges_of_what_is_seen_and_of_shadows_are_not_filled() -> None:
     assert alike[:, [11, 15, 19, 23]].any(axis=0).all()
 
 
-def test_a_sensor_of_many_lights_looks_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = OpticalModel(build("gelsight360"), "llvm")
+def test_a_metal_coating_looks_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    design = set_value(build("gelsight-mini-ideal"), "coating.specularity", 0.5)
+    model = OpticalModel(design, "llvm")
     ball = [Contact(Sphere(radius=2.0), at=(0.0, 0.0), depth=1.0)]
     size = {"resolution": (160, 120), "photons": 100_000, "skin": "conforming"}
 

@@ -185,8 +185,8 @@ def test_cells_far_from_what_the_camera_sees_keep_their_own_light(kernels) -> No
 
     cells = kernels.cells
     near = cells.centres[:, 0] < 0.0
-    some = Kernels(cells, np.full(cells.cells, 20.0), DENSITY, near)
-    whole = Kernels(cells, np.full(cells.cells, 20.0), DENSITY)
+    some = Kernels(cells, np.full(cells.cells, 8.0), DENSITY, near)
+    whole = Kernels(cells, np.full(cells.cells, 8.0), DENSITY)
     landed = np.random.default_rng(3).exponential(size=(cells.cells, 1)) * cells.areas[:, None]
     smooth, as_whole = (each.smoothing(1).kernel @ landed for each in (some, whole))
     assert smooth[near] == pytest.approx(as_whole[near])
