@@ -8,10 +8,10 @@ until one comes to its end.
 from __future__ import annotations
 
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
-from warm_python import programs
 
 SCRIPT = '''
 import os
@@ -21,10 +21,10 @@ from pathlib import Path
 
 import optisense as ots
 from optisense.search import Plan, SearchSpace, Study
-from optisense.sensors import save_design
+from optisense.sensors import gelsight_mini_ideal, save_design
 
 EVENTS = {"open", "os.mkdir", "os.rename", "os.remove", "os.rmdir", "sqlite3.connect"}
-MINI = ots.load("gelsight-mini-ideal")
+MINI = gelsight_mini_ideal(tessellation=4.0)  # whose files are written at once
 SPACE = SearchSpace({"coating.specularity": (0.0, 1.0)})
 HERE = Path(sys.argv[2])
 
@@ -97,7 +97,7 @@ print("killed", killed)
 @pytest.mark.parametrize("command", ["new", "search"])
 def test_it_is_given_again_and_ends_well(command: str, tmp_path: Path) -> None:
     found = subprocess.run(
-        [programs() / "python", "-c", SCRIPT, command, str(tmp_path)],
+        [sys.executable, "-c", SCRIPT, command, str(tmp_path)],
         capture_output=True,
         text=True,
     )

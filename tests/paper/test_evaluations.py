@@ -106,7 +106,7 @@ def test_less_noise_confuses_less(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", list(OBJECTS))
 def test_objects_leave_their_mark(name: str, tmp_path: Path) -> None:
-    asked: dict[str, Any] = {"design": sensor("gelbelt"), **IMAGES}
+    asked: dict[str, Any] = {"design": sensor("gelsight-mini-ideal"), **IMAGES}
     found = picture({**asked, "contacts": [f"object:{name}@0,0:0.5"]}, tmp_path)
     assert found.pictures["picture"].shape == (120, 160, 3)
     assert found.values["pixels_in_contact"] > 20
@@ -156,7 +156,7 @@ def test_a_searched_mirror_can_be_built_again(method: str, tmp_path: Path) -> No
         "space": {"cages.M1.blend": [0.0, 1.0]},
         "objectives": ["aoap"],
         "method": method,
-        "budget": 6,
+        "budget": 3,
         "seed": 2,
         "settings": {"ray_resolution": [32, 24]},
     }
