@@ -272,10 +272,8 @@ def _shape(design: SensorDesign, name: str) -> str:
     """Return one line on the positions of a cage's points."""
     import numpy as np
 
-    from optisense.design.cage_edit import offsets_at_rest
-
     cage = design.cages[name]
-    moved = float(np.linalg.norm(offsets_at_rest(cage), axis=1).max())
+    moved = float(np.linalg.norm(cage.offsets_at_rest(), axis=1).max())
     text = f"moved by up to {moved:.4g} mm" if moved > 1e-9 else "at rest"
     if isinstance(cage.blend, float):
         return f"{text}, blend {cage.blend:.4g}"
@@ -287,13 +285,12 @@ def _show_points(design: SensorDesign, name: str) -> None:
 
     from optisense.design import get_value
     from optisense.design.cage import Cage, as_array
-    from optisense.design.cage_edit import offsets_at_rest
 
     cage: Cage = get_value(design, f"cages.{name}")
     nx, ny, nz = cage.resolution
     output.print(f"{name}: {nx} x {ny} x {nz} control points over {', '.join(cage.parts)}; "
                  f"{_shape(design, name)}")  # fmt: skip
-    now, offsets = cage.current_points(), offsets_at_rest(cage)
+    now, offsets = cage.current_points(), cage.offsets_at_rest()
     rows = [["point", "i,j,k", "x, y, z (mm)", "moved by"]]
     ends = None
     if cage.c_min is not None and cage.c_max is not None:

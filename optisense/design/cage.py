@@ -114,6 +114,12 @@ class Cage(Model):
         share = as_array(self.blend) if isinstance(self.blend, list) else self.blend
         return np.asarray((1.0 - share) * as_array(self.c_min) + share * as_array(self.c_max))
 
+    def offsets_at_rest(self) -> NDArray[np.float64]:
+        """Return the displacements (N, 3), mm, of the control points from their places at rest."""
+        from optisense.geometry.cage import cage_points
+
+        return np.asarray(self.current_points() - cage_points(self.box, self.resolution))
+
 
 def as_array(points: Iterable[Point] | Iterable[Share]) -> NDArray[np.float64]:
     """Return a list of points as an array (N, 3), float64."""

@@ -12,7 +12,7 @@ from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
-from optisense.geometry.cage import cage_points, cage_weights
+from optisense.geometry.cage import cage_weights
 from optisense.geometry.coarseness import chord_error
 from optisense.geometry.containment import inside
 from optisense.geometry.folds import find_fold
@@ -168,8 +168,7 @@ def _moved_cages(
 
 
 def _has_moved(cage: Cage) -> bool:
-    rest = cage_points(cage.box, cage.resolution)
-    return bool(np.abs(cage.current_points() - rest).max() > AT_REST)
+    return bool(np.abs(cage.offsets_at_rest()).max() > AT_REST)
 
 
 def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
@@ -283,9 +282,8 @@ def _partings(
 def _mover(design: SensorDesign, cage_name: str, name: str, vertex: int) -> str:
     """Return, in words, the control point that moves a vertex the most."""
     cage = design.cages[cage_name]
-    offsets = cage.current_points() - cage_points(cage.box, cage.resolution)
     weights = cage_weights(design.meshes[name].vertices[vertex], cage.box, cage.resolution)[0]
-    index = int(np.argmax(weights * np.linalg.norm(offsets, axis=1)))
+    index = int(np.argmax(weights * np.linalg.norm(cage.offsets_at_rest(), axis=1)))
     i, j, k = (int(value) for value in np.unravel_index(index, cage.resolution))
     return f"control point {index} ({i},{j},{k})"
 

@@ -14,7 +14,6 @@ from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array,
 from optisense.design.problems import design_error
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
-from optisense.geometry.cage import cage_points
 from optisense.geometry.cage_map import refined_points
 from optisense.near import suggestion
 
@@ -231,11 +230,6 @@ def select_points(resolution: Resolution, which: str) -> list[int]:
             _, ny, nz = resolution
             return [(i * ny + j) * nz + k for i in axes[0] for j in axes[1] for k in axes[2]]
     raise DesignError(f"there is no control point '{which}'", hint=hint)
-
-
-def offsets_at_rest(cage: Cage) -> NDArray[np.float64]:
-    """Return the displacement of each control point from rest, (N, 3), mm."""
-    return np.asarray(cage.current_points() - cage_points(cage.box, cage.resolution))
 
 
 def _shares(

@@ -60,7 +60,7 @@ def load_design(path: str | Path) -> SensorDesign:
     folder = file.parent
     triangles = 0
     for name, part in design.parts.items():
-        mesh_path = _inside(folder, part.mesh, design.where("parts", name, "mesh"))
+        mesh_path = file_inside(folder, part.mesh, design.where("parts", name, "mesh"))
         design.meshes[name] = _load_mesh(mesh_path, name, design)
         triangles += len(design.meshes[name].faces)
         if triangles > MOST_TRIANGLES:
@@ -71,7 +71,7 @@ def load_design(path: str | Path) -> SensorDesign:
             )
     for place, value in design.values_of_kinds().items():
         for field, named in value.located(folder).files().items():
-            _inside(folder, named, design.where(*place, field))
+            file_inside(folder, named, design.where(*place, field))
     raise_problems(unit_slips(design), str(file))
     return design
 
@@ -138,8 +138,12 @@ def _check_version(data: dict[str, Any], lines: Lines, source: str) -> None:
         )
 
 
-def _inside(folder: Path, relative: str, where: str) -> Path:
-    """Return the file at a path, which must not leave the folder after links are resolved."""
+def file_inside(folder: Path, relative: str, where: str) -> Path:
+    """Return the file at a path, which must not leave the design's folder after links are resolved.
+
+    Raises:
+        DesignError: the path leads out of the folder, or to no file.
+    """
     path = inside_folder(folder, relative)
     if path is None:
         raise DesignError(

@@ -15,17 +15,15 @@ from optisense.design import SensorDesign, check_design, load_design, set_value
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, design_error
 from optisense.design.sensor_design import dotted
-from optisense.design.storage import DESIGN_FILE
+from optisense.design.storage import DESIGN_FILE, file_inside
 from optisense.engine.failures import InvalidDesignError, ProtocolError, place_in
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.library import names
 from optisense.near import near_match
 from optisense.sensors import load
-from optisense.text import brief
 from optisense.untrusted_arrays import read_array
-from optisense.untrusted_files import inside as inside_folder
-from optisense.untrusted_files import is_file, is_folder
+from optisense.untrusted_files import is_folder
 
 MOST_MESHES = 200
 """Largest number of mesh files that are kept: those of some twenty designs. The one
@@ -273,23 +271,11 @@ def _mesh_of_arrays(given: MeshFile) -> TriangleMesh:
 
 
 def _inside(folder: Path | None, relative: str, where: str) -> Path:
-    """Return the path of a file of a design, which must not leave its folder, after links are
-    resolved.
-    """
+    """Return the file of a design; see `file_inside`."""
     if folder is None:
         raise DesignError(
             f"the file '{relative}' can't be found, as the design has no folder",
             where=where,
             hint="Name the design's folder",
         )
-    path = inside_folder(folder, relative)
-    if path is None:
-        raise DesignError(
-            f"'{brief(relative)}' leads out of the design folder",
-            where=where,
-            hint="Put the file into the folder of the design",
-        )
-    if not is_file(path):
-        raise DesignError(f"there is no file '{brief(relative)}' in the design folder", where=where,
-                          hint=f"The folder is {folder}")  # fmt: skip
-    return path
+    return file_inside(folder, relative, where)

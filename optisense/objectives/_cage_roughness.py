@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
-from optisense.geometry.cage import Resolution, cage_points
+from optisense.geometry.cage import Resolution
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def cage_roughness(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     """
     found, largest = {}, 0.0
     for name, cage in evaluation.design.cages.items():
-        moved = cage.current_points() - cage_points(np.array(cage.box), cage.resolution)
+        moved = cage.offsets_at_rest()
         uneven = unevenness(moved, cage.resolution)
         found[name] = float(np.sqrt((uneven**2).mean())) if len(uneven) else 0.0
         largest = max(largest, float(uneven.max(initial=0.0)))

@@ -6,6 +6,7 @@ ratio; Roberts 2018), so that every prefix of the sequence is spread evenly in f
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import drjit as dr
@@ -66,26 +67,24 @@ def sequence_4d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> tuple[m
         stream: number (n,) of the sequence.
         seed: seed of the sequences' shifts.
     """
-    out = []
-    for k, step in enumerate(STEPS):
-        shift = mi.sample_tea_32(stream * 4 + k, seed)[0]
-        out.append(unit_float(index * mi.UInt32(step) + shift))
-    return tuple(out)
+    return _element(STEPS, index, stream, seed)
 
 
 def sequence_2d(index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32) -> mi.Point2f:
-    """Return an element of a two-dimensional sequence, a point of the unit square.
-
-    Args:
-        index: number (n,) of the element.
-        stream: number (n,) of the sequence.
-        seed: seed of the sequences' shifts.
+    """Return an element of a two-dimensional sequence, a point of the unit square; see
+    `sequence_4d`.
     """
-    out = []
-    for k, step in enumerate(STEPS_2D):
-        shift = mi.sample_tea_32(stream * 4 + k, seed)[0]
-        out.append(unit_float(index * mi.UInt32(step) + shift))
-    return mi.Point2f(*out)
+    return mi.Point2f(*_element(STEPS_2D, index, stream, seed))
+
+
+def _element(
+    steps: Sequence[int], index: mi.UInt32, stream: mi.UInt32, seed: mi.UInt32
+) -> tuple[mi.Float, ...]:
+    shifts = (mi.sample_tea_32(stream * 4 + k, seed)[0] for k in range(len(steps)))
+    return tuple(
+        unit_float(index * mi.UInt32(step) + shift)
+        for step, shift in zip(steps, shifts, strict=True)
+    )
 
 
 @lru_cache(maxsize=4)
