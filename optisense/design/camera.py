@@ -166,6 +166,11 @@ class Camera(ImagingModel, Viewpoint):
             )
         return self
 
+    def size_at(self, width: int) -> tuple[int, int]:
+        """Return a width and the height, pixels, of a picture of the camera's aspect ratio."""
+        across, down = self.resolution
+        return width, max(1, round(width * down / across))
+
     def axes(self) -> NDArray[np.float64]:
         """Return orthonormal rows (3, 3): image right, image up, viewing direction."""
         forward = np.array(self.direction) / np.linalg.norm(self.direction)

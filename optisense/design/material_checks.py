@@ -4,12 +4,12 @@ all light.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from optisense.design.materials import Medium
-from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.parts import TRANSPARENT_SOLIDS, Part, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
@@ -53,30 +53,23 @@ def index_problems(design: SensorDesign) -> list[Diagnostic]:
 
     A gas is allowed: air gaps lie between parts, and a membrane may be filled with it.
     """
-    problems: list[Diagnostic] = []
-    reported: set[str] = set()
-    for name, part in design.parts.items():
-        material = design.materials.get(part.material or "")
-        medium = None if material is None else material.medium()
-        if part.material is None or part.material in reported or medium is None:
-            continue
-        if part.role not in TRANSPARENT_SOLIDS:  # the index of a sheet is relative
-            continue
+    problems: dict[str, Diagnostic] = {}
+    for name, part, material, medium in _solids(design):
         soft = part.role is Role.ELASTOMER
         most = MOST_OF_AN_ELASTOMER if soft else MOST_OF_A_SOLID
         if is_gas(medium) or LEAST_OF_A_SOLID <= medium.ior <= most:
             continue
-        reported.add(part.material)
         what = "clear elastomer" if soft else "transparent solid"
-        problems.append(
+        problems.setdefault(
+            material,
             Diagnostic(
                 f"no {what} has a refractive index of {medium.ior:g}: material "
-                f"'{part.material}' of part '{name}'",
-                design.where("materials", part.material, "ior"),
+                f"'{material}' of part '{name}'",
+                design.where("materials", material, "ior"),
                 f"Give {LEAST_OF_A_SOLID:g} to {most:g}, or 1 for air",
-            )
+            ),
         )
-    return problems
+    return list(problems.values())
 
 
 def absorption_problems(
@@ -88,28 +81,34 @@ def absorption_problems(
     Args:
         meshes: meshes of the design's parts, mm, by part.
     """
-    problems: list[Diagnostic] = []
-    told: set[str] = set()
-    for name, part in design.parts.items():
-        material = design.materials.get(part.material or "")
-        medium = None if material is None else material.medium()
-        if part.material is None or part.material in told or medium is None:
-            continue
-        if part.role not in TRANSPARENT_SOLIDS or name not in meshes:
+    problems: dict[str, Diagnostic] = {}
+    for name, _, material, medium in _solids(design):
+        if name not in meshes:
             continue
         extent = float(np.ptp(meshes[name].vertices, axis=0).min())
         left = np.exp(-min(medium.absorption) * extent)
         if left >= LEAST_TRANSMITTED:
             continue
-        told.add(part.material)
-        problems.append(
+        problems.setdefault(
+            material,
             Diagnostic(
                 f"part '{name}' absorbs practically all light: over its smallest extent of "
-                f"{extent:.3g} mm, material '{part.material}' transmits {left:.1g} of the "
+                f"{extent:.3g} mm, material '{material}' transmits {left:.1g} of the "
                 "light of its clearest channel",
-                design.where("materials", part.material),
+                design.where("materials", material),
                 "The unit of 'absorption' is 1/mm; opaque parts are blockers",
                 severity="warning",
-            )
+            ),
         )
-    return problems
+    return list(problems.values())
+
+
+def _solids(design: SensorDesign) -> Iterator[tuple[str, Part, str, Medium]]:
+    """Yield the name of each transparent solid, the part, and its material's name and medium; the
+    index of a sheet is relative.
+    """
+    for name, part in design.parts.items():
+        material = design.materials.get(part.material or "")
+        medium = None if material is None else material.medium()
+        if part.material is not None and medium is not None and part.role in TRANSPARENT_SOLIDS:
+            yield name, part, part.material, medium

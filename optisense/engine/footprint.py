@@ -36,8 +36,7 @@ def footprint(session: Session, fields: FootprintGrid, job: Job) -> dict[str, An
 
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
-    width, height = design.camera.resolution
-    rows = min(max(2, round(fields.columns * height / width)), MOST)
+    rows = min(max(2, design.camera.size_at(fields.columns)[1]), MOST)
     # The model for drafts follows the edits; that for whole pictures keeps its light.
     model = session.renderer.draft_model(design)
     rays = model.chief_rays((fields.columns, rows))

@@ -126,7 +126,7 @@ def warm(session: Session, fields: Warm, job: Job) -> dict[str, Any]:
     job.progress(0.0, "loading the renderer")
     model = session.renderer.model(design)
     job.progress(0.2, "building the sensor")
-    size = _draft_size(design)
+    size = design.camera.size_at(DRAFT_WIDTH)
     model.render((), size, photons="draft", progress=_progress_of(job))
     if fields.contacts:
         job.progress(0.7, "preparing contacts")
@@ -153,7 +153,7 @@ def simulate(session: Session, fields: Simulate, job: Job) -> dict[str, Any]:
     contacts = contacts_of(fields.contacts)
     size = _checked_size(fields.resolution, design)
     if fields.draft:
-        size = fields.resolution or _draft_size(design)
+        size = fields.resolution or design.camera.size_at(DRAFT_WIDTH)
     else:
         session.designs.require_valid(design)
         job.progress(0.0, "building the sensor")
@@ -384,11 +384,6 @@ def _checked_size(
             hint=f"Ask for at most {MOST_PIXELS:,} pixels",
         )
     return resolution
-
-
-def _draft_size(design: SensorDesign) -> tuple[int, int]:
-    width, height = design.camera.resolution
-    return DRAFT_WIDTH, max(1, round(DRAFT_WIDTH * height / width))
 
 
 def _size(image: TactileImage) -> list[int]:

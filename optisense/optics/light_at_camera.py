@@ -75,8 +75,7 @@ def camera_light(model: OpticalModel, photons: int = PICTURE_PHOTONS, seed: int 
         photons: number of photons to trace.
         seed: seed of the photons.
     """
-    width, height = model.design.camera.resolution
-    resolution = (WIDTH, max(1, round(WIDTH * height / width)))
+    resolution = model.design.camera.size_at(WIDTH)
     image = model.render((), resolution, photons, seed=seed)
     camera = model.camera(resolution)
     angle = projected_solid_angles(camera)

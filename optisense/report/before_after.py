@@ -143,8 +143,7 @@ def ray_figures(evaluation: Evaluation) -> RayFigures:
 def _picture(
     model: OpticalModel, contacts: list[Contact], photons: int, seed: int, skin: str
 ) -> tuple[NDArray[np.uint8], tuple[Ball, ...]]:
-    width, height = model.design.camera.resolution
-    size = ACROSS, max(1, round(ACROSS * height / width))
+    size = model.design.camera.size_at(ACROSS)
     image = model.render(contacts, resolution=size, photons=photons, seed=seed, skin=skin)
     if image.interrupted:
         raise KeyboardInterrupt

@@ -67,8 +67,7 @@ class TrialPictures:
             self._model = OpticalModel(design)
         else:
             self._model.set_design(design)
-        width, height = design.camera.resolution
-        size = ACROSS, max(1, round(ACROSS * height / width))
+        size = design.camera.size_at(ACROSS)
         shared = self._settings
         contacts = self._model.nine_contacts(Sphere(shared.radius), shared.depth)
         image = self._model.render(contacts, resolution=size, photons=PHOTONS, skin=shared.skin)

@@ -298,8 +298,7 @@ def _resolution(
 ) -> tuple[int, int]:
     if settings.resolution is not None:
         return settings.resolution
-    width, height = model.design.camera.resolution
-    return task.width, max(1, round(task.width * height / width))
+    return model.design.camera.size_at(task.width)
 
 
 def _described(

@@ -356,8 +356,7 @@ class GradientEvaluator(PickledWithoutCaches):
         return values
 
     def _rays(self, design: SensorDesign, moving: Sequence[str]) -> DifferentiableRays:
-        width, height = design.camera.resolution
-        size = self.resolution, max(1, round(self.resolution * height / width))
+        size = design.camera.size_at(self.resolution)
         return self.usual.models.model(design).differentiable_rays(moving, size)
 
     @cached_property
