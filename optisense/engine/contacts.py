@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
+from optisense.array_types import FloatingArray
 from optisense.engine.failures import WrongContactError
 from optisense.errors import ContactError, MeshError, OptiSenseError
 from optisense.geometry import Contact, TriangleMesh
@@ -21,7 +22,6 @@ FLOAT32_TOLERANCE = 1e-3
 rounding of 30 mm to float32 (2e-6 mm), and far below a pixel.
 """
 
-FloatArray = NDArray[np.float32] | NDArray[np.float64]
 
 Place = Callable[[Contact], TriangleMesh]
 """Function that presses a contact in: `OpticalModel.place`."""
@@ -100,7 +100,7 @@ def errors_naming_contact(contacts: Sequence[Contact], place: Place) -> Iterator
 
 
 def unseen(
-    placed: Iterable[TriangleMesh], points: FloatArray, touched: NDArray[np.bool_]
+    placed: Iterable[TriangleMesh], points: FloatingArray, touched: NDArray[np.bool_]
 ) -> list[int]:
     """Return the indices, from 0, of the contacts that no pixel sees, so that a picture does not
     show them.

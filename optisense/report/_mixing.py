@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.responses.chain import PictureChain
 from optisense.design.responses.full_well import MAX_EXCESS, FullWellResponse
 from optisense.report.pictures import data_uri
-
-FloatArray = NDArray[np.floating]
 
 CODES = 4096
 """Number of levels of a layer: 16 for each grey level of a picture, so that twice the sum of eight
@@ -27,7 +25,7 @@ neighbours differ by at most one grey level for a curve as steep as sRGB's.
 
 
 def mixing_data(
-    layers: Mapping[str, FloatArray], exposure: float, chain: PictureChain
+    layers: Mapping[str, FloatingArray], exposure: float, chain: PictureChain
 ) -> dict[str, Any]:
     """Return the data with which the page shows a picture for other brightnesses of the light
     groups.
@@ -57,7 +55,7 @@ def mixing_data(
     }
 
 
-def _coded(levels: FloatArray) -> dict[str, Any]:
+def _coded(levels: FloatingArray) -> dict[str, Any]:
     roots = np.sign(levels) * np.sqrt(np.abs(levels))
     least, most = min(float(roots.min()), 0.0), max(float(roots.max()), 1e-6)
     step = (most - least) / (CODES - 1)

@@ -9,9 +9,7 @@ import zlib
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.array_types import ByteArray
-
-FloatArray = NDArray[np.floating]
+from optisense.array_types import ByteArray, FloatingArray
 
 MOST_STRETCHED = 4.0
 """Stretching at the end of the colour scale: a ball four times as long as wide hardly looks like a
@@ -55,7 +53,7 @@ def data_uri(picture: ByteArray) -> str:
     return "data:image/png;base64," + base64.b64encode(png(picture)).decode("ascii")
 
 
-def normal_colours(normals: FloatArray, axes: NDArray[np.float64]) -> ByteArray:
+def normal_colours(normals: FloatingArray, axes: NDArray[np.float64]) -> ByteArray:
     """Return surface normals as the usual normal-map colours, seen by the camera.
 
     Args:
@@ -75,7 +73,7 @@ def normal_colours(normals: FloatArray, axes: NDArray[np.float64]) -> ByteArray:
     return colours
 
 
-def stretching_colours(stretching: FloatArray) -> ByteArray:
+def stretching_colours(stretching: FloatingArray) -> ByteArray:
     """Return a map of the stretching of pixels: dark blue is undistorted, yellow `MOST_STRETCHED`
     or more.
 
@@ -93,7 +91,7 @@ def stretching_colours(stretching: FloatArray) -> ByteArray:
     return colours
 
 
-def pressure_colours(pressure: FloatArray) -> ByteArray:
+def pressure_colours(pressure: FloatingArray) -> ByteArray:
     """Return a map of pressure from black (none) by red and yellow to white (the greatest).
 
     Args:

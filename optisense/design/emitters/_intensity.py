@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from optisense.array_types import FloatingArray
 
 
 @dataclass(frozen=True)
@@ -20,11 +19,11 @@ class Intensity:
         values: relative intensity (m, n), linear between the angles and 0 beyond the last one.
     """
 
-    polar: FloatArray
-    azimuth: FloatArray
-    values: FloatArray
+    polar: FloatingArray
+    azimuth: FloatingArray
+    values: FloatingArray
 
-    def at(self, polar: FloatArray, azimuth: FloatArray) -> FloatArray:
+    def at(self, polar: FloatingArray, azimuth: FloatingArray) -> FloatingArray:
         """Return the relative intensity (...) at polar angles and azimuths (...), degrees."""
         p = np.clip(np.interp(polar, self.polar, np.arange(len(self.polar))), 0, None)
         i = np.minimum(p.astype(int), max(len(self.polar) - 2, 0))

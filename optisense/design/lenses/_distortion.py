@@ -13,16 +13,12 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Annotated, Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from optisense.design.fields import Number
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError
 from optisense.registry import Registry
-
-FloatArray = NDArray[np.floating]
 
 NEWTON_STEPS = 12
 """Number of Newton steps in `undistort`. Seven reach single precision for lenses that move the

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import NonNegative
 from optisense.design.lenses.blur import LensBlur, LensView
-
-FloatArray = NDArray[np.floating]
 
 
 class GaussianBlur(LensBlur):
@@ -26,6 +24,6 @@ class GaussianBlur(LensBlur):
         json_schema_extra={"unit": "pixels"},
     )
 
-    def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
+    def deviation(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
         """Return the width over the number of pixels across, in the shape of `vergence`."""
         return np.asarray(self.width / camera.resolution[0]) + 0.0 * vergence

@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import Fraction, InconsistentValueError, Number
 from optisense.design.lenses.film import FilmPlaces
 from optisense.design.lenses.shading import LensShading
-
-FloatArray = NDArray[np.floating]
 
 TABLE_ROWS, TABLE_COLUMNS = 12, 16
 """Size of the shading tables in libcamera's tuning files for the Raspberry Pi (rpi.alsc on the VC4
@@ -71,21 +69,21 @@ class TableShading(LensShading):
                 )
         return self
 
-    def transmission(self, places: FilmPlaces) -> FloatArray:
+    def transmission(self, places: FilmPlaces) -> FloatingArray:
         """Return the transmission (h, w, 3): the inverse of the gains."""
         from scipy.ndimage import map_coordinates  # takes a third of a second to load
 
         rows, columns = len(self.gain), len(self.gain[0])
         at = np.array([places.down * rows - 0.5, places.across * columns - 0.5])
 
-        def spread(table: GainTable) -> FloatArray:
+        def spread(table: GainTable) -> FloatingArray:
             return map_coordinates(np.array(table), at, order=1, mode="nearest")
 
         green = spread(self.gain)
         further = [1.0 if table is None else spread(table) for table in (self.red, self.blue)]
         return 1.0 / np.stack([green * further[0], green, green * further[1]], axis=-1)
 
-    def correction(self, transmission: FloatArray) -> FloatArray:
+    def correction(self, transmission: FloatingArray) -> FloatingArray:
         """Return the gain (h, w, 3) that the processor applies for a transmission (h, w, 3).
 
         It is the gain of green, times the further gains of red and blue, each in its share.

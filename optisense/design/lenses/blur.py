@@ -10,13 +10,11 @@ from abc import abstractmethod
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError
 from optisense.registry import Registry
-
-FloatArray = NDArray[np.floating]
 
 REACH = 4.0
 """Radius at which a blur is cut off, in standard deviations (SciPy's default)."""
@@ -67,7 +65,7 @@ class LensBlur(KindModel):
     """Whether it depends on the distance of the scene."""
 
     @abstractmethod
-    def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
+    def deviation(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
         """Return the standard deviation (...) as a share of the picture's width.
 
         Args:
@@ -88,8 +86,8 @@ def reach_of(deviation: float, width: int) -> int:
 
 
 def blurred(
-    levels: FloatArray, deviation: FloatArray, span: tuple[float, float] | None = None
-) -> FloatArray:
+    levels: FloatingArray, deviation: FloatingArray, span: tuple[float, float] | None = None
+) -> FloatingArray:
     """Return levels (h, w, 3), blurred by a width that may vary over the picture.
 
     Args:
@@ -114,7 +112,7 @@ def blurred(
     return total
 
 
-def _spread(levels: FloatArray, width: float) -> FloatArray:
+def _spread(levels: FloatingArray, width: float) -> FloatingArray:
     if width < LEAST_WIDTH:
         return levels
     from scipy.ndimage import gaussian_filter  # takes a third of a second to load

@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import MILLIMETRES, Positive
 from optisense.design.lenses.blur import LensBlur, LensView
-
-FloatArray = NDArray[np.floating]
 
 DISC_DEVIATION = 0.25
 """Standard deviation along an axis of a uniformly lit disc, divided by its diameter."""
@@ -41,7 +39,7 @@ class Defocus(LensBlur):
         json_schema_extra=MILLIMETRES,
     )
 
-    def circle(self, camera: LensView, vergence: FloatArray) -> FloatArray:
+    def circle(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
         """Return the diameter (...) of the circle of confusion, as a share of the picture's width.
 
         Args:
@@ -51,7 +49,7 @@ class Defocus(LensBlur):
         angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
         return np.asarray(angle * camera.angle_scale)
 
-    def deviation(self, camera: LensView, vergence: FloatArray) -> FloatArray:
+    def deviation(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
         """Return the standard deviation (...) of the disc: a quarter of the circle's diameter.
 
         Args:

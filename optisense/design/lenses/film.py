@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.floating]
+from optisense.array_types import FloatingArray
 
 
 @dataclass(frozen=True)
@@ -49,9 +48,9 @@ class FilmPlaces:
         radius: distance from the middle; 1 in the corners.
     """
 
-    across: FloatArray
-    down: FloatArray
-    radius: FloatArray
+    across: FloatingArray
+    down: FloatingArray
+    radius: FloatingArray
 
 
 def film_places(height: int, width: int) -> FilmPlaces:

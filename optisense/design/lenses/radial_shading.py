@@ -9,15 +9,12 @@ from __future__ import annotations
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import Number
 from optisense.design.lenses.film import FilmPlaces
 from optisense.design.lenses.shading import LensShading
-
-FloatArray = NDArray[np.floating]
-
 
 Falloff = Annotated[Number, Field(ge=0.0, lt=1.0)]
 
@@ -41,7 +38,7 @@ class RadialShading(LensShading):
         default=2.0, description="power of the distance with which the loss grows"
     )
 
-    def transmission(self, places: FilmPlaces) -> FloatArray:
+    def transmission(self, places: FilmPlaces) -> FloatingArray:
         """Return the transmission (h, w, 3): 1 in the middle, 1 - falloff in the corners."""
         each = [
             self.falloff if own is None else own

@@ -10,17 +10,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import Fraction
 from optisense.design.kinds import KindModel
 from optisense.design.lenses.film import FilmPlaces
 from optisense.errors import DesignError
 from optisense.registry import Registry
-
-FloatArray = NDArray[np.floating]
 
 
 class LensShading(KindModel):
@@ -42,11 +39,11 @@ class LensShading(KindModel):
     )
 
     @abstractmethod
-    def transmission(self, places: FilmPlaces) -> FloatArray:
+    def transmission(self, places: FilmPlaces) -> FloatingArray:
         """Return the share of the light of R, G and B that reaches the sensor, (h, w, 3), above
         0.
         """
 
-    def correction(self, transmission: FloatArray) -> FloatArray:
+    def correction(self, transmission: FloatingArray) -> FloatingArray:
         """Return the gain (h, w, 3) by which the processor undoes a transmission."""
         return 1.0 + self.corrected * (1.0 / transmission - 1.0)

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import Fraction, InconsistentValueError
 from optisense.design.responses._tone_curve import ToneCurve
-
-FloatArray = NDArray[np.floating]
 
 
 class PointsCurve(ToneCurve):
@@ -44,6 +43,6 @@ class PointsCurve(ToneCurve):
             )
         return self
 
-    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+    def curve(self, linear: FloatingArray) -> NDArray[np.float64]:
         """Return the stored levels (...), 0 to 1, interpolated between the points."""
         return np.interp(np.clip(linear, 0.0, 1.0), *np.array(self.points).T)

@@ -7,10 +7,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.colour import encode, srgb_curve
 from optisense.design.responses._tone_curve import ToneCurve
-
-FloatArray = NDArray[np.floating]
 
 
 class SrgbCurve(ToneCurve):
@@ -20,10 +19,10 @@ class SrgbCurve(ToneCurve):
 
     kind: Literal["srgb"] = "srgb"
 
-    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+    def curve(self, linear: FloatingArray) -> NDArray[np.float64]:
         """Return the stored levels (...), 0 to 1: a power of 1 / 2.4, linear in the dark."""
         return srgb_curve(linear)
 
-    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+    def encode(self, linear: FloatingArray) -> NDArray[np.uint8]:
         """Return the stored levels (...) in 8 bits, in single precision."""
         return encode(linear)

@@ -8,11 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError
 from optisense.registry import Registry
-
-FloatArray = NDArray[np.floating]
 
 
 class ToneCurve(KindModel):
@@ -30,12 +29,12 @@ class ToneCurve(KindModel):
     )
 
     @abstractmethod
-    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+    def curve(self, linear: FloatingArray) -> NDArray[np.float64]:
         """Return the stored levels (...), 0 to 1 before rounding, of linear levels (...).
 
         Linear levels are clipped to 0..1.
         """
 
-    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+    def encode(self, linear: FloatingArray) -> NDArray[np.uint8]:
         """Return the stored levels (...) in 8 bits."""
         return np.round(255.0 * self.curve(linear)).astype(np.uint8)

@@ -8,12 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.colour import srgb_curve
 from optisense.design.kinds import KindModel
 from optisense.errors import DesignError
 from optisense.registry import Registry
-
-FloatArray = NDArray[np.floating]
 
 EXPOSURE_TARGET = 0.55
 """Level (of 1, before the transfer curve) to which automatic exposure maps the 95th percentile of
@@ -37,7 +36,7 @@ class CameraResponse(KindModel):
     )
 
     @abstractmethod
-    def respond(self, exposed: FloatArray, width: int | None = None) -> NDArray[np.float32]:
+    def respond(self, exposed: FloatingArray, width: int | None = None) -> NDArray[np.float32]:
         """Return the sensor's reading, (h, w, 3), linear, 0 to 1.
 
         Args:
@@ -58,22 +57,22 @@ class CameraResponse(KindModel):
         """
         return 0
 
-    def spreads(self, exposed: FloatArray) -> bool:
+    def spreads(self, exposed: FloatingArray) -> bool:
         """Return whether light in some pixel of exposed levels (h, w, 3) changes others."""
         return self.reach(exposed.shape[1]) > 0
 
-    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+    def curve(self, linear: FloatingArray) -> NDArray[np.float64]:
         """Return the stored levels (...), 0 to 1 before rounding, of readings (...), 0 to 1.
 
         They follow the sRGB curve unless a kind has its own.
         """
         return srgb_curve(linear)
 
-    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+    def encode(self, linear: FloatingArray) -> NDArray[np.uint8]:
         """Return the stored levels (...) in 8 bits of readings (...), 0 to 1."""
         return np.round(255.0 * self.curve(linear)).astype(np.uint8)
 
-    def auto_exposure(self, radiance: FloatArray) -> float:
+    def auto_exposure(self, radiance: FloatingArray) -> float:
         """Return the exposure, a factor on radiance, that gives a well exposed picture of radiance
         (h, w, 3).
         """
@@ -83,7 +82,7 @@ class CameraResponse(KindModel):
         return EXPOSURE_TARGET * self.full_level() / level if level > 0 else 1.0
 
 
-def brightest(image: FloatArray) -> FloatArray:
+def brightest(image: FloatingArray) -> FloatingArray:
     """Return the largest channel (h, w) of an image (h, w, 3).
 
     This is several times faster than NumPy's maximum along an axis of 3.

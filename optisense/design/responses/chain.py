@@ -20,6 +20,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import Colour, PositiveRGB
 from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurred, reach_of
 from optisense.design.lenses.film import PictureWindow, film_places
@@ -36,8 +37,6 @@ from optisense.design.responses.electronics import (
 )
 from optisense.design.responses.full_well import FullWellResponse
 
-FloatArray = NDArray[np.floating]
-
 USUAL_RESPONSE = FullWellResponse()
 """Response of a camera whose design names none."""
 
@@ -51,15 +50,17 @@ class SoftFocus:
             (1, 1).
     """
 
-    deviation: FloatArray
+    deviation: FloatingArray
 
     @classmethod
-    def of(cls, blur: LensBlur, camera: LensView, vergence: FloatArray | None = None) -> SoftFocus:
+    def of(
+        cls, blur: LensBlur, camera: LensView, vergence: FloatingArray | None = None
+    ) -> SoftFocus:
         """Return the blur of a lens; `vergence` (h, w), 1/mm, is needed if it depends on depth."""
         given = np.zeros((1, 1)) if vergence is None else vergence
         return cls(np.atleast_2d(blur.deviation(camera, given)))
 
-    def in_pixels(self, window: PictureWindow) -> FloatArray:
+    def in_pixels(self, window: PictureWindow) -> FloatingArray:
         """Return the standard deviation (h, w), in pixels, for a window of a picture."""
         from scipy.ndimage import map_coordinates  # takes a third of a second to load
 
@@ -121,7 +122,7 @@ class PictureChain:
         return self if self.noise is None else replace(self, noise=None)
 
     def respond(
-        self, exposed: FloatArray, window: PictureWindow | None = None, seed: NoiseSeed = 0
+        self, exposed: FloatingArray, window: PictureWindow | None = None, seed: NoiseSeed = 0
     ) -> NDArray[np.float32]:
         """Return the linear levels (h, w, 3), 0 to 1, from which the tone curve makes the picture.
 
@@ -136,7 +137,7 @@ class PictureChain:
         level = self.response.respond(self._on_sensor(exposed, place), place.width)
         return self._processed(self._read(level, place, seed), place)
 
-    def linear(self, exposed: FloatArray) -> NDArray[np.float32]:
+    def linear(self, exposed: FloatingArray) -> NDArray[np.float32]:
         """Return levels (h, w, 3) without noise, overexposure and clipping.
 
         These levels are additive: those of a sum of lights are the sum of their levels.
@@ -151,16 +152,16 @@ class PictureChain:
         level = self._balanced(self._on_sensor(exposed, window), transmission)
         return np.asarray(level, dtype=np.float32)
 
-    def _on_sensor(self, exposed: FloatArray, window: PictureWindow) -> FloatArray:
+    def _on_sensor(self, exposed: FloatingArray, window: PictureWindow) -> FloatingArray:
         """Return the levels that fill the pixels of the sensor, before they saturate."""
-        level: FloatArray = np.asarray(exposed, dtype=np.float32)
+        level: FloatingArray = np.asarray(exposed, dtype=np.float32)
         if self.focus is not None:
             level = blurred(level, self.focus.in_pixels(window), self.focus.span(window.width))
         if self.crosstalk is not None:
             level = mixed(level, self.crosstalk)
         return level if self.shading is None else level * self._transmission(window)
 
-    def _read(self, level: FloatArray, window: PictureWindow, seed: NoiseSeed) -> FloatArray:
+    def _read(self, level: FloatingArray, window: PictureWindow, seed: NoiseSeed) -> FloatingArray:
         """Return the sensor's output for filled pixels, minus the black level."""
         if self.stray_light is not None:
             level = level + np.array(self.stray_light, dtype=np.float32)
@@ -171,25 +172,25 @@ class PictureChain:
             return self.black_level.subtract(self.black_level.read(level))
         return np.clip(level, 0.0, 1.0)
 
-    def _processed(self, level: FloatArray, window: PictureWindow) -> NDArray[np.float32]:
+    def _processed(self, level: FloatingArray, window: PictureWindow) -> NDArray[np.float32]:
         """Return the processor's output for levels above black."""
         level = self._balanced(level, None if self.shading is None else self._transmission(window))
         return np.clip(level, 0.0, 1.0).astype(np.float32, copy=False)
 
-    def _balanced(self, level: FloatArray, transmission: FloatArray | None) -> FloatArray:
+    def _balanced(self, level: FloatingArray, transmission: FloatingArray | None) -> FloatingArray:
         if self.shading is not None and transmission is not None:
             level = level * self.shading.correction(transmission).astype(np.float32)
         if self.white_balance is not None:
             level = level * np.array(self.white_balance, dtype=np.float32)
         return level if self.colour_matrix is None else mixed(level, self.colour_matrix)
 
-    def _transmission(self, window: PictureWindow) -> FloatArray:
+    def _transmission(self, window: PictureWindow) -> FloatingArray:
         assert self.shading is not None
         data = self.shading.model_dump_json()
         return _transmission(_Shown(self.shading, data), window.height, window.width)[window.box]
 
     def metered(
-        self, radiance: FloatArray, where: NDArray[np.bool_] | None = None
+        self, radiance: FloatingArray, where: NDArray[np.bool_] | None = None
     ) -> NDArray[np.floating]:
         """Return the input of automatic exposure: levels that must not exceed the full one.
 
@@ -202,7 +203,7 @@ class PictureChain:
         """
         if self.is_plain:
             return radiance
-        level: FloatArray = np.asarray(radiance, dtype=np.float32)
+        level: FloatingArray = np.asarray(radiance, dtype=np.float32)
         transmission = None
         if self.crosstalk is not None:
             level = mixed(level, self.crosstalk)
@@ -213,7 +214,7 @@ class PictureChain:
             level = level * transmission
         return np.maximum(level, self._balanced(level, transmission))
 
-    def auto_exposure(self, radiance: FloatArray) -> float:
+    def auto_exposure(self, radiance: FloatingArray) -> float:
         """Return the exposure, a factor on radiance, that gives a well exposed picture of radiance
         (h, w, 3).
         """
@@ -232,7 +233,7 @@ class PictureChain:
         own = self.response.reach(width)
         return own if not self._softens(width) else own + reach_of(self._largest, width)
 
-    def spreads(self, exposed: FloatArray, window: PictureWindow | None = None) -> bool:
+    def spreads(self, exposed: FloatingArray, window: PictureWindow | None = None) -> bool:
         """Return whether light in some pixel changes others.
 
         Args:
@@ -251,11 +252,11 @@ class PictureChain:
     def _softens(self, width: int) -> bool:
         return self._largest * width >= LEAST_WIDTH
 
-    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+    def curve(self, linear: FloatingArray) -> NDArray[np.float64]:
         """Return the stored levels (...), 0 to 1 before rounding, of linear levels (...)."""
         return (self.tone_curve or self.response).curve(linear)
 
-    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+    def encode(self, linear: FloatingArray) -> NDArray[np.uint8]:
         """Return the stored levels (...) in 8 bits of linear levels (...), 0 to 1."""
         return (self.tone_curve or self.response).encode(linear)
 
@@ -275,7 +276,7 @@ class _Shown:
 
 
 @lru_cache(maxsize=4)
-def _transmission(shown: _Shown, height: int, width: int) -> FloatArray:
+def _transmission(shown: _Shown, height: int, width: int) -> FloatingArray:
     found = shown.shading.transmission(film_places(height, width)).astype(np.float32)
     found.setflags(write=False)
     return found

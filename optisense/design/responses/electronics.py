@@ -10,12 +10,10 @@ from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import Fraction, Model, NonNegative, Number, Positive
-
-FloatArray = NDArray[np.floating]
 
 Row = tuple[Number, Number, Number]
 
@@ -45,11 +43,11 @@ class BlackLevel(Model):
         default=1.0, description="share of it that the processor subtracts first"
     )
 
-    def read(self, level: FloatArray) -> FloatArray:
+    def read(self, level: FloatingArray) -> FloatingArray:
         """Return the converter's output (...), 0 to 1, for levels (...) relative to black."""
         return np.clip(self.level + (1.0 - self.level) * level, 0.0, 1.0)
 
-    def subtract(self, read: FloatArray) -> FloatArray:
+    def subtract(self, read: FloatingArray) -> FloatingArray:
         """Return the levels (...) above the assumed black, scaled so that a full pixel stays at 1.
 
         Args:
@@ -80,13 +78,13 @@ class SensorNoise(Model):
         default=1.0, description="pixels of the sensor whose mean is one pixel of the picture"
     )
 
-    def deviation(self, level: FloatArray) -> FloatArray:
+    def deviation(self, level: FloatingArray) -> FloatingArray:
         """Return the standard deviation (...) of levels (...), as a share of a full pixel."""
         per_electron = self.gain / self.full_well
         shot = np.maximum(level, 0.0) * per_electron
         return np.sqrt((shot + (self.read_noise * per_electron) ** 2) / self.binning)
 
-    def add(self, level: FloatArray, normal: FloatArray) -> FloatArray:
+    def add(self, level: FloatingArray, normal: FloatingArray) -> FloatingArray:
         """Return levels with noise.
 
         Args:
@@ -96,7 +94,7 @@ class SensorNoise(Model):
         return level + self.deviation(level) * normal
 
 
-def normal_numbers(seed: NoiseSeed | Sequence[int], height: int, width: int) -> FloatArray:
+def normal_numbers(seed: NoiseSeed | Sequence[int], height: int, width: int) -> FloatingArray:
     """Return numbers (h, w, 3) of the standard normal distribution for all pixels of a picture.
 
     The same seed and size give the same array, which must not be changed.
@@ -105,13 +103,13 @@ def normal_numbers(seed: NoiseSeed | Sequence[int], height: int, width: int) -> 
 
 
 @lru_cache(maxsize=2)
-def _normal_numbers(seed: NoiseSeed, height: int, width: int) -> FloatArray:
+def _normal_numbers(seed: NoiseSeed, height: int, width: int) -> FloatingArray:
     numbers = np.random.default_rng(seed).standard_normal((height, width, 3), dtype=np.float32)
     numbers.setflags(write=False)
     return numbers
 
 
-def mixed(levels: FloatArray, matrix: ChannelMatrix) -> FloatArray:
+def mixed(levels: FloatingArray, matrix: ChannelMatrix) -> FloatingArray:
     """Return levels (..., 3) with their channels mixed by a matrix."""
-    mix: FloatArray = levels @ np.array(matrix, dtype=np.float32).T
+    mix: FloatingArray = levels @ np.array(matrix, dtype=np.float32).T
     return mix

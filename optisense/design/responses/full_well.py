@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.array_types import FloatingArray
 from optisense.design.colour import encode
 from optisense.design.fields import NonNegative, Positive
-from optisense.design.responses.base import CameraResponse, FloatArray, brightest
+from optisense.design.responses.base import CameraResponse, brightest
 
 MAX_EXCESS = 4.0
 """Largest excess over the full well that the mask counts, as a multiple of a full pixel, so that a
@@ -52,11 +53,11 @@ class FullWellResponse(CameraResponse):
         """Return the radius of the blur, in pixels."""
         return int(BLUR_REACH * self.blur * width) + SPARE
 
-    def spreads(self, exposed: FloatArray) -> bool:
+    def spreads(self, exposed: FloatingArray) -> bool:
         """Return whether a pixel of exposed levels (h, w, 3) is overexposed."""
         return bool(exposed.max() > self.full_well)
 
-    def respond(self, exposed: FloatArray, width: int | None = None) -> NDArray[np.float32]:
+    def respond(self, exposed: FloatingArray, width: int | None = None) -> NDArray[np.float32]:
         """Return the reading (h, w, 3), with overexposure spread over the channels, and clipped.
 
         Args:
@@ -75,6 +76,6 @@ class FullWellResponse(CameraResponse):
             )
         return np.clip(exposed, 0.0, 1.0, dtype=np.float32)
 
-    def encode(self, linear: FloatArray) -> NDArray[np.uint8]:
+    def encode(self, linear: FloatingArray) -> NDArray[np.uint8]:
         """Return the stored levels (...) in 8 bits, by the sRGB curve in single precision."""
         return encode(linear)

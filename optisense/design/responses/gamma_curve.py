@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from optisense.array_types import FloatingArray
 from optisense.design.fields import Positive
 from optisense.design.responses._tone_curve import ToneCurve
-
-FloatArray = NDArray[np.floating]
 
 
 class GammaCurve(ToneCurve):
@@ -22,7 +21,7 @@ class GammaCurve(ToneCurve):
     kind: Literal["gamma"] = "gamma"
     gamma: Positive = Field(default=2.2, description="1 stores linear levels", examples=[2.2])
 
-    def curve(self, linear: FloatArray) -> NDArray[np.float64]:
+    def curve(self, linear: FloatingArray) -> NDArray[np.float64]:
         """Return the stored levels (...), 0 to 1: a power of linear levels (...)."""
         level = np.clip(np.asarray(linear, dtype=float), 0.0, 1.0)
         return np.asarray(level ** (1.0 / self.gamma))

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.responses import PictureChain
 from optisense.design.responses.electronics import NoiseSeed
 from optisense.errors import RenderError
 
-FloatArray = NDArray[np.floating]
-
 
 def picture(
-    radiance: FloatArray,
+    radiance: FloatingArray,
     exposure: float | str = "auto",
     chain: PictureChain | None = None,
     noise_seed: NoiseSeed = 0,

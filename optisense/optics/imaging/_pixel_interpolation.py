@@ -12,11 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.array_types import BoolArray
+from optisense.array_types import BoolArray, FloatingArray
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.chief_rays import ChiefRays
-
-FloatArray = NDArray[np.floating]
 
 MAX_OFFSET = 0.2
 """Largest distance of a pixel's surface point from the centre of its neighbours' points, relative
@@ -57,7 +55,7 @@ def between_rays(rays: ChiefRays, where: BoolArray) -> BoolArray:
     return out
 
 
-def agreed(layers: FloatArray, where: BoolArray) -> BoolArray:
+def agreed(layers: FloatingArray, where: BoolArray) -> BoolArray:
     """Return the mask (h, w) of the pixels of a mask ``where`` (h, w) whose even neighbours agree
     in their light ``layers`` (groups, h, w, 3).
     """

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-FloatArray = NDArray[np.floating]
+from optisense.array_types import FloatingArray
 
 NOISIEST_SHARE = 0.05
 """Share of the area in view that counts as the worst places when their noise is reported: small
@@ -20,7 +20,7 @@ DARKEST_JUDGED = 0.1
 that very dark places do not decide the result."""
 
 
-def relative_noise(light: FloatArray, square: FloatArray) -> float:
+def relative_noise(light: FloatingArray, square: FloatingArray) -> float:
     """Return the relative RMS noise (1 = 100 %) over cells and light groups.
 
     Args:
@@ -35,10 +35,10 @@ def relative_noise(light: FloatArray, square: FloatArray) -> float:
 
 
 def noise_of_worst_places(
-    light: FloatArray,
-    square: FloatArray,
+    light: FloatingArray,
+    square: FloatingArray,
     near: NDArray[np.bool_],
-    areas: FloatArray,
+    areas: FloatingArray,
     kernel: csr_matrix,
 ) -> float:
     """Return the relative RMS noise (1 = 100 %) that the noisiest 5 % of the area have at least.

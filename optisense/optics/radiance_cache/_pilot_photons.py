@@ -9,11 +9,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
-
-FloatArray = NDArray[np.floating]
 
 GRAZING_COSINE = 0.25
 """Cosine of incidence (76 degrees) below which light is grazing. Light that passes 1 mm above a
@@ -36,9 +35,9 @@ class PilotPhotons:
         halves: (n,) the half of the photons that each landing belongs to, 0 or 1.
     """
 
-    points: FloatArray
-    cosines: FloatArray
-    powers: FloatArray
+    points: FloatingArray
+    cosines: FloatingArray
+    powers: FloatingArray
     groups: NDArray[np.integer]
     halves: NDArray[np.integer]
 
@@ -73,7 +72,7 @@ class PilotPhotons:
         kept = found & where[cell]
         return PilotPhotons(*(getattr(self, field.name)[kept] for field in fields(self)))
 
-    def landed(self, cells: SurfaceCells, groups: int) -> FloatArray:
+    def landed(self, cells: SurfaceCells, groups: int) -> FloatingArray:
         """Return the power (2, cells, groups), mW, on each cell for each half of the photons."""
         cell, found = self.cells_of(cells)
         rows = (self.halves.astype(np.int64) * cells.cells + cell) * groups + self.groups

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix, diags, identity
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatingArray
 from optisense.optics.scene.surface_cells import SurfaceCells
-
-FloatArray = NDArray[np.floating]
 
 REFERENCE_RADIUS = 1.6
 """Kernel radius (mm) at `REFERENCE_DENSITY` and `REFERENCE_LENGTH`: the one that minimises the sum
@@ -77,7 +76,7 @@ class Smoothing:
 
     kernel: csr_matrix
     blur: csr_matrix
-    strength: FloatArray
+    strength: FloatingArray
     correction: csr_matrix | None
 
 
@@ -87,10 +86,10 @@ class Kernels:
     def __init__(
         self,
         cells: SurfaceCells,
-        lamp_distance: FloatArray,
+        lamp_distance: FloatingArray,
         density: float,
         near: NDArray[np.bool_] | None = None,
-        pilot_power: FloatArray | None = None,
+        pilot_power: FloatingArray | None = None,
         pilot_density: float = 0.0,
     ) -> None:
         """Find the length over which light varies in each cell.
@@ -114,11 +113,11 @@ class Kernels:
             self._length = np.minimum(self._length, found)
         self._known: dict[tuple[int, bool], Smoothing] = {}
 
-    def radii(self, photons: int) -> FloatArray:
+    def radii(self, photons: int) -> FloatingArray:
         """Return the kernel radius (cells,), mm, for this number of emitted photons."""
         return self._radii(self.density * photons)
 
-    def _radii(self, density: float) -> FloatArray:
+    def _radii(self, density: float) -> FloatingArray:
         wider = (REFERENCE_DENSITY / max(density, 1e-9)) ** DENSITY_EXPONENT
         best = REFERENCE_RADIUS * (self._length / REFERENCE_LENGTH) ** LENGTH_EXPONENT * wider
         least = (
@@ -150,11 +149,11 @@ class Kernels:
             self._known = {key: Smoothing(matrix, blur, strength, twice)}
         return self._known[key]
 
-    def _twice(self, blur: csr_matrix, strength: FloatArray) -> csr_matrix:
+    def _twice(self, blur: csr_matrix, strength: FloatingArray) -> csr_matrix:
         scale = diags(np.where(self.near, strength, 0.0))
         return (identity(self.cells.cells) + scale - scale @ blur @ diags(self.cells.areas)).tocsr()
 
-    def _second_moment(self, kernel: csr_matrix) -> FloatArray:
+    def _second_moment(self, kernel: csr_matrix) -> FloatingArray:
         """Return the mean squared distance (cells,), mm^2, over which a kernel spreads light. That
         of Epanechnikov's kernel is a third of its squared radius if it holds many cells.
         """
@@ -164,7 +163,7 @@ class Kernels:
         cross = 2 * np.einsum("ij,ij->i", means, centres)
         return np.asarray(squares - cross + (centres**2).sum(axis=1))
 
-    def sharpening(self, landed: FloatArray, photons: int) -> FloatArray:
+    def sharpening(self, landed: FloatingArray, photons: int) -> FloatingArray:
         """Return factors (cells, groups) that undo most of the blur of the kernel and the cells.
 
         The kernel lowers peaks and fills hollows. Smoothing the smoothed light once more shows by
@@ -184,7 +183,7 @@ class Kernels:
         return 1 + np.clip(change, -MAX_SHARPENING, MAX_SHARPENING)
 
 
-def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> FloatArray:
+def varies_over(cells: SurfaceCells, halves: FloatingArray, radii: FloatingArray) -> FloatingArray:
     """Return the length (cells,), mm, over which light varies.
 
     It is the distance of a lamp whose light the kernel would blur as much: under a lamp at distance
@@ -210,7 +209,7 @@ def varies_over(cells: SurfaceCells, halves: FloatArray, radii: FloatArray) -> F
     return np.asarray(radii / np.sqrt(2 * np.maximum(relative, 1e-9)))
 
 
-def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
+def kernel_matrix(cells: SurfaceCells, radii: FloatingArray) -> csr_matrix:
     """Return Epanechnikov's kernel (cells, cells) around each cell, which maps mW on cells to
     mW/mm^2.
 
@@ -228,8 +227,8 @@ def kernel_matrix(cells: SurfaceCells, radii: FloatArray) -> csr_matrix:
 
 
 def _pairs_within(
-    places: FloatArray, radii: FloatArray
-) -> tuple[NDArray[np.integer], NDArray[np.integer], FloatArray]:
+    places: FloatingArray, radii: FloatingArray
+) -> tuple[NDArray[np.integer], NDArray[np.integer], FloatingArray]:
     """Return the pairs (m,) of places that are closer than the radius of the first, and their
     distances (m,), mm, in ascending order of the first and of the second.
 

@@ -11,6 +11,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.optics.backend.arrays import floats
 from optisense.optics.radiance_cache._direction_bins import (
     COARSE_BINS,
@@ -32,8 +33,6 @@ from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, produc
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
 from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
-
-FloatArray = NDArray[np.floating]
 
 MIN_COSINE = 0.02
 """Lower bound on the cosine of incidence (89 degrees) that a photon's power is divided by, so that
@@ -193,7 +192,7 @@ class CacheTally:
         near, areas = self.kernels.near, self.cells.areas
         return noise_of_worst_places(*self._light_and_variance(), near, areas, kernel)
 
-    def _light_and_variance(self) -> tuple[FloatArray, FloatArray]:
+    def _light_and_variance(self) -> tuple[FloatingArray, FloatingArray]:
         """Return the smoothed irradiance (cells, groups), mW/mm^2, and its squared standard
         deviation.
         """
@@ -239,7 +238,7 @@ class CacheTally:
         dense = self.planes > 1 and self.kernels.density * self.photons >= DENSE
         return self.kernels.smoothing(self.photons, self.directions.corrected or dense)
 
-    def _landed(self) -> FloatArray:
+    def _landed(self) -> FloatingArray:
         """Return the power (planes, 2, cells, groups), mW, of the photons of even and odd number in
         each cell of each plane.
         """

@@ -16,13 +16,11 @@ from functools import lru_cache
 import drjit as dr
 import mitsuba as mi
 import numpy as np
-from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.design.emitters import Intensity
 from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, RGB
-
-FloatArray = NDArray[np.floating]
 
 POLAR_CELLS = 512
 """Number of polar cells of a tabulated profile; cells towards the rim hold less power. With 512,
@@ -80,7 +78,7 @@ class Emitter:
         return float(self.size[0] * self.size[1] * filled)
 
     @property
-    def frame(self) -> FloatArray:
+    def frame(self) -> FloatingArray:
         """Return the unit vectors (3, 3) of width axis, height axis and direction, as rows."""
         return frame_of(self.direction, self.up)
 
@@ -88,7 +86,7 @@ class Emitter:
 @lru_cache(maxsize=4096)
 def frame_of(
     direction: tuple[float, float, float], up: tuple[float, float, float] | None
-) -> FloatArray:
+) -> FloatingArray:
     """Return the unit vectors (3, 3) of width axis, height axis and direction of a light, as rows.
 
     The array is shared between calls and must not be changed.
@@ -121,7 +119,7 @@ class EmitterTable:
     emitters: list[Emitter] = field(default_factory=list)
 
 
-def inverse_tables(intensity: Intensity) -> tuple[FloatArray, FloatArray]:
+def inverse_tables(intensity: Intensity) -> tuple[FloatingArray, FloatingArray]:
     """Return the inverse tables of an angular profile.
 
     Returns:
@@ -167,8 +165,8 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
     """Copy lights to the device; lights that share an intensity table share its inverse."""
     rows = np.zeros((len(emitters), FLOATS_PER_EMITTER), dtype=np.float32)
     profiles: dict[int, int] = {}
-    polar: list[FloatArray] = []
-    azimuth: list[FloatArray] = []
+    polar: list[FloatingArray] = []
+    azimuth: list[FloatingArray] = []
     for row, emitter in zip(rows, emitters, strict=True):
         profile = -1
         if emitter.intensity is not None:

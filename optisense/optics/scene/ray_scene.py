@@ -19,12 +19,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.array_types import FloatingArray
 from optisense.geometry.connected import connected_components
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.bsdf import SMOOTH_ALPHA, surface_table
 from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
-
-FloatArray = NDArray[np.floating]
 
 SMOOTH_FACE = 1 << 16
 """Bit in a face's record that marks interpolated normals: the first bit above those of a surface's
@@ -52,10 +51,10 @@ class Piece:
     """
 
     name: str
-    vertices: FloatArray
+    vertices: FloatingArray
     faces: NDArray[np.integer]
     surface: Surface
-    normals: FloatArray | None = None
+    normals: FloatingArray | None = None
 
     @cached_property
     def rows(self) -> NDArray[np.float32]:
@@ -337,7 +336,7 @@ def leave(point: mi.Point3f, normal: mi.Vector3f, direction: mi.Vector3f) -> mi.
 
 def _merge(
     pieces: list[Piece], numbers: list[int]
-) -> tuple[FloatArray, NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[FloatingArray, NDArray[np.uint32], NDArray[np.float32], NDArray[np.float32]]:
     vertices, faces, rows = [], [], []
     start = 0
     for number, piece in zip(numbers, pieces, strict=True):

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
+from optisense.array_types import FloatingArray
 from optisense.optics.backend.arrays import floats, indices
-
-FloatArray = NDArray[np.floating]
 
 SAMPLES_ACROSS = 7
 """Number of samples of the surface along the side of a cell. Seven give the cell's area to a few
@@ -61,16 +60,16 @@ class SurfaceCells:
     creased: bool
     cells: int
     planes: mi.Float
-    centres: FloatArray
-    normals: FloatArray
-    areas: FloatArray
-    offset_growth: FloatArray
-    axes: FloatArray
+    centres: FloatingArray
+    normals: FloatingArray
+    areas: FloatingArray
+    offset_growth: FloatingArray
+    axes: FloatingArray
 
 
 def surface_samples(
-    vertices: FloatArray, faces: NDArray[np.integer], spacing: float
-) -> tuple[FloatArray, NDArray[np.integer], FloatArray]:
+    vertices: FloatingArray, faces: NDArray[np.integer], spacing: float
+) -> tuple[FloatingArray, NDArray[np.integer], FloatingArray]:
     """Spread sample points evenly over a mesh, about one per ``spacing`` squared.
 
     Returns:
@@ -95,7 +94,9 @@ def surface_samples(
     return points, owner, (area / count)[owner]
 
 
-def _twice_areas(vertices: FloatArray, faces: NDArray[np.integer]) -> tuple[FloatArray, FloatArray]:
+def _twice_areas(
+    vertices: FloatingArray, faces: NDArray[np.integer]
+) -> tuple[FloatingArray, FloatingArray]:
     """Return the normals (m, 3) of faces with lengths of twice their areas (mm^2), and these
     lengths (m,).
     """
@@ -105,10 +106,10 @@ def _twice_areas(vertices: FloatArray, faces: NDArray[np.integer]) -> tuple[Floa
 
 
 def build_cells(
-    vertices: FloatArray,
+    vertices: FloatingArray,
     faces: NDArray[np.integer],
     size: float,
-    normals: FloatArray | None = None,
+    normals: FloatingArray | None = None,
 ) -> SurfaceCells:
     """Divide a mesh into cells.
 
@@ -164,7 +165,9 @@ def build_cells(
     )
 
 
-def _growth(corners: FloatArray, normals: FloatArray, upright: FloatArray) -> FloatArray:
+def _growth(
+    corners: FloatingArray, normals: FloatingArray, upright: FloatingArray
+) -> FloatingArray:
     """Return the coefficients (m, 2) of `SurfaceCells.offset_growth` for each face.
 
     Args:
@@ -175,7 +178,7 @@ def _growth(corners: FloatArray, normals: FloatArray, upright: FloatArray) -> Fl
     side, other = (corners[:, k] - corners[:, 0] for k in (1, 2))
     turn, other_turn = (normals[:, k] - normals[:, 0] for k in (1, 2))
 
-    def area(one: FloatArray, two: FloatArray) -> FloatArray:
+    def area(one: FloatingArray, two: FloatingArray) -> FloatingArray:
         return np.asarray(np.einsum("mi,mi->m", np.cross(one, two), upright))
 
     linear = area(side, other_turn) + area(turn, other)
@@ -185,15 +188,15 @@ def _growth(corners: FloatArray, normals: FloatArray, upright: FloatArray) -> Fl
 def _means(
     owner: NDArray[np.int64],
     cells: int,
-    points: FloatArray,
-    normals: FloatArray,
-    areas: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+    points: FloatingArray,
+    normals: FloatingArray,
+    areas: FloatingArray,
+) -> tuple[FloatingArray, FloatingArray, FloatingArray]:
     """Return area (cells,), centre (cells, 3) and mean unit normal (cells, 3) of cells, whose
     samples `owner` tells.
     """
 
-    def total(values: FloatArray) -> FloatArray:
+    def total(values: FloatingArray) -> FloatingArray:
         return np.asarray(np.bincount(owner, values, cells), dtype=np.float64)
 
     area = total(areas)
@@ -205,7 +208,7 @@ def _means(
 
 
 def _divided(
-    owner: NDArray[np.int64], points: FloatArray, normals: FloatArray, areas: FloatArray
+    owner: NDArray[np.int64], points: FloatingArray, normals: FloatingArray, areas: FloatingArray
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Divide the places that a crease runs through into two cells.
 
@@ -228,7 +231,7 @@ def _divided(
     inside = np.flatnonzero(number[owner] >= 0)
     home, spots, ways = number[owner[inside]], points[:, inside], normals[inside]
 
-    def farthest(seeds: FloatArray) -> FloatArray:
+    def farthest(seeds: FloatingArray) -> FloatingArray:
         """Return the normal at each place that differs most from its seed."""
         order = np.lexsort((np.einsum("ij,ij->i", seeds[home], ways), home))
         return np.asarray(ways[order[np.searchsorted(home[order], np.arange(len(suspects)))]])
@@ -240,7 +243,7 @@ def _divided(
     halves = np.where(towards > 0, beyond, home)
     _, centre, normal = _means(halves, 2 * len(suspects), spots, ways, areas[inside])
 
-    def away(cell: NDArray[np.int64]) -> FloatArray:
+    def away(cell: NDArray[np.int64]) -> FloatingArray:
         return np.asarray(np.abs(np.einsum("ij,ij->i", normal[cell], spots.T - centre[cell])))
 
     # Where all samples lie in one plane, as on the two sides of a sheet, the place stays one cell.
@@ -268,7 +271,7 @@ def _index(used: NDArray[np.int64], counts: NDArray[np.int64]) -> NDArray[np.uin
     return np.asarray(near.ravel(), dtype=np.uint32)
 
 
-def _frame(z: FloatArray) -> FloatArray:
+def _frame(z: FloatingArray) -> FloatingArray:
     z = z / np.linalg.norm(z) if np.linalg.norm(z) > 1e-6 else np.array([0.0, 0.0, 1.0])
     x = np.cross((1.0, 0.0, 0.0) if abs(z[0]) < 0.9 else (0.0, 1.0, 0.0), z)
     x /= np.linalg.norm(x)
