@@ -6,7 +6,7 @@ GitHub nor Sphinx:
 ```console                          the commands after "$ "; each must end with exit code 0
 ```console exit=2                   the commands end with this exit code
 ```console enter                    the reader presses Enter at every question
-```console long                     takes minutes; a quick variant is beside it
+```console long                     takes minutes; a quick variant is typed, too
 ```console not-run="opens Blender"  can't be run by a test, for this reason
 ```python                           typed into one Python session for each page
 ```python save=rules.py             saved under this name (a block of any language)

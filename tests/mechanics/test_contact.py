@@ -60,7 +60,7 @@ def test_a_thin_compressible_gel_yields_as_a_bed_of_springs():
 def test_contactmechanics_finds_the_same_force_and_radius(
     thickness, poisson_ratio, radius, depth, box
 ):
-    points = 800
+    points = 500
     pitch = box / points
     layer = PeriodicFFTElasticHalfSpace(
         (points, points), 1.0, (box, box), thickness=thickness, poisson=poisson_ratio
