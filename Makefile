@@ -63,9 +63,9 @@ demo: setup
 
 # Each of these runs whatever becomes of the others, two at a time; a summary at the end says what
 # failed. Those that take longest begin first.
-LOTS := optics search cli tasks objectives
-CHECKS := pytest-rest pytest-docs studio-tests $(LOTS:%=pytest-%) types bare-pytest docs lint \
-    import-rules
+LOTS := optics search sensors calibration cli tasks objectives
+CHECKS := pytest-rest pytest-optics studio-tests pytest-docs pytest-search pytest-sensors \
+    pytest-calibration pytest-cli pytest-tasks types pytest-objectives docs bare-pytest lint import-rules
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 

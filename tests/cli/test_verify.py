@@ -54,14 +54,6 @@ def test_a_study_is_compared_with_its_start(study: Path, tmp_path: Path) -> None
     assert values["normals"]["before"] > 0.0
 
 
-def test_two_designs_are_compared() -> None:
-    code, text, told = run("gelsight-mini-ideal", "gelsight-mini-ideal", *TINY, "--json")
-    assert code == 0, told
-    values = json.loads(text)
-    assert values["normals"]["change"] == 0.0
-    assert values["same_places"] is True
-
-
 def test_one_design_alone_is_refused() -> None:
     code, _, told = run("gelsight-mini")
     assert code == 2

@@ -109,7 +109,7 @@ def test_a_long_block_says_how_long_it_takes_and_has_a_quick_variant() -> None:
     for page, shown in BLOCKS.items():
         lines = page.read_text(encoding="utf-8").splitlines()
         for block in (each for each in shown if each.long):
-            assert TIME.search(around(lines, block)), f"{block.place} does not say how long it takes"
+            assert TIME.search(around(lines, block)), f"{block.place}: say how long it takes"
             assert any(verbs(each) & verbs(block) for each in quick), f"{block.place}: type it, too"
 
 
