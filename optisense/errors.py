@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+
 
 class OptiSenseError(Exception):
     """Base of all errors caused by input, set-up or output, never by a defect of the program.
@@ -75,6 +77,18 @@ class SetupError(OptiSenseError):
 
 class OutputError(OptiSenseError):
     """A file or folder can't be written."""
+
+    @staticmethod
+    def of(error: OSError) -> OutputError:
+        """Return an error of the operating system with a message and a hint for the user."""
+        where = str(error.filename) if error.filename else None
+        if error.errno in (errno.ENOSPC, errno.EDQUOT):
+            hint = "Free some space and try again"
+            return OutputError("the disk is full", where=where, hint=hint)
+        if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+            hint = "Choose a folder that you may write to"
+            return OutputError("permission denied", where=where, hint=hint)
+        return OutputError(error.strerror or str(error), where=where)
 
 
 class FolderInUseError(OutputError):

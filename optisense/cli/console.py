@@ -5,7 +5,6 @@ Results go to standard output, everything else to standard error, so that output
 
 from __future__ import annotations
 
-import errno
 import functools
 import os
 import sys
@@ -126,7 +125,7 @@ def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise typer.Exit(EXIT_FAILURE) from None
         except OSError as error:
-            failed = output_error(error)
+            failed = OutputError.of(error)
             print_error(failed.message, where=failed.where, hint=failed.hint)
             _show_traceback()
             raise typer.Exit(EXIT_FAILURE) from None
@@ -147,20 +146,6 @@ def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
             raise typer.Exit(EXIT_FAILURE) from None
 
     return with_options(run)
-
-
-def output_error(error: OSError) -> OutputError:
-    """Return an error of the operating system as an error with a message and a hint for the
-    user.
-    """
-    where = str(error.filename) if error.filename else None
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return OutputError("the disk is full", where=where, hint="Free some space and try again")
-    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
-        return OutputError(
-            "permission denied", where=where, hint="Choose a folder that you may write to"
-        )
-    return OutputError(error.strerror or str(error), where=where)
 
 
 def _show_traceback() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from optisense.design import Diagnostic, SensorDesign
-from optisense.errors import OptiSenseError
+from optisense.errors import OptiSenseError, OutputError, SetupError
 
 
 class ProtocolError(OptiSenseError):
@@ -66,46 +66,44 @@ def as_data(error: BaseException, design: SensorDesign | None = None) -> dict[st
         error: an error of any kind; an `OptiSenseError` tells its place and a remedy.
         design: design of the request, in which the part is looked up.
     """
-    known = [] if design is None else list(design.parts)
+    told, kind = error, type(error).__name__
     if isinstance(error, Cancelled):
-        return _row("Cancelled", "the request was cancelled", None, None, known, design)
-    if isinstance(error, InvalidDesignError):
-        row = _row("DesignError", error.message, error.where, error.hint, known, design)
-        row["problems"] = [problem_row(problem, design) for problem in error.problems]
-        return row
-    if isinstance(error, WrongContactError):
-        row = _row(error.kind, error.message, error.where, error.hint, known, design)
-        return row | {"contact": error.number}
-    if isinstance(error, OptiSenseError):
-        kind = type(error).__name__
-        return _row(kind, error.message, error.where, error.hint, known, design)
-    if isinstance(error, MemoryError):
+        told = OptiSenseError("the request was cancelled")
+    elif isinstance(error, InvalidDesignError):
+        kind = "DesignError"
+    elif isinstance(error, WrongContactError):
+        kind = error.kind
+    elif isinstance(error, MemoryError):
         hint = "Use a smaller resolution or fewer photons"
-        return _row("SetupError", "not enough memory", None, hint, known, design)
-    if isinstance(error, OSError):
-        where = str(error.filename) if error.filename else None
-        return _row("OutputError", error.strerror or str(error), where, None, known, design)
-    return _row(
-        "InternalError",
-        f"unexpected {type(error).__name__}: {error}",
-        None,
-        "This is a defect of OptiSense; the log of the engine shows where it is",
-        known,
-        design,
-    )
+        told, kind = SetupError("not enough memory", hint=hint), "SetupError"
+    elif isinstance(error, OSError):
+        told, kind = OutputError.of(error), "OutputError"
+    elif not isinstance(error, OptiSenseError):
+        hint = "This is a defect of OptiSense; the log of the engine shows where it is"
+        told, kind = OptiSenseError(f"unexpected {kind}: {error}", hint=hint), "InternalError"
+    assert isinstance(told, OptiSenseError)
+    problems = error.problems if isinstance(error, InvalidDesignError) else ()
+    return {
+        "kind": kind,
+        **_row(told, design),
+        "contact": error.number if isinstance(error, WrongContactError) else None,
+        "problems": [problem_row(problem, design) for problem in problems],
+    }
 
 
 def problem_row(problem: Diagnostic, design: SensorDesign | None) -> dict[str, Any]:
     """Return a problem that `check` found as data, with the part that it is about."""
-    known = list(design.parts) if design is not None else []
-    path = path_in(problem.where)
+    return {"severity": problem.severity, **_row(problem, design)}
+
+
+def _row(told: OptiSenseError | Diagnostic, design: SensorDesign | None) -> dict[str, Any]:
+    path = path_in(told.where)
     return {
-        "severity": problem.severity,
-        "message": problem.message,
-        "where": problem.where,
-        "hint": problem.hint,
+        "message": told.message,
+        "where": told.where,
+        "hint": told.hint,
         "path": path,
-        "part": part_of(problem.message, path, known, design),
+        "part": part_of(told.message, path, list(design.parts) if design else [], design),
     }
 
 
@@ -157,24 +155,3 @@ _PATH = re.compile(
     r"(schema_version|name|description|coating|materials|parts|lights|camera|cages|provenance)"
     r"(\.[A-Za-z0-9_-]+|\[\d+\])*"
 )
-
-
-def _row(
-    kind: str,
-    message: str,
-    where: str | None,
-    hint: str | None,
-    known: Sequence[str],
-    design: SensorDesign | None,
-) -> dict[str, Any]:
-    path = path_in(where)
-    return {
-        "kind": kind,
-        "message": message,
-        "where": where,
-        "hint": hint,
-        "path": path,
-        "part": part_of(message, path, known, design),
-        "contact": None,
-        "problems": [],
-    }
