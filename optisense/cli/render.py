@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
-from optisense.cli.interrupt import Interrupt, deferred_interrupt
 from optisense.cli.options import (
     ContactOption,
     DesignArgument,
@@ -19,6 +18,7 @@ from optisense.cli.options import (
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
 from optisense.cli.sampling import BUILDING, LOADING, loading_steps, set_expected_durations
+from optisense.cli.stopping import Interrupt, deferred_interrupt
 from optisense.commands.rendering import RenderOptions
 from optisense.quality import PICTURE_PHOTONS
 from optisense.time_left import TimedStep

@@ -48,15 +48,9 @@ def write_comparison(path: str | Path, design: SensorDesign, found: Comparison) 
     Raises:
         OutputError: the file can't be written.
     """
-    write_text(Path(path), render_comparison(design, found))
-    return Path(path)
-
-
-def render_comparison(design: SensorDesign, found: Comparison) -> str:
-    """Return the page of `write_comparison` as text."""
     figures = found.realism
     width, height = found.photographs.size
-    return page(
+    text = page(
         "comparison",
         title=design.name,
         description=design.description,
@@ -77,6 +71,8 @@ def render_comparison(design: SensorDesign, found: Comparison) -> str:
         contrast=f"{CONTRAST:g}",
         patch=f"{PATCH:g}",
     )
+    write_text(Path(path), text)
+    return Path(path)
 
 
 def background_pictures(found: Comparison) -> list[tuple[str, str]]:

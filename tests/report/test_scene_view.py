@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from optisense.geometry import TriangleMesh
-from optisense.report._edges import feature_edges
-from optisense.report._scene_view import scene_data
+from optisense.report._scene_view import feature_edges, scene_data
 from optisense.sensors import gelsight_mini_ideal
 
 
