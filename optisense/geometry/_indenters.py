@@ -23,7 +23,6 @@ from optisense.geometry.indenter_kinds import (
     LARGEST,
     SMALLEST,
     IndenterKind,
-    Quantity,
     quantity,
 )
 from optisense.geometry.mesh import TriangleMesh, grid_faces, turn_about_x_and_y
@@ -180,11 +179,6 @@ class MeshIndenter(IndenterKind):
 
     source: TriangleMesh | str | Path
     scale: float = quantity("", "The factor from the file's unit to mm.", 1.0, low=ABOVE_ZERO)
-
-    @classmethod
-    def quantities(cls) -> dict[str, Quantity]:
-        """Return the scale; see `IndenterKind.quantities`."""
-        return {"scale": cls.__dataclass_fields__["scale"].metadata["quantity"]}
 
     @classmethod
     def from_text(cls, text: str) -> MeshIndenter:

@@ -141,7 +141,11 @@ class IndenterKind(ABC):
     @classmethod
     def quantities(cls) -> dict[str, Quantity]:
         """Return the numbers of this kind by name, in the order of the text form."""
-        return {each.name: each.metadata["quantity"] for each in dataclasses.fields(cls)}
+        return {
+            each.name: each.metadata["quantity"]
+            for each in dataclasses.fields(cls)
+            if "quantity" in each.metadata
+        }
 
     @classmethod
     def from_text(cls, text: str) -> IndenterKind:

@@ -15,7 +15,7 @@ import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.errors import ContactError
-from optisense.geometry.indenter_kinds import FACET_ERROR, IndenterKind, Quantity, quantity
+from optisense.geometry.indenter_kinds import FACET_ERROR, IndenterKind, quantity
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.objects import _outlines
 from optisense.geometry.objects._relief import Relief
@@ -211,11 +211,6 @@ class ObjectIndenter(IndenterKind):
         super().__post_init__()
 
     @classmethod
-    def quantities(cls) -> dict[str, Quantity]:
-        """Return the scale; see `IndenterKind.quantities`."""
-        return {"scale": cls.__dataclass_fields__["scale"].metadata["quantity"]}
-
-    @classmethod
     def from_text(cls, text: str) -> ObjectIndenter:
         """Read NAME or NAME,SCALE; see `IndenterKind.from_text`."""
         name, separator, scale = text.strip().partition(",")
@@ -247,8 +242,5 @@ class ObjectIndenter(IndenterKind):
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """Return the triangles up to that height, or all of them; see `Indenter.mesh`."""
         whole = self._mesh
-        near = whole.faces[whole.vertices[whole.faces, 2].min(axis=1) <= reach]
-        kept, numbers = np.unique(near, return_inverse=True)
-        faces = numbers.reshape(-1, 3).astype(np.int32)
-        assert whole.normals is not None
-        return TriangleMesh(whole.vertices[kept], faces, whole.normals[kept])
+        near = whole.vertices[whole.faces, 2].min(axis=1) <= reach
+        return whole.with_faces(whole.faces[near]).compacted()
