@@ -94,7 +94,7 @@ def test_pixels_of_a_metal_contact_are_hardly_noisier_than_its_photons() -> None
     model = OpticalModel(design, "llvm")
     ball = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
     one, other = (
-        model.render([ball], (320, 240), 1_000_000, seed=seed, skin="conforming") for seed in (1, 2)
+        model.render([ball], (160, 120), 1_000_000, seed=seed, skin="conforming") for seed in (1, 2)
     )
     mask = one.contact_mask
     off = (one.radiance - other.radiance)[mask] / np.sqrt(2)
