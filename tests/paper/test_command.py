@@ -91,7 +91,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.Monke
         real(each, folder)
 
     monkeypatch.setattr("paper.bench.work_out", second_is_stopped)
-    command = ["gelbelt-lights", "--quick", "--seeds", "1", "--workers", "1"]
+    command = ["svelte-mirror", "--quick", "--seeds", "1", "--workers", "1"]
     result = runner.invoke(app, [*command, "--out", str(tmp_path)])
     assert result.exit_code == 130
     assert "the same command continues" in result.stderr

@@ -106,7 +106,7 @@ def test_the_commands_write_the_section(tmp_path: Path) -> None:
     assert {"absorbed by a part"} == {
         entry["kind"] for entry in data["entries"] if entry["where"] == "absorbed by body"
     }
-    done = CliRunner().invoke(app, ["render", "gelsight-svelte", "--resolution", "32x24", *few])
+    done = CliRunner().invoke(app, ["render", "gelsight-mini-ideal", "--resolution", "32x24", *few])
     assert done.exit_code == 0, done.output
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "Where the light goes" in report and "absorbed by body" in report
+    assert "Where the light goes" in report and "escaped from tray" in report
