@@ -30,6 +30,17 @@ SUNK = 2e-4
 """Depth (m) of the ball in the gel when it is looked which bodies it touches."""
 
 
+SHAPES = (
+    "gelsight-mini",
+    "gelsight-mini-spherical",
+    "gelbelt",
+    "digit",
+    "gelsight-svelte",
+    "gelsight360",
+)
+"""The sensors; other GelSight Minis differ from these in their lights and in how they are bent."""
+
+
 class Made(NamedTuple):
     """A sensor, its body and its files."""
 
@@ -39,7 +50,7 @@ class Made(NamedTuple):
     urdf: Path
 
 
-@pytest.fixture(scope="module", params=sensors.SENSORS.names())
+@pytest.fixture(scope="module", params=SHAPES)
 def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Made:
     design = sensors.build(request.param)
     mjcf, urdf, *_ = export_robot(design, tmp_path_factory.mktemp("robot"), ["mujoco", "urdf"])

@@ -20,7 +20,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.relit import RelitEvaluator, can_relight
 from optisense.search.space.constraints import NoCrossings, UserRule, why_forbidden
 
-LOW = {"photons": 200_000, "resolution": (160, 120), "together": True}
+LOW = {"photons": 60_000, "resolution": (160, 120), "together": True}
 
 
 class TestScores:
