@@ -49,9 +49,9 @@ class Film:
 
     def add_light(self, points: VisiblePoints, emitters: list[Emitter]) -> None:
         """Add the windows of flat lights that are seen directly; a Lambertian window of 1 mW and
-        area A has radiance 1 / (pi A).
+        area A (that of the face that rays meet) has radiance 1 / (pi A).
         """
-        areas = [emitter.area for emitter in emitters]
+        areas = [emitter.window_area for emitter in emitters]
         radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
         values = floats(np.array([0.0, *radiance]))
         groups = indices(np.array([0, *(e.group for e in emitters)]))

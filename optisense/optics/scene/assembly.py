@@ -18,6 +18,7 @@ from optisense.geometry.coplanar import merge_coplanar
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
 from optisense.optics.scene._solids import Interface, Sheet, Solid
 from optisense.optics.scene.emitters import (
+    DISC_CORNERS,
     Emitter,
     EmitterShape,
     frame_of,
@@ -35,9 +36,6 @@ FLAT = 1e-6
 mesh has flat facets: far above the rounding of normals in double precision (1e-15), and an angle of
 only 6e-5 degrees."""
 
-DISC_CORNERS = 12
-"""Number of corners of the polygon that represents a round light window for rays that meet it.
-Twelve give 95 % of the disc's area; photons start from the exact disc."""
 PROBE = 0.02
 """Distance (mm) off a coating or a light at which the medium in front of it is looked up: ten times
 the distance below which faces touch, and no more than the thinnest film that a design holds."""
@@ -192,7 +190,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     emitters = _emitters(design, solids)
     for number, emitter in enumerate(emitters):
         if emitter.shape is not EmitterShape.POINT:
-            pieces.append(_window(number, emitter))
+            pieces.append(window(number, emitter))
     return Assembly(
         pieces=pieces,
         sensing=sensing[0] if len(sensing) == 1 else TriangleMesh.joined(sensing),
@@ -361,7 +359,7 @@ def _lamp(model: LightModel) -> Emitter:
     return replace(lamp, shape=EmitterShape[window.shape.upper()], size=window.size)
 
 
-def _window(number: int, emitter: Emitter) -> Piece:
+def window(number: int, emitter: Emitter) -> Piece:
     """Return the emitting face of a light, which faces its direction; equal lights share one
     object.
     """

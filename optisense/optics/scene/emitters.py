@@ -29,6 +29,9 @@ power)."""
 AZIMUTH_CELLS = 128
 """Number of azimuthal cells of each polar cell, all of equal power; those of a round profile are
 2.8 degrees wide, finer than the usual tables of luminaires (5 degrees and more)."""
+DISC_CORNERS = 12
+"""Number of corners of the polygon that represents a round light window for rays that meet it.
+Twelve give 95 % of the disc's area; photons start from the exact disc."""
 FLOATS_PER_EMITTER = 20
 """Number of floats of a light in the emitter table; five gathers of four floats read them."""
 
@@ -76,6 +79,14 @@ class Emitter:
             EmitterShape.DISC: np.pi / 4,
         }[self.shape]
         return float(self.size[0] * self.size[1] * filled)
+
+    @property
+    def window_area(self) -> float:
+        """Area (mm^2) of the face that rays meet: the area, or for a disc that of the polygon whose
+        corners lie on its outline.
+        """
+        turn = 2 * np.pi / DISC_CORNERS
+        return self.area * (np.sin(turn) / turn if self.shape is EmitterShape.DISC else 1.0)
 
     @property
     def frame(self) -> FloatingArray:
