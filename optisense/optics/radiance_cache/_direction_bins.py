@@ -76,7 +76,7 @@ class DirectionBins:
         broad = BROAD_LOBE_OF_RAISED_PLANE if raised_plane else BROAD_LOBE
         if roughness is None or roughness >= broad:
             return CURVED_BINS if curved else COARSE_BINS
-        return FINE_BINS if roughness >= NARROW_LOBE else FINEST_BINS
+        return FINE_BINS if roughness >= FINEST_LOBE else FINEST_BINS
 
 
 COARSE_BINS = DirectionBins(16, 0.6)
@@ -90,8 +90,7 @@ takes a quarter longer; images from a finished cache take as long as with `COARS
 FINE_BINS = DirectionBins(24, 0.6, True)
 """The bins for lobes that resolve the lamps: 576 bins, 8.5 degrees across in the mean."""
 FINEST_BINS = DirectionBins(32, 0.6, True)
-"""The bins for lobes that are narrower than most lamps: 1,024 bins, 6.3 degrees across in the
-mean."""
+"""The bins for lobes of a few degrees: 1,024 bins, 6.3 degrees across in the mean."""
 BROAD_LOBE = 0.5
 """GGX alpha from which on a lobe is so broad that coarse bins suffice where no light is tallied in
 the raised plane."""
@@ -100,10 +99,14 @@ BROAD_LOBE_OF_RAISED_PLANE = 0.38
 1.5 % in a contact in the middle of GelSight Mini and 1.0 % beside it; `FINE_BINS`, which take twice
 the time at equal noise, leave 1.3 and 0.7 %."""
 NARROW_LOBE = 0.25
-"""GGX alpha below which the finest bins are needed: the error in a contact of GelSight Mini of
-alpha 0.05 is 5 % with them and 9 % with the next coarser ones; at 0.2 it is at most 1.1 and 2.1 %,
-and at 0.4 1.4 and 1.6 %. At 0.2 an image with a million photons takes half the time with the next
-coarser ones."""
+"""GGX alpha below which a lobe is narrower than most lamps and sees each beam as two discs (see
+`two_discs`)."""
+FINEST_LOBE = 0.18
+"""GGX alpha below which the finest bins are needed. At 0.2, the error in a contact of GelSight Mini
+is 2.1 % with `FINE_BINS` and 1.9 % with `FINEST_BINS`, and on the skin around it 0.9 and 0.3 %; an
+image with a million photons takes 0.7 times as long with `FINE_BINS`. If beams were single discs,
+the errors would be 2.8 and 1.5 %. At 0.05, the error in the contact is 5 % with `FINEST_BINS` and
+9 % with the next coarser ones."""
 
 
 def direction_bin(

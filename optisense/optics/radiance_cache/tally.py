@@ -15,7 +15,7 @@ from optisense.array_types import FloatingArray
 from optisense.optics.backend.arrays import floats
 from optisense.optics.radiance_cache._direction_bins import (
     COARSE_BINS,
-    FINEST_BINS,
+    NARROW_LOBE,
     DirectionBins,
     Tables,
     bin_centres,
@@ -275,7 +275,7 @@ class CacheTally:
             bins=size,
             groups=groups,
             coloured=self.coloured,
-            narrow_lobes=across >= FINEST_BINS.across,
+            narrow_lobes=self.roughness is not None and self.roughness < NARROW_LOBE,
         )
         return RadianceCache(
             binned=binned,
