@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +49,11 @@ FEWEST_FINE = 4
 uncertain."""
 MOST_FINE = 64
 """Largest number of fine pictures of a case."""
+CHIEF_DEPTH = 12
+"""Largest number of surfaces that a ray of `ray_offset_shift` meets: more than the interfaces and
+mirrors in front of any built-in sensor's skin."""
+LAST_NUMBER = 1 - 2**-16
+"""Random number at the end of the unit interval, in single precision."""
 FIRST_SEED = 9_000
 """Seed of the first batch of photons, far from the seeds of the judged images."""
 
@@ -141,6 +147,41 @@ class Reference:
                 save_picture(path, render(batch))
             found[batch][window] = np.load(path)
         return found, len(paths) * effort.count(self.referee)
+
+
+def ray_offset_shift(model: OpticalModel, mask: NDArray[np.bool_]) -> tuple[float, float]:
+    """Return by how many pixels, to the right and down, the path tracer's view of the pixels of a
+    mask (h, w) is shifted.
+
+    Mitsuba starts rays off surfaces, by up to 0.006 mm at 60 mm from the origin. Behind the mirrors
+    of GelSight Svelte, which are met at grazing angles, the picture of a contact is shifted by 0.06
+    pixels by this, which changes its narrow highlights by 5 %. Elsewhere the shift is below 0.002
+    pixels.
+    """
+    camera = model.camera(mask.shape[::-1])
+    parts = assembly.assemble(model.design)
+    flux = [(1.0, 1.0, 1.0)] * len(parts.groups)
+    scene = mi.load_dict(mitsuba_scene(parts.pieces, parts.emitters, camera, flux))
+    points = model.chief_rays(mask.shape[::-1]).points
+    right, down = (np.gradient(points, axis=axis) for axis in (1, 0))
+    seen = mask & np.isfinite(right + down).all(axis=-1)
+    rows, columns = np.nonzero(seen)
+    ray = mi.Ray3f(*camera.rays(mi.Float(columns + 0.5), mi.Float(rows + 0.5)))
+    onward = dr.full(mi.Bool, True, len(rows))
+    end = dr.zeros(mi.Point3f, len(rows))
+    for _ in range(CHIEF_DEPTH):
+        hit = scene.ray_intersect(ray, onward)
+        onward &= hit.is_valid()
+        end = dr.select(onward, hit.p, end)
+        bsdf = hit.bsdf(ray)
+        onward &= mi.has_flag(bsdf.flags(), mi.BSDFFlags.Delta)
+        # The last of the random numbers chooses the refracted lobe of an interface.
+        lobe, _ = bsdf.sample(mi.BSDFContext(), hit, mi.Float(LAST_NUMBER), mi.Point2f(0), onward)
+        ray = hit.spawn_ray(hit.to_world(lobe.wo))
+    off = np.asarray(end).T - points[seen]
+    steps = np.stack([right[seen], down[seen]], axis=-1)
+    across, along = np.median((np.linalg.pinv(steps) @ off[..., None])[..., 0], axis=0)
+    return float(across), float(along)
 
 
 def save_picture(path: Path, picture: FloatArray) -> None:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.patches import compare
+from benchmarks.patch_references import ray_offset_shift
+from benchmarks.patches import PatchCase, compare
+from optisense import OpticalModel
 
 PATCHES = 20
 TRIALS = 100
@@ -31,3 +33,13 @@ def test_noise_is_no_error_and_the_limit_contains_the_true_error(error: float) -
         limits.append(found["limit"])
     assert np.mean(np.array(limits) >= error) > 0.95
     assert np.sqrt(np.mean(squares)) == pytest.approx(error, abs=LEFT)
+
+
+@pytest.mark.parametrize(
+    ("sensor", "shift"), [("gelsight-mini-ideal", 0.0), ("gelsight-svelte", -0.0625)]
+)
+def test_the_path_tracer_sees_the_skin_behind_mirrors_shifted(sensor: str, shift: float) -> None:
+    case = PatchCase(sensor, 1.0)
+    model = OpticalModel(case.design(), "llvm")
+    seen = model.chief_rays(case.resolution, [case.contact(model)], "conforming").contact_mask
+    assert ray_offset_shift(model, seen) == pytest.approx((shift, 0.0), abs=0.002)
