@@ -37,9 +37,9 @@ from optisense.design import SensorDesign
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
-DIFFERENCE = 0.35
-"""Step of the difference quotients of numbers that need a rendering, in plausible ranges; it is
-large because renderings have noise.
+DIFFERENCE = 0.5
+"""Step to both sides of the difference quotients of numbers that need a rendering, in plausible
+ranges; it is large because renderings have noise.
 """
 
 VIEW_DIFFERENCE = 0.25
@@ -101,8 +101,9 @@ class FitRounds:
         self._rendering = [number for number, each in enumerate(chosen) if each.renders]
         self.exposure = 1.0
         self._done = 0
+        self._bodily = [number for number in self._rendering if not chosen[number].views]
         self._count = 2 * settings.rounds + 3
-        self._count += sum(not chosen[number].views for number in self._rendering)
+        self._count += len(self._bodily) * max(settings.rounds - 1, 1)
 
     def report_step(self, what: str) -> None:
         """Report the progress by one piece."""
@@ -112,31 +113,36 @@ class FitRounds:
     def run(self) -> Solution:
         """Run all rounds; the contacts of the fitted photographs move along.
 
-        Difference quotients of two renderings are taken in the first round only; later rounds start
-        from new renderings, and their corrections are small. Those of the camera's view cost no
-        rendering, and each round has its own. Rounds that are not rough render everything twice, to
-        know the noise of the light.
+        Each round takes new difference quotients, because pictures are not linear in the numbers of
+        a sensor's body. The last of several rounds keeps these numbers and fits the others to their
+        true pictures: powers and the camera's processing that suit a linear prediction do not suit
+        these. Rounds that are not rough render everything twice, to know the noise of the light.
         """
         steps = np.zeros(len(self._chosen))
         small = self._small.subset(self._used)
         solution: Solution | None = None
         slopes: dict[int, PictureSlopes] = {}
+        changes: FloatArray = np.zeros(len(steps))
         for number in range(self._settings.rounds):
             seen = [self._seen[index] for index in self._used]
             rough = number < max(1, math.floor(ROUGH_SHARE * self._settings.rounds))
             self.report_step("rendering")
             layers, noise = self._layers(small, seen, steps, number), None
-            if not rough:
-                again = self._layers(small, seen, steps, number, layers, AGAIN)
-                layers, noise = averaged(layers, again)
             if number == 0:
                 total = layers.background.sum(axis=0)
                 self.exposure = matched_exposure(total, layers.chain, small.background)
-                slopes = self._slopes(small, seen, steps, layers)
+            kept = self._bodily if 0 < number == self._settings.rounds - 1 else []
+            if not kept:
+                slopes = self._slopes(small, seen, steps, number, layers)
+            if not rough:
+                again = self._layers(small, seen, steps, number, layers, AGAIN)
+                layers, noise = averaged(layers, again)
             self.report_step("fitting")
-            found = self._solution(small, seen, layers, steps, slopes, noise)
+            found = self._solution(small, seen, layers, steps, slopes, noise, kept)
+            before, changes = changes, found.steps - steps
+            changes[kept] = before[kept]
             if number:
-                found = found.with_changes(found.steps - steps)
+                found = found.with_changes(changes)
             solution, steps = found, found.steps
             for index, moved in zip(self._used, solution.contacts, strict=True):
                 self._seen[index] = moved_contact(self._seen[index], moved)
@@ -151,6 +157,7 @@ class FitRounds:
         steps: FloatArray,
         slopes: dict[int, PictureSlopes],
         noise: LayeredPictures | None,
+        kept: Sequence[int],
     ) -> Solution:
         """Fit to layers that were rendered at `steps`; whenever the view has moved, the layers are
         displaced to it and fitted again.
@@ -159,6 +166,7 @@ class FitRounds:
             small, seen, layers, slopes: see `LayeredFit`.
             steps: (n,) start of the fit.
             noise: sample of the noise of the layers; None in a rough round.
+            kept: indices of the numbers that are not changed.
         """
         rough = noise is None
         views = [number for number in self._rendering if self._chosen[number].views]
@@ -166,7 +174,7 @@ class FitRounds:
         if not views:
             fit = LayeredFit(
                 small, seen, layers, self._chosen, self.exposure, steps, slopes,
-                RoughFit(ROUGH_PIXELS) if rough else None, noise,
+                RoughFit(ROUGH_PIXELS) if rough else None, noise, kept,
             )  # fmt: skip
             return fit.solve(steps, contacts)
         rendered = self._view(small, steps)
@@ -175,7 +183,7 @@ class FitRounds:
             every = slopes | self._view_slopes(small, seen, start, shown, view)
             fit = LayeredFit(
                 small, seen, shown, self._chosen, self.exposure, start, every,
-                RoughFit(ROUGH_PIXELS, blur) if rough else None, noise,
+                RoughFit(ROUGH_PIXELS, blur) if rough else None, noise, kept,
             )  # fmt: skip
             found = fit.solve(steps, contacts)
             steps, contacts = found.steps, found.contacts
@@ -285,23 +293,32 @@ class FitRounds:
         small: Photographs,
         seen: Sequence[SeenContact],
         steps: FloatArray,
+        number: int,
         layers: LayeredPictures,
     ) -> dict[int, PictureSlopes]:
+        """Return the slopes of the numbers that need a rendering, by index, from renderings of a
+        round on both sides of their values.
+
+        Args:
+            small, seen: see `layered_pictures`.
+            steps: (n,) current values.
+            number: number of the round.
+            layers: layers whose contacts are pressed in again if a number does not move them.
+        """
         found: dict[int, PictureSlopes] = {}
-        for number in self._rendering:
-            each = self._chosen[number]
-            if each.views:
-                continue
+        for index in self._bodily:
+            each = self._chosen[index]
             self.report_step(f"rendering another {each.words}")
-            other = self._other(number, steps, DIFFERENCE)
-            size = float(other[number] - steps[number])
+            low, high = np.clip(steps[index] + np.array([-DIFFERENCE, DIFFERENCE]), *each.limits())
             same = None if each.moves_contacts else layers
-            moved = self._layers(small, seen, other, 0, same)
-            pairs = zip(
-                [moved.background, *moved.presses], [layers.background, *layers.presses],
-                strict=True,
-            )  # fmt: skip
-            found[number] = PictureSlopes(
-                [((one - two) / size).astype(np.float32) for one, two in pairs]
+            ends = []
+            for value in (low, high):
+                other = steps.copy()
+                other[index] = value
+                moved = self._layers(small, seen, other, number, same)
+                ends.append([moved.background, *moved.presses])
+            size = np.float32(high - low)
+            found[index] = PictureSlopes(
+                [(two - one) / size for one, two in zip(*ends, strict=True)]
             )
         return found

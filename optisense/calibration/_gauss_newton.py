@@ -115,6 +115,7 @@ class LayeredFit:
         slopes: dict[int, PictureSlopes],
         rough: RoughFit | None = None,
         noise: LayeredPictures | None = None,
+        kept: Sequence[int] = (),
     ) -> None:
         """Prepare a round.
 
@@ -126,8 +127,10 @@ class LayeredFit:
             rough: how pictures are compared in a rough round; None in the others.
             noise: errors of the layers by the noise of the light, a sample of them; None if they
                 are not known.
+            kept: indices of quantities that are not changed.
         """
         self._noise = noise
+        self._kept = list(kept)
         self._pixels = None if rough is None else rough.pixels
         self._blur = 0.0 if rough is None else rough.blur
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
@@ -271,9 +274,12 @@ class LayeredFit:
         return steps, contacts, pictures, scales
 
     def _free(self, steps: FloatArray, gradient: FloatArray) -> NDArray[np.bool_]:
-        """Return which unknowns may move: all but numbers at a limit that would leave it."""
+        """Return which unknowns may move: all but those that are kept, and numbers at a limit that
+        would leave it.
+        """
         slope = gradient[: self.count]
         stuck = (steps <= self._low) & (slope > 0.0) | (steps >= self._high) & (slope < 0.0)
+        stuck[self._kept] = True
         return np.concatenate([~stuck, np.ones(len(gradient) - self.count, dtype=bool)])
 
     def _errors(self, pictures: list[FloatArray]) -> tuple[float, float]:

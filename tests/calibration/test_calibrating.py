@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import optisense as ots
 from optisense.calibration import Photographs, photograph_model, save_photographs
-from optisense.calibration._body_changes import with_single_lights
+from optisense.calibration._body_changes import with_lights_moved, with_single_lights
 from optisense.calibration._fitted_numbers import fitted_numbers, with_known_total
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
@@ -49,6 +49,9 @@ HIDDEN = {
     "camera.shading.red_falloff": 0.5,
 }
 """Numbers of the photographed sensor that differ from those of the start."""
+
+LOWER_AND_POWERS = "lights.blue.along", "lights.red.flux", "lights.green.flux", "lights.blue.flux"
+"""Numbers of a fit that finds the height of a row of lights."""
 
 
 @pytest.fixture(scope="module")
@@ -300,3 +303,23 @@ def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
     others = np.mean([power[f"red-{number}"] for number in (1, 3, 4, 5)])
     assert power["red-2"] / others == pytest.approx(1.0 / 2.1, abs=0.2)
     assert list(found.design.lights) == list(design.lights)
+
+
+def test_a_row_of_lights_that_lies_lower_is_found(
+    mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lower = -0.8  # mm; more than twice the step of the difference quotients
+    real = ots.OpticalModel(with_lights_moved(mini.design, "blue", lower))
+    balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES[:2]]
+    shown = photograph_model(real, balls, resolution=SMALL, photons=200_000, seed=5)
+    monkeypatch.setattr(  # one number of a body is enough
+        "optisense.calibration.calibrating.quantities_of",
+        lambda *of: [q for q in quantities_of(*of) if q.path in LOWER_AND_POWERS],
+    )
+    settings = CalibrationSettings(
+        families=chosen_families([], ["lights"]), rounds=3, photons=200_000, held_out=()
+    )
+    found = calibrate(mini.design, shown, settings)
+    moved = next(each for each in found.numbers if each.path == "lights.blue.along")
+    assert moved.after == pytest.approx(lower, abs=0.2)
+    assert moved.determined
