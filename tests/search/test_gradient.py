@@ -189,7 +189,7 @@ def test_gelsight360_by_gradient_ends_at_a_narrow_view() -> None:
     space = {"camera.position.z": (0.0, 8.0), "camera.fov": Around(20.0)}
     result = search(
         load("gelsight360"), space, "aoap", method="gradient", budget=24,
-        settings=SETTINGS, options={"resolution": 96, "starts": 1},
+        settings=SETTINGS, options={"resolution": 96},
     )  # fmt: skip
     best = result.best
     assert best.outcome.scores["aoap"] > 0.933
