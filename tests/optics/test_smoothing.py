@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from optisense.optics.backend.variant import use_variant
 
@@ -234,19 +235,31 @@ def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels) -> None:  # ty
     assert np.median((found / even)[clear & (aside > 4.0)]) == pytest.approx(1.0)
 
 
-def test_products_do_not_depend_on_the_number_of_threads(kernels) -> None:  # type: ignore[no-untyped-def]
+def test_blocks_cover_each_bin_once_with_any_number_of_threads() -> None:
     import drjit as dr
 
-    from optisense.optics.radiance_cache.smoothing import product
+    from optisense.optics.radiance_cache.smoothing import in_blocks
 
-    matrix = kernels.smoothing(1_000_000).kernel.astype(np.float32)
-    table = np.random.default_rng(3).random((matrix.shape[1], 12), dtype=np.float32)
-    before, found = dr.thread_count(), []
+    before = dr.thread_count()
     try:
-        for threads in (1, 3):
+        for threads, weights in ((1, 10), (3, 10), (3, 10**9)):
             dr.set_thread_count(threads)
-            found.append(product(matrix, table))
+            counts = np.zeros((2, 37), dtype=int)
+
+            def count(plane: int, bins: slice, counts: NDArray[np.int64] = counts) -> None:
+                counts[plane, bins] += 1
+
+            in_blocks(count, 2, 37, weights, columns=36)
+            assert (counts == 1).all()
     finally:
         dr.set_thread_count(before)
-    np.testing.assert_array_equal(*found)
-    np.testing.assert_allclose(found[0], matrix.toarray() @ table, rtol=1e-5)
+
+
+def test_errors_of_blocks_are_raised() -> None:
+    from optisense.optics.radiance_cache.smoothing import in_blocks
+
+    def fail(plane: int, bins: slice) -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        in_blocks(fail, 1, 100, 10**9, columns=36)
