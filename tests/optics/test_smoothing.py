@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from optisense.optics.backend.variant import use_variant
 
@@ -235,31 +234,28 @@ def test_kernels_are_narrower_along_the_edge_of_a_shadow(kernels) -> None:  # ty
     assert np.median((found / even)[clear & (aside > 4.0)]) == pytest.approx(1.0)
 
 
-def test_blocks_cover_each_bin_once_with_any_number_of_threads() -> None:
+@pytest.mark.parametrize("cached", [0.0, 1e9])
+def test_products_do_not_depend_on_the_number_of_threads(
+    kernels,  # type: ignore[no-untyped-def]
+    monkeypatch: pytest.MonkeyPatch,
+    cached: float,
+) -> None:
+    """By blocks of columns, of which the last is shorter, and by rows."""
     import drjit as dr
 
-    from optisense.optics.radiance_cache.smoothing import in_blocks
+    from optisense.optics.radiance_cache import smoothing
 
-    before = dr.thread_count()
+    monkeypatch.setattr(smoothing, "LEAST_SHARED_PRODUCT", 0)
+    monkeypatch.setattr(smoothing, "CACHED_BYTES", cached)
+    monkeypatch.setattr(smoothing, "BLOCK_COLUMNS", 5)
+    matrix = kernels.smoothing(1_000_000).kernel.astype(np.float32)
+    table = np.random.default_rng(3).random((matrix.shape[1], 12), dtype=np.float32)
+    before, found = dr.thread_count(), []
     try:
-        for threads, weights in ((1, 10), (3, 10), (3, 10**9)):
+        for threads in (1, 3):
             dr.set_thread_count(threads)
-            counts = np.zeros((2, 37), dtype=int)
-
-            def count(plane: int, bins: slice, counts: NDArray[np.int64] = counts) -> None:
-                counts[plane, bins] += 1
-
-            in_blocks(count, 2, 37, weights, columns=36)
-            assert (counts == 1).all()
+            found.append(smoothing.product(matrix, table))
     finally:
         dr.set_thread_count(before)
-
-
-def test_errors_of_blocks_are_raised() -> None:
-    from optisense.optics.radiance_cache.smoothing import in_blocks
-
-    def fail(plane: int, bins: slice) -> None:
-        raise ZeroDivisionError
-
-    with pytest.raises(ZeroDivisionError):
-        in_blocks(fail, 1, 100, 10**9, columns=36)
+    np.testing.assert_array_equal(*found)
+    np.testing.assert_allclose(found[0], matrix.toarray() @ table, rtol=1e-5)

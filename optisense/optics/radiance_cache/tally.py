@@ -6,8 +6,6 @@ to the bin of its direction in the cell where it lands.
 
 from __future__ import annotations
 
-import math
-
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -31,7 +29,7 @@ from optisense.optics.radiance_cache._power_rounding import PowerRounding
 from optisense.optics.radiance_cache._raised_plane import areas, crossings
 from optisense.optics.radiance_cache.beams import collect_beams
 from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
-from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, in_blocks
+from optisense.optics.radiance_cache.smoothing import Kernels, Smoothing, product
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.transport.photon_map import GROUP_MASK, HALF_SHIFT, PhotonMap
 from optisense.optics.transport.volume_flux import FluxLayer, layer_cell_at
@@ -214,28 +212,24 @@ class CacheTally:
         near, twice, factors = np.flatnonzero(self.kernels.near), None, None
         if kernel.correction is None:
             landed = self._landed().mean(axis=1)
-            sharpening = [self.kernels.sharpening(each, self.photons) for each in landed]
-            factors = np.asarray(sharpening, dtype=np.float32)[:, :, None, :, None]
+            factors = [self.kernels.sharpening(each, self.photons) for each in landed]
         else:
-            # Elsewhere the correction is the identity.
+            # Elsewhere the correction is the identity; a copy of a table takes as long as a
+            # product.
             twice = kernel.correction[near].astype(np.float32)
 
         def summed(table: mi.Float) -> mi.Float:
-            whole = np.asarray(table).reshape(self.planes, cells, count, self.groups, -1)
-            out = np.empty((self.planes, cells, len(used), *whole.shape[3:]), dtype=np.float32)
-
-            def smooth(plane: int, bins: slice) -> None:
-                light = out[plane, :, bins]
-                chosen = np.take(whole[plane], used[bins], axis=1)
-                smoothed = once @ chosen.reshape(cells, -1)
+            planes = []
+            for plane, whole in enumerate(np.asarray(table).reshape(self.planes, cells, count, -1)):
+                chosen = whole if len(used) == count else np.take(whole, used, axis=1)
+                light = product(once, chosen.reshape(cells, -1))
                 if twice is not None:
-                    smoothed[near] = twice @ smoothed
-                light[:] = smoothed.reshape(light.shape)
-                if factors is not None:
-                    light *= factors[plane]
-
-            in_blocks(smooth, self.planes, len(used), once.nnz, math.prod(whole.shape[3:]))
-            return floats(out)
+                    light[near] = product(twice, light)
+                elif factors is not None:
+                    groups = light.reshape(cells, len(used), self.groups, -1)
+                    groups *= factors[plane].astype(np.float32)[:, None, :, None]
+                planes.append(light)
+            return floats(planes[0] if len(planes) == 1 else np.stack(planes))
 
         moments, heights = summed(tables.moments), summed(tables.heights)
         return Tables(moments, heights, summed(tables.colours) if self.coloured else moments)
