@@ -110,6 +110,11 @@ class Reference:
     mask: NDArray[np.bool_]
     margin: int
 
+    @property
+    def window(self) -> Window:
+        """The rows and columns around the contact that are rendered."""
+        return box_around(self.mask, self.margin)
+
     def paths(self, effort: Effort, batches: int) -> list[Path]:
         """Return the files of independent pictures, which may not exist."""
         more = [
@@ -122,9 +127,7 @@ class Reference:
 
     def renderer(self, effort: Effort) -> Render:
         """Return the function that renders the window around the contact."""
-        make = _path if self.referee is Referee.PATH else _light
-        window = box_around(self.mask, self.margin)
-        return make(self.model, self.contact, self.mask.shape, window, effort)
+        return self._path(effort) if self.referee is Referee.PATH else self._light(effort)
 
     def pictures(self, batches: int) -> tuple[FloatArray, int]:
         """Return independent pictures (n, h, w, 3), zero outside a window around the contact, and
@@ -138,15 +141,52 @@ class Reference:
         if len(paths) < FEWEST_FINE:
             effort = USUAL
             paths = self.paths(USUAL, batches)
-        window = box_around(self.mask, self.margin)
         found = np.zeros((len(paths), *self.mask.shape, 3))
         render = None
         for batch, path in enumerate(paths):
             if not path.is_file():
                 render = render or self.renderer(effort)
                 save_picture(path, render(batch))
-            found[batch][window] = np.load(path)
+            found[batch][self.window] = np.load(path)
         return found, len(paths) * effort.count(self.referee)
+
+    def _path(self, effort: Effort) -> Render:
+        model, (rows, columns) = self.model, self.window
+        parts = assembly.assemble(model.design)
+        coat = assembly.coating_surface(model.design.coating, parts.ior_before, Region.INDENTER)
+        pieces = [*parts.pieces, assembly.indenter_piece(model.place(self.contact), coat)]
+        flux = [tuple(model.design.lights[name].channel_flux().tolist()) for name in parts.groups]
+        scene = mitsuba_scene(
+            pieces,
+            parts.emitters,
+            model.camera(self.mask.shape[::-1]),
+            flux,
+            samples=PASS_SAMPLES,
+            max_depth=PATH_DEPTH,
+        )
+        scene["sensor"]["film"] |= {
+            "crop_offset_x": int(columns.start),
+            "crop_offset_y": int(rows.start),
+            "crop_width": int(columns.stop - columns.start),
+            "crop_height": int(rows.stop - rows.start),
+        }
+        loaded = mi.load_dict(scene)
+        passes = effort.samples // PASS_SAMPLES
+
+        def render(batch: int) -> FloatArray:
+            total = np.zeros((rows.stop - rows.start, columns.stop - columns.start, 3))
+            for number in range(passes):
+                picture = mi.render(loaded, spp=PASS_SAMPLES, seed=batch * passes + number)
+                total += np.asarray(picture, dtype=np.float64) / passes
+            return total
+
+        return render
+
+    def _light(self, effort: Effort) -> Render:
+        camera = window_camera(self.model.camera(self.mask.shape[::-1]), self.window)
+        scene = self.model.scenes.touched([self.contact], [self.model.place(self.contact)]).full
+        render = light_traced(self.model, scene, camera, effort.photons, LIGHT_PASSES)
+        return lambda batch: render(FIRST_SEED + batch)
 
 
 def ray_offset_shift(model: OpticalModel, mask: NDArray[np.bool_]) -> tuple[float, float]:
@@ -201,55 +241,3 @@ def _digest(design: SensorDesign, more: list[str]) -> str:
     for text in more:
         digest.update(text.encode())
     return digest.hexdigest()[:12]
-
-
-def _path(
-    model: OpticalModel,
-    contact: Contact,
-    shape: tuple[int, int],
-    window: Window,
-    effort: Effort,
-) -> Render:
-    parts = assembly.assemble(model.design)
-    coat = assembly.coating_surface(model.design.coating, parts.ior_before, Region.INDENTER)
-    pieces = [*parts.pieces, assembly.indenter_piece(model.place(contact), coat)]
-    flux = [tuple(model.design.lights[name].channel_flux().tolist()) for name in parts.groups]
-    scene = mitsuba_scene(
-        pieces,
-        parts.emitters,
-        model.camera(shape[::-1]),
-        flux,
-        samples=PASS_SAMPLES,
-        max_depth=PATH_DEPTH,
-    )
-    rows, columns = window
-    scene["sensor"]["film"] |= {
-        "crop_offset_x": int(columns.start),
-        "crop_offset_y": int(rows.start),
-        "crop_width": int(columns.stop - columns.start),
-        "crop_height": int(rows.stop - rows.start),
-    }
-    loaded = mi.load_dict(scene)
-    passes = effort.samples // PASS_SAMPLES
-
-    def render(batch: int) -> FloatArray:
-        total = np.zeros((rows.stop - rows.start, columns.stop - columns.start, 3))
-        for number in range(passes):
-            picture = mi.render(loaded, spp=PASS_SAMPLES, seed=batch * passes + number)
-            total += np.asarray(picture, dtype=np.float64) / passes
-        return total
-
-    return render
-
-
-def _light(
-    model: OpticalModel,
-    contact: Contact,
-    shape: tuple[int, int],
-    window: Window,
-    effort: Effort,
-) -> Render:
-    camera = window_camera(model.camera(shape[::-1]), window)
-    scene = model.scenes.touched([contact], [model.place(contact)]).full
-    render = light_traced(model, scene, camera, effort.photons, LIGHT_PASSES)
-    return lambda batch: render(FIRST_SEED + batch)
