@@ -15,7 +15,7 @@ import threading
 from typing import Any, BinaryIO
 
 from optisense.errors import OptiSenseError, SetupError
-from optisense.search.executors._wire import receive, send
+from optisense.search.executors.base import receive, send
 
 
 def main() -> None:

@@ -6,6 +6,7 @@ import pickle
 from abc import ABC, abstractmethod
 from concurrent.futures import Future
 from types import TracebackType
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,6 +87,28 @@ def pickled(evaluator: Evaluator) -> bytes:
             "workers can't find functions of the program that starts them", hint=PICKLING_HINT
         )
     return blob
+
+
+def send(stream: IO[bytes], message: Any) -> None:
+    """Write a message between a pool and its workers as a pickle, which ends by itself.
+
+    Raises:
+        OSError: the process at the other end has closed the pipe.
+    """
+    stream.write(pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL))
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> Any:
+    """Read a message.
+
+    Raises:
+        EOFError: the process at the other end has closed the pipe.
+    """
+    try:
+        return pickle.load(stream)
+    except pickle.UnpicklingError as error:  # it was killed while it wrote
+        raise EOFError from error
 
 
 PICKLING_HINT = "Put the function into a file and name it as FILE.py:FUNCTION, or use one worker"

@@ -25,8 +25,7 @@ from numpy.typing import NDArray
 from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
-from optisense.search.executors._wire import receive, send
-from optisense.search.executors.base import Runner, pickled
+from optisense.search.executors.base import Runner, pickled, receive, send
 from optisense.usual_times import processors
 
 MOST_DEATHS = 2
