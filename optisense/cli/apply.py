@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -30,11 +31,8 @@ def apply(
     from optisense.search.study.applied import design_of
     from optisense.sensors import save_design
 
-    opened = Study.open(study)
-    try:
+    with closing(Study.open(study)) as opened:
         chosen = opened.trial(trial)
         save_design(design_of(opened, chosen), out, new=True)
         output.print(f"{out / 'design.yaml'}")
         output.print(f"trial {chosen.number}: {opened.objective} {chosen.unbiased_score:.4g}")
-    finally:
-        opened.close()

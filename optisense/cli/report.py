@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -92,8 +93,7 @@ def report(
     from optisense.search import Study
 
     page = study / REPORT_FILE if out is None else out
-    opened = Study.open(study)
-    try:
+    with closing(Study.open(study)) as opened:
         if page.is_dir():
             raise typer.BadParameter(f"'{page}' is a folder", param_hint="--out")
         ensure_writable(page.parent)
@@ -103,8 +103,6 @@ def report(
             shown = _pictures(opened, count, line)
             line.begin(WRITING)
             write_study_report(page, opened, views, pictures=shown, named=str(study))
-    finally:
-        opened.close()
     output.print(f"report: {page}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ from optisense.cli.console import messages, output
 
 if TYPE_CHECKING:
     from optisense.report.before_after import DesignView
+    from optisense.report.live import LiveServer
     from optisense.search import Study
 
 POLL_INTERVAL = 1.0
@@ -32,31 +34,22 @@ def watch(study: Path, port: int, pictures: bool) -> None:
     from optisense.report.live import LiveServer
     from optisense.search import Study
 
-    opened = Study.open(study)
-    try:
-        server = LiveServer(port)
-        try:
-            watched = _Watched(opened, str(study), server, pictures)
+    with closing(Study.open(study)) as opened, closing(LiveServer(port)) as server:
+        watched = _Watched(opened, str(study), server, pictures)
+        watched.refresh()
+        output.print(f"watching: {server.address}")
+        messages.print("Open it in a browser of this machine. Ctrl-C ends it.")
+        while True:
+            watched.answer()
             watched.refresh()
-            output.print(f"watching: {server.address}")
-            messages.print("Open it in a browser of this machine. Ctrl-C ends it.")
-            while True:
-                watched.answer()
-                watched.refresh()
-        finally:
-            server.close()
-    finally:
-        opened.close()
 
 
 class _Watched:
     """Study and the page that shows it."""
 
-    def __init__(self, study: Study, named: str, server: object, pictures: bool) -> None:
-        from optisense.report.live import LiveServer
+    def __init__(self, study: Study, named: str, server: LiveServer, pictures: bool) -> None:
         from optisense.report.trial_pictures import TrialPictures
 
-        assert isinstance(server, LiveServer)
         self._study, self._named, self._server = study, named, server
         self._pictures = TrialPictures(study) if pictures else None
         self._version = ""

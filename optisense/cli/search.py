@@ -16,11 +16,10 @@ from optisense.cli.asking import ask_yes
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
 from optisense.cli.options import VariantOption, WorkersOption, json_option, out_option
 from optisense.cli.search_result import print_result, summary
-from optisense.cli.searching import expect_search, search_progress
+from optisense.cli.searching import search_progress
 from optisense.commands.searching import SearchOptions
 
 if TYPE_CHECKING:
-    from optisense.cli.progress import ProgressLine
     from optisense.search import Study
 
 VERIFIED_FROM = 300.0
@@ -93,7 +92,7 @@ def search(
         study = _resumed_study(out, design, options.as_stored(), trust) if resume else None
         with search_progress(workers if cluster is None else 0) as (line, show):
             if study is None:
-                study = _new_study(out, design, options, line)
+                study = _new_study(out, design, options)
             from optisense.search import run_study
 
             stack.callback(study.close)
@@ -150,7 +149,7 @@ def _verify(study: Path, variant: str) -> None:
         messages.print(f"the best design can't be verified: {error}", style="yellow")
 
 
-def _new_study(out: Path, design: str | None, options: SearchOptions, line: ProgressLine) -> Study:
+def _new_study(out: Path, design: str | None, options: SearchOptions) -> Study:
     """Return a new study of the given options."""
     from optisense.sensors import load
 
@@ -160,7 +159,6 @@ def _new_study(out: Path, design: str | None, options: SearchOptions, line: Prog
         if not given:
             raise typer.BadParameter("must be given at least once", param_hint=name)
     sensor = load(design)
-    expect_search(line, sensor, options)
     from optisense.search import Study
     from optisense.search.study.advice import advice
 

@@ -5,36 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from optisense.cli.console import messages
 from optisense.cli.progress import ProgressLine, about, progress_line
-from optisense.quality import TRIAL_PHOTONS
 from optisense.time_left import TimedStep
 from optisense.usual_times import UsualTimes
 
 if TYPE_CHECKING:
-    from optisense.commands.searching import SearchOptions
-    from optisense.design import SensorDesign
-    from optisense.objectives.usual_score import UsualTrials
     from optisense.search import SearchProgress
 
 LOADING = "loading"
 
-LOADING_TIME, CMA_LIBRARIES = 0.7, 0.8
-"""Time to load the program and a design, s, and to load the library of CMA-ES, which imports those
-for plots and statistics.
-"""
-
-
-RELIT_METHODS = ("light-colours",)
-"""Methods whose trials take next to no time, since they render nothing."""
-
-USUAL_FRESH, FRESH_SEEDS = 9, 3
-"""Number of scores with fresh seeds, and of these seeds, until the study gives other numbers; they
-are those of `optisense.search.study.stages`, which loads slowly.
-"""
+LOADING_TIME = 0.7
+"""Time to load the program and a design, s."""
 
 WORTH_STOPPING = 20.0
 """Time left (s) from which on a search is worth stopping. With less left, warnings are left to its
@@ -75,52 +59,6 @@ def search_progress(workers: int) -> Iterator[SearchLine]:
             line.show(*stage_text(progress), progress.seconds_left, notes(progress))
 
         yield SearchLine(line, show)
-
-
-def expect_search(line: ProgressLine, design: SensorDesign, options: SearchOptions) -> None:
-    """Estimate the time left from the options, before the study is created, which takes a while.
-
-    Errors in the options are left to the study, and so is the number of trials if no budget is
-    given.
-    """
-    expect = line.time_left.expect
-    if options.method in (None, "cma-es"):
-        expect(LOADING, seconds=(LOADING_TIME + CMA_LIBRARIES) * UsualTimes.here().thread_pace)
-    budget = 0 if options.method in RELIT_METHODS else options.budget
-    if budget is None or not options.objectives:
-        return
-    full = usual_trials(design, options.objectives, options.settings)
-    if full is None:
-        return
-    trials = full
-    if options.coarse_first:
-        from optisense.search.evaluation.coarse import coarse_settings
-
-        coarse = coarse_settings(design, {"photons": TRIAL_PHOTONS, **options.settings})
-        trials = usual_trials(design, options.objectives, coarse) or full
-    expect("start", seconds=trials.first)
-    expect("trials", count=budget, seconds=trials.trial)
-    fresh = FRESH_SEEDS if options.method in RELIT_METHODS else USUAL_FRESH
-    expect("fresh seeds", count=fresh, seconds=full.fresh)
-
-
-def usual_trials(
-    design: SensorDesign, objectives: list[str], settings: Mapping[str, object]
-) -> UsualTrials | None:
-    """Return the usual duration of trials of a design, or None if it can't be estimated from the
-    options.
-    """
-    from optisense.errors import OptiSenseError
-    from optisense.objectives.settings import Settings
-    from optisense.objectives.usual_score import UsualTrials, usual_score
-
-    shared = {field.name for field in fields(Settings)}
-    given: dict[str, Any] = {name: value for name, value in settings.items() if name in shared}
-    try:
-        usual = usual_score(design, objectives, Settings(**given))
-    except (OptiSenseError, TypeError, ValueError):  # reported later, where it is read in full
-        return None
-    return UsualTrials.of(usual, usual.building + usual.whole, usual.whole)
 
 
 def stage_text(progress: SearchProgress) -> tuple[str, int | None, int | None]:

@@ -20,7 +20,6 @@ from optisense.cli.options import (
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import about, progress_line
-from optisense.cli.searching import usual_trials
 from optisense.commands.scoring import ToleranceOptions
 from optisense.time_left import TimedStep
 from optisense.usual_times import LOADING as LOADING_TIME
@@ -72,10 +71,6 @@ def tolerance(
         from optisense.sensors import load
 
         sensor = load(design)
-        usual = usual_trials(sensor, options.objectives, settings)
-        if usual is not None:
-            line.time_left.expect(FIRST, seconds=usual.first)
-            line.time_left.expect(SENSORS, count=options.sensors, seconds=usual.trial)
         from optisense.search.space.text import parse_errors
         from optisense.search.tolerance.analysis import tolerance as find_tolerance
 

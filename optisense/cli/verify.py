@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -209,8 +210,7 @@ def _designs(
         raise typer.BadParameter(
             f"'{first}' is no study; name a second design to compare it with", param_hint="DESIGN"
         )
-    study = Study.open(first)
-    try:
+    with closing(Study.open(first)) as study:
         chosen = study.trial(trial)
         if chosen.is_start:
             raise SearchError(
@@ -219,8 +219,6 @@ def _designs(
                 hint="Search on, choose a --trial NUMBER, or name two designs",
             )
         return ("the start", f"trial {chosen.number}"), (study.space.design, chosen.design)
-    finally:
-        study.close()
 
 
 def _model(name: str, design: SensorDesign, variant: str) -> OpticalModel:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from typing import TYPE_CHECKING, Any
 
 from optisense.cli.console import output, table_of
@@ -52,16 +53,13 @@ def conditions_of(folder: str, which: str) -> list[dict[str, Any]]:
     from optisense.search import Study
     from optisense.search.study.conditions import margins
 
-    study = Study.open(folder)
-    try:
+    with closing(Study.open(folder)) as study:
         chosen, start = study.trial(which), study.start
         before = {} if start is None else dict(start.conditions)
         return [
             {"condition": text, "start": before.get(text), "trial": value, "margin": margin}
             for text, value, margin in margins(chosen)
         ]
-    finally:
-        study.close()
 
 
 def print_conditions(conditions: list[dict[str, Any]]) -> None:

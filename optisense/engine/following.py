@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import threading
 import time
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,8 +73,7 @@ class Following:
         """
         from optisense.search import Study
 
-        study = Study.open(self._folder)
-        try:
+        with closing(Study.open(self._folder)) as study:
             self._job.send(
                 "begun",
                 study=str(self._folder),
@@ -85,8 +85,6 @@ class Following:
             self._job.on_cancel(self._cancel)
             self._follow(study)
             summary = self._outcome(study)
-        finally:
-            study.close()
         return {
             "study": str(self._folder),
             "done": self._done,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -220,15 +219,10 @@ def apply(session: Session, fields: Apply, job: Job) -> dict[str, Any]:
         return {"folder": str(folder), "number": chosen.number}
 
 
-@contextmanager
-def _opened(folder: Path) -> Iterator[Study]:
+def _opened(folder: Path) -> closing[Study]:
     from optisense.search import Study
 
-    study = Study.open(folder)
-    try:
-        yield study
-    finally:
-        study.close()
+    return closing(Study.open(folder))
 
 
 def _absolute(folder: str) -> Path:
