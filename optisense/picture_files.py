@@ -52,6 +52,13 @@ def decode_picture(data: bytes, path: Path, error: type[OptiSenseError]) -> NDAr
         ) from None
 
 
+def png(picture: NDArray[np.uint8]) -> bytes:
+    """Return an array (h, w, 3) or (h, w), uint8, as the content of a PNG file."""
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, format="PNG")
+    return content.getvalue()
+
+
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
     """Write an array (h, w, 3), uint8, as a PNG file."""
-    Image.fromarray(picture).save(path, format="PNG")
+    path.write_bytes(png(picture))

@@ -70,7 +70,7 @@ class _Watched:
         """Wait up to `POLL_INTERVAL` seconds for a browser's request for a trial's picture, and
         answer it.
         """
-        from optisense.report.pictures import png
+        from optisense.picture_files import png
 
         asked = self._server.wait(POLL_INTERVAL)
         if asked is None:

@@ -53,9 +53,9 @@ class Files:
 
     def picture(self, rest: str, picture: NDArray[np.uint8]) -> str:
         """Write a picture (h, w, 3) uint8 as a PNG file, and return its path."""
-        from optisense.report.pictures import png
+        from optisense.picture_files import write_picture
 
-        return self._write(rest, lambda path: path.write_bytes(png(picture)))
+        return self._write(rest, lambda path: write_picture(path, picture))
 
     def array(self, rest: str, values: NDArray[Any]) -> str:
         """Write an array of any shape as a NumPy file, and return its path."""

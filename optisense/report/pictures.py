@@ -1,51 +1,19 @@
-"""Encoding of arrays as PNG pictures inside a page."""
+"""Arrays as PNG pictures inside a page, and the colours of what they show."""
 
 from __future__ import annotations
 
 import base64
-import struct
-import zlib
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import ByteArray, FloatingArray
+from optisense.picture_files import png
 
 MOST_STRETCHED = 4.0
 """Stretching at the end of the colour scale: a ball four times as long as wide hardly looks like a
 ball, and finer differences beyond that matter little.
 """
-
-
-UP = 2
-"""PNG's filter type that stores the difference of each row from the row above it; pictures of
-smooth surfaces become a third smaller with it.
-"""
-
-
-def png(picture: ByteArray) -> bytes:
-    """Return a PNG file of a picture.
-
-    Args:
-        picture: picture (h, w, 3) or (h, w), uint8, row 0 on top.
-    """
-    if picture.dtype != np.uint8 or picture.ndim not in (2, 3):
-        raise ValueError(f"expected a (h, w[, 3]) uint8 picture, got {picture.dtype}")
-    height, width = picture.shape[:2]
-    colour_type = 0 if picture.ndim == 2 else 2
-    rows = picture.reshape(height, -1)
-    filtered = np.full((height, rows.shape[1] + 1), UP, dtype=np.uint8)
-    filtered[:1, 1:] = rows[:1]
-    np.subtract(rows[1:], rows[:-1], out=filtered[1:, 1:])  # modulo 256, as the format requires
-    header = struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)
-    return b"".join(
-        [
-            b"\x89PNG\r\n\x1a\n",
-            _chunk(b"IHDR", header),
-            _chunk(b"IDAT", zlib.compress(filtered.tobytes(), 6)),
-            _chunk(b"IEND", b""),
-        ]
-    )
 
 
 def data_uri(picture: ByteArray) -> str:
@@ -116,8 +84,3 @@ def mask_overlay(picture: ByteArray, mask: NDArray[np.bool_]) -> ByteArray:
     shown = np.where(mask[..., None], picture, grey.astype(np.uint8))
     shown[mask & ~binary_erosion(mask)] = 255
     return shown.astype(np.uint8)
-
-
-def _chunk(kind: bytes, content: bytes) -> bytes:
-    checksum = zlib.crc32(kind + content)
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", checksum)

@@ -8,18 +8,14 @@ import io
 import numpy as np
 from PIL import Image
 
-from optisense.report.pictures import (
-    data_uri,
-    mask_overlay,
-    normal_colours,
-    png,
-)
+from optisense.picture_files import png
+from optisense.report.pictures import data_uri, mask_overlay, normal_colours
 
 AXES = np.array([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 """Image right, image up and viewing direction of a camera that looks along +z."""
 
 
-def test_another_reader_reads_the_same_pixels() -> None:
+def test_the_same_pixels_are_read_back() -> None:
     pixels = np.random.default_rng(0).integers(0, 256, (7, 11, 3)).astype(np.uint8)
     assert np.array_equal(np.asarray(Image.open(io.BytesIO(png(pixels)))), pixels)
     grey = pixels[..., 0]
