@@ -12,7 +12,7 @@ from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, ou
 from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
-from optisense.commands.comparing import CalibrateOptions, read_range
+from optisense.commands.comparing import CalibrateOptions
 from optisense.time_left import TimedStep
 from optisense.writing import write_json, write_text, written_together
 
@@ -48,19 +48,10 @@ def calibrate(
         line.begin(LOADING)
         from optisense.calibration import read_photographs
         from optisense.calibration.calibrating import calibrate as fit_design
-        from optisense.calibration.families import FAMILIES, chosen_families
         from optisense.calibration.kept_renderings import KeptRenderings
-        from optisense.calibration.settings import CalibrationSettings
         from optisense.report.calibration import render_calibration
         from optisense.sensors import load, save_design
 
-        for option, names in (("--keep", options.keep), ("--also", options.also)):
-            for name in names:
-                if name not in FAMILIES:
-                    raise typer.BadParameter(
-                        f"'{name}' is none of " + ", ".join(FAMILIES), param_hint=option
-                    )
-        asked = tuple(_parsed_range(text) for text in options.fit)
         sensor = load(design)
         photographs = read_photographs(photos, options.ball)
         take_folder(out)
@@ -76,15 +67,7 @@ def calibrate(
             found = fit_design(
                 sensor,
                 photographs,
-                CalibrationSettings(
-                    families=chosen_families(options.keep, options.also),
-                    asked=asked,
-                    rounds=options.rounds,
-                    photons=options.photons,
-                    seed=options.seed,
-                    refine=not options.as_labelled,
-                    held_out=tuple(options.hold_out) or None,
-                ),
+                options.settings(),
                 variant=variant,
                 kept=kept,
                 progress=report,
@@ -143,12 +126,3 @@ def print_calibration(found: Calibration) -> None:
 
 def _figures(found: Realism) -> list[str]:
     return [*(f"{found.median(name):.3f}" for name in COLUMNS), f"{found.background.ratio:.1f}"]
-
-
-def _parsed_range(text: str) -> tuple[str, float, float]:
-    try:
-        return read_range(text)
-    except ValueError:
-        raise typer.BadParameter(
-            f"'{text}' is not PATH=LO:HI, such as camera.fov=45:60", param_hint="--fit"
-        ) from None

@@ -2,18 +2,49 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from annotated_types import Ge, Le
-from pydantic import Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from optisense.commands.options import CommandOptions, OptionNotation, Photons, Seed
+from optisense.commands.options import CommandOptions, OptionNotation, Photons, Seed, one_of
 from optisense.quality import FIT_PHOTONS, PICTURE_PHOTONS
 
 LARGEST_BALL = 1000.0
 """Largest diameter of a ball, mm; sensors are far smaller, so a larger value is an error of the
 unit.
 """
+
+
+def _family(name: str) -> str:
+    """Return the name of a family of numbers that a calibration may fit.
+
+    Raises:
+        ValueError: there is no such family.
+    """
+    from optisense.calibration.families import FAMILIES
+
+    return one_of(FAMILIES)(name)
+
+
+def _number_range(text: str) -> tuple[str, float, float]:
+    """Return the path, the lowest and the highest value of a PATH=LO:HI.
+
+    Raises:
+        ValueError: the text is something else.
+    """
+    path, equals, given = text.partition("=")
+    low, colon, high = given.partition(":")
+    try:
+        if not (equals and colon and path.strip()):
+            raise ValueError
+        return path.strip(), float(low), float(high)
+    except ValueError:
+        raise ValueError(f"'{text}' is not PATH=LO:HI, such as camera.fov=45:60") from None
+
+
+FamilyName = Annotated[str, AfterValidator(_family)]
+NumberRange = Annotated[tuple[str, float, float], BeforeValidator(_number_range)]
 
 
 class PhotographOptions(CommandOptions):
@@ -43,17 +74,17 @@ class CompareOptions(PhotographOptions):
 class CalibrateOptions(PhotographOptions):
     """Options of a fit of a design to photographs."""
 
-    keep: Annotated[list[str], OptionNotation("NAME")] = Field(
+    keep: Annotated[list[FamilyName], OptionNotation("NAME")] = Field(
         [],
         description="What the fit does not change: powers, colours, tone, black, shading, view or "
         "place. May be given several times.",
     )
-    also: Annotated[list[str], OptionNotation("NAME")] = Field(
+    also: Annotated[list[FamilyName], OptionNotation("NAME")] = Field(
         [],
         description="What the fit also changes: pose, distortion, leds, lights, rows, emission, "
         "edges, coating, gel or indices. May be given several times.",
     )
-    fit: Annotated[list[str], OptionNotation("PATH=LO:HI")] = Field(
+    fit: Annotated[list[NumberRange], OptionNotation("PATH=LO:HI")] = Field(
         [],
         description="Another number of the design that the fit changes, and its range, such as "
         "coating.specularity=0:0.4. May be given several times.",
@@ -71,15 +102,17 @@ class CalibrateOptions(PhotographOptions):
     )
     seed: Seed = Field(0, description="The same seed gives the same light.")
 
+    def settings(self) -> Any:
+        """Return the settings of a calibration, which take a second to load."""
+        from optisense.calibration.families import chosen_families
+        from optisense.calibration.settings import CalibrationSettings
 
-def read_range(text: str) -> tuple[str, float, float]:
-    """Return the path, the lowest and the highest value of a PATH=LO:HI.
-
-    Raises:
-        ValueError: the text is something else.
-    """
-    path, equals, given = text.partition("=")
-    low, colon, high = given.partition(":")
-    if not (equals and colon and path.strip()):
-        raise ValueError
-    return path.strip(), float(low), float(high)
+        return CalibrationSettings(
+            families=chosen_families(self.keep, self.also),
+            asked=tuple(self.fit),
+            rounds=self.rounds,
+            photons=self.photons,
+            seed=self.seed,
+            refine=not self.as_labelled,
+            held_out=tuple(self.hold_out) or None,
+        )

@@ -6,9 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from optisense.calibration.families import FAMILIES, USUAL, chosen_families
-from optisense.commands.comparing import CalibrateOptions, read_range
-from optisense.engine.failures import ProtocolError
+from optisense.calibration.families import FAMILIES, USUAL
+from optisense.commands.comparing import CalibrateOptions
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, design_of
@@ -45,18 +44,9 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
     """Fit a design to photographs, and write the fitted design and its report."""
     from optisense.calibration import read_photographs
     from optisense.calibration.calibrating import calibrate as fit_design
-    from optisense.calibration.settings import CalibrationSettings
     from optisense.report.calibration import render_calibration
     from optisense.sensors import save_design
 
-    for where, names in (("keep", fields.keep), ("also", fields.also)):
-        for name in names:
-            if name not in FAMILIES:
-                raise ProtocolError(
-                    f"there is no family of numbers '{name}'",
-                    where=where,
-                    hint="Use " + ", ".join(FAMILIES),
-                )
     design = design_of(session, fields, job)
     session.designs.require_valid(design)
     job.progress(0.0, "reading the photographs")
@@ -71,15 +61,7 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
         found = fit_design(
             design,
             photographs,
-            CalibrationSettings(
-                families=chosen_families(fields.keep, fields.also),
-                asked=tuple(_asked(text) for text in fields.fit),
-                rounds=fields.rounds,
-                photons=fields.photons,
-                seed=fields.seed,
-                refine=not fields.as_labelled,
-                held_out=tuple(fields.hold_out) or None,
-            ),
+            fields.settings(),
             variant=session.renderer.variant,
             progress=report,
         )
@@ -102,16 +84,3 @@ def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
         "verdict": found.verdict(),
         "notes": [*found.before.notes, *found.notes],
     }
-
-
-def _asked(text: str) -> tuple[str, float, float]:
-    """Return the path and bounds of a further parameter of the fit.
-
-    Raises:
-        ProtocolError: the text is not PATH=LO:HI.
-    """
-    try:
-        return read_range(text)
-    except ValueError:
-        hint = "Write PATH=LO:HI, such as camera.fov=45:60"
-        raise ProtocolError(f"'{text}' is no range of a number", where="fit", hint=hint) from None

@@ -50,6 +50,6 @@ def test_the_power_of_a_light_is_found_from_photographs(engine: Any, tmp_path: P
     assert found["unexplained"][1] < found["unexplained"][0]
     assert (to / "design.yaml").is_file() and Path(found["page"]).is_file()
     refused = engine.refused("calibrate", to=str(tmp_path / "n"), keep=["weather"], **given)
-    assert refused["where"] == "keep" and "powers" in refused["hint"]
+    assert "keep" in refused["message"] and "powers" in refused["message"]
     refused = engine.refused("calibrate", to=str(tmp_path / "n"), fit=["camera.fov"], **given)
-    assert "PATH=LO:HI" in refused["hint"]
+    assert "PATH=LO:HI" in refused["message"]
