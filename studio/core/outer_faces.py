@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .mesh_file import Mesh
+from .outlines import face_normals
 
 FACING = 30.0
 """Largest angle in degrees between a face and the outward direction for the faces that the
@@ -33,7 +34,7 @@ def outer_faces(mesh: Mesh, outward: NDArray[np.float64]) -> NDArray[np.int64]:
     Returns:
         Indices of faces, (k,); empty if no face faces outward.
     """
-    normals = face_normals(mesh)
+    normals = face_normals(mesh.vertices[mesh.faces])
     way = outward / np.linalg.norm(outward)
     facing = normals @ way > math.cos(math.radians(FACING))
     if not facing.any():
@@ -63,13 +64,6 @@ def skin_of(mesh: Mesh, faces: NDArray[np.int64]) -> Mesh:
     used, numbered = np.unique(chosen, return_inverse=True)
     turned = numbered.reshape(-1, 3)[:, ::-1]
     return Mesh(mesh.vertices[used], np.ascontiguousarray(turned, dtype=np.int32))
-
-
-def face_normals(mesh: Mesh) -> NDArray[np.float64]:
-    """Return unit normals of the faces, (m, 3); zero for a face without area."""
-    one, two, three = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
-    found = np.cross(two - one, three - one)
-    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
 
 
 def _welded(mesh: Mesh) -> NDArray[np.int64]:

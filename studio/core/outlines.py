@@ -49,6 +49,13 @@ def feature_edges(
     return np.sort(np.concatenate([shared[bent], np.flatnonzero((count == 1) | (count > 2))]))
 
 
+def face_normals(triangles: ArrayLike) -> NDArray[np.float64]:
+    """Return unit normals of triangles (m, 3, 3), (m, 3); zero for one without area."""
+    one, two, three = np.moveaxis(np.asarray(triangles), 1, 0)
+    found = np.cross(two - one, three - one)
+    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
+
+
 def beam(
     shape: str, size: tuple[float, float], half_angle: float, length: float
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

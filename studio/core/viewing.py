@@ -79,7 +79,8 @@ def resized(picture: NDArray[np.float32], width: int, height: int) -> NDArray[np
     """Return a picture at another size by nearest neighbours, (height, width, channels)."""
     rows = np.arange(height) * picture.shape[0] // height
     columns = np.arange(width) * picture.shape[1] // width
-    return picture[rows[:, None], columns]
+    # faster than indexing with both
+    return np.take(np.take(picture, columns, axis=1), rows, axis=0)
 
 
 def coloured(

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..core import outlines
 from ..scene.collections import objects_of
 from ..scene.lamps import lamp_colour, window
+from ..scene.meshes import shown_vertices
 from .section import plane
 
 LINE = (0.62, 0.68, 0.75)
@@ -56,9 +57,7 @@ def outline(part: bpy.types.Object) -> NDArray[np.float32]:
         kept = _edges[part.name] = (size, _feature_edges(mesh))
     ends = np.empty(2 * size[1], dtype=np.int32)
     mesh.edges.foreach_get("vertices", ends)
-    places = np.empty(3 * size[0], dtype=np.float32)
-    mesh.vertices.foreach_get("co", places)
-    chosen = places.reshape(-1, 3)[ends.reshape(-1, 2)[kept[1]].ravel()]
+    chosen = shown_vertices(mesh)[ends.reshape(-1, 2)[kept[1]].ravel()]
     return in_world(chosen, part.matrix_world)
 
 
@@ -90,7 +89,7 @@ def _draw() -> None:
     try:
         for part in objects_of(scene, "PART"):
             if part.visible_get() and part.mode != "EDIT":
-                draw_lines(cut_lines(scene, outline(part)), (*LINE, OUTLINE_OPACITY))
+                draw_lines(cut(scene, outline(part), 2), (*LINE, OUTLINE_OPACITY))
         gpu.state.depth_mask_set(False)
         for each in when_drawing:
             each(scene)
@@ -166,14 +165,16 @@ def draw_faces(corners: NDArray[np.float32], colours: NDArray[np.float32]) -> No
     batch.draw(shader)
 
 
-def cut_lines(scene: bpy.types.Scene, ends: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the lines that lie entirely on the shown side of a scene's section plane, (2 m, 3)."""
+def cut(scene: bpy.types.Scene, corners: NDArray[np.float32], size: int) -> NDArray[np.float32]:
+    """Return the lines (`size` 2) or triangles (3) that lie entirely on the shown side of a scene's
+    section plane, by their corners (`size` * m, 3).
+    """
     found = plane(scene)
-    if found is None or not len(ends):
-        return ends
+    if found is None or not len(corners):
+        return corners
     normal, offset = np.array(found[:3]), found[3]
-    kept = (ends @ normal + offset > 0.0).reshape(-1, 2).all(axis=1)
-    return ends.reshape(-1, 2, 3)[kept].reshape(-1, 3)
+    kept = (corners @ normal + offset > 0.0).reshape(-1, size).all(axis=1)
+    return corners.reshape(-1, size, 3)[kept].reshape(-1, 3)
 
 
 @bpy.app.handlers.persistent

@@ -15,6 +15,7 @@ from ..engine import session
 from ..engine.latest_request import LatestRequest
 from ..scene.collections import is_edited
 from ..scene.contacts import sensing_surface
+from ..scene.meshes import shown_vertices
 from . import drawing, section
 
 KINDS = ("PART", "CAMERA", "CAGE")
@@ -133,10 +134,10 @@ def _draw(scene: bpy.types.Scene) -> None:
     _draw_faces(scene, _shown["seen"], SEEN)
     if surface is not None and surface.visible_get():
         skin = skin_triangles(surface)
-        shift = UNSEEN_LIFT * np.repeat(face_normals(skin), 3, axis=0)
+        shift = UNSEEN_LIFT * np.repeat(outlines.face_normals(skin.reshape(-1, 3, 3)), 3, axis=0)
         for side in (1.0, -1.0):
             _draw_faces(scene, skin + side * shift, UNSEEN)
-    border = drawing.cut_lines(scene, _shown["border"])
+    border = drawing.cut(scene, _shown["border"], 2)
     drawing.draw_lines(border, BORDER, width=BORDER_WIDTH)
     gpu.state.depth_mask_set(False)
 
@@ -144,20 +145,8 @@ def _draw(scene: bpy.types.Scene) -> None:
 def _draw_faces(
     scene: bpy.types.Scene, corners: NDArray[np.float32], colour: tuple[float, ...]
 ) -> None:
-    corners = cut_faces(scene, corners)
+    corners = drawing.cut(scene, corners, 3)
     drawing.draw_faces(corners, np.tile(np.array(colour, dtype=np.float32), (len(corners), 1)))
-
-
-def cut_faces(scene: bpy.types.Scene, corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return the triangles that lie entirely on the shown side of a scene's section plane, (3 m,
-    3).
-    """
-    found = section.plane(scene)
-    if found is None or not len(corners):
-        return corners
-    normal, offset = np.array(found[:3]), found[3]
-    kept = (corners @ normal + offset > 0.0).reshape(-1, 3).all(axis=1)
-    return corners.reshape(-1, 3, 3)[kept].reshape(-1, 3)
 
 
 def skin_triangles(surface: bpy.types.Object) -> NDArray[np.float32]:
@@ -166,16 +155,7 @@ def skin_triangles(surface: bpy.types.Object) -> NDArray[np.float32]:
     mesh.calc_loop_triangles()
     corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
-    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", places)
-    return drawing.in_world(places.reshape(-1, 3)[corners], surface.matrix_world)
-
-
-def face_normals(corners: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Return unit normals of triangles with corners (3 n, 3), (n, 3); zero for one without area."""
-    one, two, three = np.moveaxis(corners.reshape(-1, 3, 3), 1, 0)
-    found = np.cross(two - one, three - one)
-    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-12)
+    return drawing.in_world(shown_vertices(mesh)[corners], surface.matrix_world)
 
 
 def _leave() -> None:

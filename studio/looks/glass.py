@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..scene import kinds
 from ..scene.collections import objects_of
+from ..scene.meshes import shown_vertices
 from . import drawing, section
 from .drawing import MOST_FACES, in_world
 
@@ -152,8 +153,7 @@ def _batch(part: bpy.types.Object) -> Any:
     mesh = part.data
     if not 0 < len(mesh.polygons) <= MOST_FACES:
         return None
-    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", places)
+    places = shown_vertices(mesh).ravel()
     weights = np.arange(1, len(places) + 1, dtype=np.float32)
     state = (part.matrix_world.copy().freeze(), len(mesh.polygons), float(places @ weights))
     kept = _batches.get(part.name)
@@ -179,11 +179,9 @@ def triangles(mesh: bpy.types.Mesh) -> tuple[NDArray[np.float32], NDArray[np.flo
     mesh.loop_triangles.foreach_get("loops", loops)
     vertices = np.empty(3 * count, dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", vertices)
-    places = np.empty(3 * len(mesh.vertices), dtype=np.float32)
-    mesh.vertices.foreach_get("co", places)
     normals = np.empty(3 * len(mesh.loops), dtype=np.float32)
     mesh.corner_normals.foreach_get("vector", normals)
-    return places.reshape(-1, 3)[vertices], normals.reshape(-1, 3)[loops]
+    return shown_vertices(mesh)[vertices], normals.reshape(-1, 3)[loops]
 
 
 @bpy.app.handlers.persistent

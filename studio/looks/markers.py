@@ -103,7 +103,7 @@ def _draw(scene: bpy.types.Scene) -> None:
     if not is_on(scene) or surface is None or not surface.visible_get():
         return
     if _shown.get("of") == surface.as_pointer():
-        corners = footprint.cut_faces(scene, _shown["corners"])
+        corners = drawing.cut(scene, _shown["corners"], 3)
         drawing.draw_faces(corners, np.tile(np.float32(INK), (len(corners), 1)))
 
 

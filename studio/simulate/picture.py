@@ -10,6 +10,8 @@ import bpy.utils.previews
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.viewing import resized
+
 IMAGE = "OptiSense picture"
 
 PAUSE = 0.5
@@ -85,9 +87,7 @@ def enlarged(pixels: NDArray[np.float32], size: tuple[int, int]) -> NDArray[np.f
     height, width = pixels.shape[:2]
     if width >= size[0] or height >= size[1]:
         return pixels
-    rows = np.arange(size[1]) * height // size[1]
-    columns = np.arange(size[0]) * width // size[0]
-    return np.take(np.take(pixels, columns, axis=1), rows, axis=0)  # faster than indexing with both
+    return resized(pixels, *size)
 
 
 def kind(now: bpy.types.PropertyGroup) -> str:

@@ -11,7 +11,7 @@ from mathutils import Vector
 from waiting import until
 
 from studio.core import outlines
-from studio.looks import footprint
+from studio.looks import drawing, footprint
 from studio.scene.collections import objects_of
 from studio.scene.contacts import sensing_surface
 
@@ -88,7 +88,7 @@ def test_the_section_cuts_it(shown: Any) -> None:
     looks = shown.optisense_looks
     whole = footprint._shown["seen"]
     looks.cut, looks.axis, looks.share = True, "X", 0.5
-    half = footprint.cut_faces(shown, whole)
+    half = drawing.cut(shown, whole, 3)
     assert 0.3 < len(half) / len(whole) < 0.7 and (half[:, 0] > -0.1).all()
 
 

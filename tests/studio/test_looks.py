@@ -85,7 +85,7 @@ def test_the_section_goes_from_the_whole_sensor_to_nothing(mini: Any) -> None:
             shares.append((corners @ (a, b, c) + d > 0.0).mean())
         assert shares[0] == 1.0 and shares[2] == 0.0 and 0.0 < shares[1] < 1.0
     looks.axis, looks.share = "Z", 1.0
-    assert len(drawing.cut_lines(mini, corners[: len(corners) // 2 * 2])) == 0
+    assert len(drawing.cut(mini, corners[: len(corners) // 2 * 2], 2)) == 0
 
 
 def test_gel_and_acrylic_are_glassy_and_nothing_is_drawn_as_wire(mini: Any) -> None:

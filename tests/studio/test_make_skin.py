@@ -12,6 +12,7 @@ import pytest
 
 from studio.core import outer_faces
 from studio.core.mesh_file import Mesh
+from studio.core.outlines import face_normals
 from studio.engine import session
 from studio.scene.cages import cage_data, follow, shown_points
 from studio.scene.collections import object_of, objects_of
@@ -43,7 +44,7 @@ def test_the_top_of_a_box_and_no_side() -> None:
         assert len(faces) == 2
         skin = outer_faces.skin_of(box, faces)
         np.testing.assert_allclose(
-            outer_faces.face_normals(skin), [np.negative(way)] * 2, atol=1e-6
+            face_normals(skin.vertices[skin.faces]), [np.negative(way)] * 2, atol=1e-6
         )
         assert len(skin.vertices) == 4 and skin.vertices @ way == pytest.approx(1.0)
 
@@ -74,7 +75,7 @@ def test_one_press_makes_the_skin_of_a_mini(mini: Any, select: Callable[..., Non
     made = part_mesh(skin, caged=False)
     np.testing.assert_allclose(made.vertices.min(axis=0), old.vertices.min(axis=0), atol=1e-4)
     np.testing.assert_allclose(made.vertices.max(axis=0), old.vertices.max(axis=0), atol=1e-4)
-    assert (outer_faces.face_normals(made)[:, 2] < -0.99).all()  # it faces into the sensor
+    assert (face_normals(made.vertices[made.faces])[:, 2] < -0.99).all()  # it faces into the sensor
     bpy.ops.optisense.check()
     assert not session.state().problem
 
