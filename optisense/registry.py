@@ -179,8 +179,6 @@ def must_be(kind: type, error: type[OptiSenseError], noun: str) -> Callable[[str
     """Return a check for a `Registry` that refuses objects of other classes.
 
     Args:
-        kind: the class.
-        error: the error to raise.
         noun: what the registry holds, as messages call it.
     """
 

@@ -62,7 +62,6 @@ class Scales:
 
         Args:
             errors: errors (h, w, 3) of the background and of each response, levels.
-            expected: see the attribute.
             masks: (h, w) masks of the pixels of each response that count.
             pixels: see `RoughFit`; None estimates it from the errors.
         """

@@ -240,8 +240,6 @@ class FitRounds:
         Args:
             small, seen: see `layered_pictures`.
             steps: (n,) current values.
-            number: number of the round.
-            contacts: layers whose contacts are pressed in.
             more: number that is added to the seed.
         """
         moved = [self._chosen[number] for number in self._rendering]
@@ -302,7 +300,6 @@ class FitRounds:
         Args:
             small, seen: see `layered_pictures`.
             steps: (n,) current values.
-            number: number of the round.
             layers: layers whose contacts are pressed in again if a number does not move them.
         """
         found: dict[int, PictureSlopes] = {}

@@ -43,7 +43,6 @@ def photograph_model(
     """Return photographs of a model as if it were a real sensor.
 
     Args:
-        model: model of the sensor.
         contacts: contacts of balls, one for each photograph.
         exposure: factor on the radiance; automatic if None.
         resolution: width and height in pixels; those of the camera if None.

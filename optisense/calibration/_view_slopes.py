@@ -54,7 +54,6 @@ def view_changes(
     the response.
 
     Args:
-        layers: layers before the change.
         before, after: views before and after the change, at the size of the layers.
     """
     columns, rows = displacements(before.rays, after.rays)

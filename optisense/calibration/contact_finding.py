@@ -122,7 +122,6 @@ def find_another(
     Args:
         picture: photograph of the press, (h, w, 3).
         background: photograph of the untouched sensor, (h, w, 3).
-        known: the contact that is known.
     """
     response = difference(picture, background)
     rows, columns = np.mgrid[: response.shape[0], : response.shape[1]] + 0.5

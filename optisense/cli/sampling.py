@@ -48,7 +48,6 @@ def sample_steps(
 
     Args:
         name: name of the samples, different from that of other samples.
-        photons: photons of the samples' light.
         work: processor time of a sample on GelSight Mini, s.
         after: time of the work after the last sample, s.
         is_cached: whether the light is cached already, since other samples have used it.

@@ -53,7 +53,6 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Di
     is fast enough for searches: displacements of ordinary size take milliseconds.
 
     Args:
-        design: design to check.
         meshes: deformed meshes of the design, if they are known already.
 
     Raises:

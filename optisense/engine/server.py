@@ -61,11 +61,7 @@ class Engine:
     """Server of one front end."""
 
     def __init__(self, channel: Channel) -> None:
-        """Start the queues; nothing is loaded yet.
-
-        Args:
-            channel: channel for the answers.
-        """
+        """Start the queues; nothing is loaded yet."""
         self.session = Session()
         self._channel = channel
         self._lines = {lane: JobQueue(lane.value) for lane in (Lane.QUICK, Lane.RENDER)}

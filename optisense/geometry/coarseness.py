@@ -44,7 +44,6 @@ def chord_error(
 
     Args:
         mesh: the mesh at rest, mm, with faces.
-        bent: the same mesh, bent.
         box: (2, 3) lower and upper corner of the cage, mm.
         resolution: number of its points along x, y, z.
         points: (nx * ny * nz, 3) its control points, mm.

@@ -131,8 +131,6 @@ def place(
     ray inside the gel sees the first of the two surfaces.
 
     Args:
-        contact: the contact.
-        surface: the sensing surface.
         gel: the elastomer under it, a closed mesh; None to leave the depth unchecked.
         facet_error: largest distance of the mesh from the indenter's exact shape, mm.
 

@@ -56,7 +56,6 @@ def find_fold(
 
     Args:
         mesh: the mesh at rest, mm.
-        bent: the same mesh, bent.
         box: (2, 3) lower and upper corner of the cage, mm.
         resolution: number of its points along x, y, z.
         points: (nx * ny * nz, 3) its control points, mm.

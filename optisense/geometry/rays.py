@@ -70,7 +70,6 @@ def _hits(
     """Return the intersections of rays, numbered from ``first``, with triangles (t, 3, 3).
 
     Args:
-        corners: the triangles.
         start, way: (r, 3) origins and directions.
         middle: (t, 3) centres of the triangles' bounding spheres.
         reach: (t,) squares of their radii.

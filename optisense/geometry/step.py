@@ -69,7 +69,6 @@ def no_step(error: ImportError, action: str, instead: str, where: Path | None = 
     Args:
         action: "reading" or "writing".
         instead: hint for what a user can do without it.
-        where: the file.
     """
     place = None if where is None else str(where)
     library = re.match(r"(lib[^:]*\.so[^:]*):", str(error))

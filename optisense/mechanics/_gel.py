@@ -166,7 +166,6 @@ class Gel:
         """Solve for the skin under contacts.
 
         Args:
-            contacts: the contacts.
             placed: their placed meshes, if they are known.
 
         Raises:
@@ -222,9 +221,6 @@ class Gel:
 
     def mesh(self, contacts: Sequence[Contact]) -> SkinMesh:
         """Return the deformed sensing surface.
-
-        Args:
-            contacts: the contacts.
 
         Raises:
             ContactError: as in `pressed`.

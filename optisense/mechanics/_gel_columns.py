@@ -102,7 +102,6 @@ def gel_columns(
     Args:
         loaded: half sides (mm) of the rectangle around the contact that carries loads.
         skin: the undeformed sensing surface, in the design's frame.
-        elastomers: the gels under it.
     """
     thickness = place.thickness
     halves = [half + REACH * thickness for half in loaded]

@@ -44,7 +44,6 @@ def solve_normal_contact(
     contact problems", Wear 231 (1999), for a given approach in place of a given force.
 
     Args:
-        response: the response of the layer on the grid.
         overlap: (rows, columns) depth (mm) of the undeformed skin inside the indenter; negative
             where there is a gap.
         start: initial pressure, MPa.

@@ -306,7 +306,6 @@ def _refuse_unsettled(what: str, turns: int, change: float) -> None:
     """Refuse the result of an iteration that ends far from its solution.
 
     Args:
-        what: what is solved for.
         change: last change of the displacements, mm.
 
     Raises:

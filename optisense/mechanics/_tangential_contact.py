@@ -60,9 +60,7 @@ def solve_shear(
     pressure is neglected, as usual; it vanishes for an incompressible half-space.
 
     Args:
-        response: the response of the layer on the grid.
         pressure: (rows, columns) pressure, MPa.
-        friction: coefficient of friction.
         wanted: (2, rows, columns) displacement of the indenter along x and y, mm.
         start: (2, rows, columns) initial shear, MPa.
 

@@ -72,7 +72,6 @@ def edge_curvatures(
 
     Args:
         flat: the undeformed mesh, which determines the sharp edges.
-        bent: the same mesh, bent.
     """
     edges, pairs = inner_edges(flat)
     smooth = _angles(flat, pairs) < np.radians(SHARP)

@@ -120,7 +120,6 @@ class Press:
         """Return the colours (n, 3), 0 to 1, of the pixels of a mask (h, w).
 
         Args:
-            where: the mask.
             kind: "picture": sRGB-encoded, as a robot reads it from the camera, before rounding to 8
                 bits; or "response": linear.
 

@@ -156,7 +156,6 @@ def parameters(
     few trials.
 
     Args:
-        best: trial that is marked.
         marks: record of the positions of trials in the figure.
     """
     chosen = influences(trials, name)[:MOST_PANELS]
@@ -216,8 +215,6 @@ def front(
     """Draw two objectives against each other, with the Pareto front.
 
     Args:
-        chosen: trials of the front.
-        best: trial that is marked.
         marks: record of the positions of trials in the figure.
     """
     one, other = names[:2]

@@ -120,7 +120,6 @@ def page_data(
     """Return the data of trials for the page, ready for JSON.
 
     Args:
-        trials: trials in the data of the figures.
         strongest: indices of the parameters by the strength of their association with the score.
         pictures: pictures (h, w, 3) of some trials, by number.
         named: the study's folder as the user names it; None takes the folder's own name.

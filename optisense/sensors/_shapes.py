@@ -185,7 +185,6 @@ def row_of_lights(
     Args:
         centre: middle of the row, mm.
         along: unit vector of the row, which is also the `up` of each light.
-        count: number of lights.
         pitch: distance between neighbours, mm.
         direction: direction in which they shine.
     """

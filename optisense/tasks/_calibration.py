@@ -125,7 +125,6 @@ class CalibratedSensor:
         """Press the balls and fit the reader.
 
         Args:
-            model: the sensor.
             settings: settings of presses and reader.
             progress: function that is called with the number of balls pressed.
             readers: number of readers fitted to the same presses, each to other pixels and with
@@ -181,7 +180,6 @@ class CalibratedSensor:
         """Return the image of a contact, and the picture (h, w, 3) that the camera stores.
 
         Args:
-            contact: the contact.
             number: number of the picture; each has noise of its own.
         """
         image = self._render([contact])

@@ -106,9 +106,6 @@ class Mould:
 def moulds(made: list[Shape]) -> list[Mould]:
     """Return the moulds of all gels of a design.
 
-    Args:
-        made: shapes of the design.
-
     Raises:
         DesignError: a gel is no solid, or the skin points in all directions; the message says
             which.
@@ -121,7 +118,6 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
     """Return the mould of a gel.
 
     Args:
-        gel: shape of the gel, a solid.
         pull: unit vector (3,) in the direction in which its front half is pulled off.
 
     Raises:

@@ -31,7 +31,6 @@ def feature_edges(
         corners: index of the edge at each corner of the faces, (m,), one face after the other.
         starts: index in `corners` of the first corner of each face, (n,).
         normals: normals of the faces, (n, 3).
-        edges: number of edges.
 
     Returns:
         Indices (k,) of the edges whose faces meet at more than `CREASE`, or that have one face

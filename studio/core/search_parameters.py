@@ -179,7 +179,6 @@ def for_cage(
     """Return suggestions for a cage: its blend, or its control points.
 
     Args:
-        key: name of the cage.
         chosen: indices of the selected control points; empty means all.
         blended: whether the cage's shape is a blend of C_min and C_max.
         reach: range of the control points, mm to either side.

@@ -179,7 +179,6 @@ def start_job(
         on_result: called with the result after the job has ended.
         on_event: called with the job's events, except progress.
         wait: block until the job is over, for scripts.
-        fields: fields of the request.
     """
     global _job, _job_goes_on
     _job_goes_on = bool(fields.get("go_on"))

@@ -29,7 +29,6 @@ def add_cage(scene: bpy.types.Scene, key: str, values: dict[str, Any]) -> bpy.ty
     """Add an object for a cage; its parts follow it.
 
     Args:
-        scene: scene of the design.
         key: name of the cage in the design.
         values: cage as in the design file.
     """

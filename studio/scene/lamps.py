@@ -30,7 +30,6 @@ def add_light(
     """Add an object for one light.
 
     Args:
-        group: light group of the light.
         pose: `position`, `direction` and optionally `up`, as in the design file.
     """
     light = bpy.data.objects.new(group.name, _mesh(group))

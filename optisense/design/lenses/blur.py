@@ -69,7 +69,6 @@ class LensBlur(KindModel):
         """Return the standard deviation (...) as a share of the picture's width.
 
         Args:
-            camera: camera of the lens.
             vergence: inverse (...) of the apparent distance of the point that a pixel sees, 1/mm; a
                 single 0 if `by_depth` is false.
         """

@@ -119,7 +119,6 @@ class DesignEvaluator(PickledWithoutCaches):
 
         Args:
             goals: one or more; the first is what single-goal methods search for.
-            settings: settings of the objectives.
             requirements: conditions as texts, such as "coverage >= 0.55".
             apart: whether designs are forbidden whose parts cut through one another or leave the
                 parts that they rest on; if None, they are where the space moves surfaces.

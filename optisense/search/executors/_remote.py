@@ -59,7 +59,6 @@ class ExecutorRunner(Runner):
 
         Args:
             vector: point (n,).
-            seed: seed of the objectives.
         """
         return self._executor.submit(score_trial, self._key, self._blob, vector, seed)
 
@@ -103,7 +102,6 @@ class DaskRunner(Runner):
 
         Args:
             vector: point (n,).
-            seed: seed of the objectives.
         """
         given = self._executor.submit(score_trial, self._key, None, vector, seed)
         future: Future[Outcome] = Future()

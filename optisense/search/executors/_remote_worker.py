@@ -30,7 +30,6 @@ def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed:
     """Score a trial in the process where this is called.
 
     Args:
-        key: key of the evaluator.
         blob: the pickled evaluator, or None if it was sent before by `store_evaluator`.
         vector, seed: point of the trial, (n,), and its seed.
     """

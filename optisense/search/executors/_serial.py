@@ -28,7 +28,6 @@ class SerialRunner(Runner):
         """Store the evaluator; nothing is started yet.
 
         Args:
-            evaluator: evaluator of the trials.
             on_wait: function that is called when Ctrl-C is pressed during a trial.
         """
         self._evaluator = evaluator
@@ -41,7 +40,6 @@ class SerialRunner(Runner):
 
         Args:
             vector: point (n,).
-            seed: seed of the objectives.
 
         Raises:
             KeyboardInterrupt: Ctrl-C was pressed before this trial, or twice during it.

@@ -36,7 +36,6 @@ class Runner(ABC):
 
         Args:
             vector: point (n,) of the search space.
-            seed: seed of the objectives.
         """
 
     @abstractmethod

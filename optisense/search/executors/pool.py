@@ -82,7 +82,6 @@ class ProcessPool(Runner):
         """Start the workers, which get ready in the background.
 
         Args:
-            evaluator: evaluator of the trials.
             workers: number of processes.
             threads: threads of each worker's renderer; the worker's share of the processors if
                 None.
@@ -109,7 +108,6 @@ class ProcessPool(Runner):
 
         Args:
             vector: point (n,).
-            seed: seed of the objectives.
         """
         task = _Task(vector, seed, Future())
         with self._changed:

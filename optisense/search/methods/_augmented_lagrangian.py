@@ -71,7 +71,6 @@ class AugmentedLagrangian:
         """Return the merit function of the first ascent.
 
         Args:
-            score: score of the start.
             offsets: see the attribute, (m,).
         """
         weight = WEIGHT * max(abs(score), CONDITION_TOLERANCE)

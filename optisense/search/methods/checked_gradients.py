@@ -126,7 +126,6 @@ class GradientEvaluator(PickledWithoutCaches):
         """Store the settings; nothing is traced yet.
 
         Args:
-            usual: evaluator of the points.
             parts: names of the parts that points move.
             objective: name of the score that is climbed.
             resolution: number of rays across the image.
@@ -334,7 +333,6 @@ class GradientEvaluator(PickledWithoutCaches):
             vector: point (n,).
             way: direction (n,), in the units of the coordinates.
             step: step to each side, as a multiple of `way`.
-            seed: seed of the objectives.
         """
         found = self._differences.along(vector, way, step, seed, self.wanted[:1])
         return None if found is None else float(found[0])

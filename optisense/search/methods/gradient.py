@@ -102,7 +102,6 @@ class Gradient(Method):
         """Determine the source of the gradient.
 
         Args:
-            problem: problem to solve.
             resolution: number of rays across the image for gradients.
             memory: number of steps that the quasi-Newton method remembers.
             starts: number of ascents: the first from the design as it is, the others, as far as the

@@ -124,7 +124,6 @@ class ContactPoints(NamedTuple):
         """Return points spread evenly over some faces of a mesh that touch another mesh.
 
         Args:
-            mesh: mesh of the points.
             faces: indices (k,) of its faces that lie on the other mesh.
             other: the mesh that the points touch.
         """

@@ -211,7 +211,6 @@ class Store:
         """Write the points (k, n) of a generation, all in one commit.
 
         Args:
-            generation: number of the generation.
             vectors: points (k, n).
             place: index of the first point within the generation.
         """

@@ -55,7 +55,6 @@ class RecipeState:
 
         Args:
             kind: kind of the entry, such as 'light'.
-            name: name of the entry.
             path: path of the name in the recipe, whose line the error states.
 
         Raises:

@@ -78,7 +78,6 @@ def lights_and_camera(
         meshes: meshes of all parts by name, mm.
         clear: names of the transparent parts, the gel first.
         outward: direction of the dome's tip, such as +z.
-        light: light of the library.
     """
     axis, sign = axis_of(outward)
     way = vector(outward)
