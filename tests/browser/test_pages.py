@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Browser
 
-from .conftest import Open, opening
+from .conftest import opening
 from .pages import EVIL
 from .visit import DESKTOP, TELEPHONE, Visit
 
@@ -36,31 +36,31 @@ MOST_CONTROLS = 300
 @pytest.fixture(scope="module", params=KINDS)
 def opened(
     request: pytest.FixtureRequest, browser: Browser, pages: dict[str, Path]
-) -> Iterator[tuple[str, Visit]]:
-    """A kind of page in a window that tests share, and its kind."""
+) -> Iterator[Visit]:
+    """A kind of page in a window that tests share."""
     with opening(browser) as open_page:
-        yield request.param, open_page(pages[request.param], DESKTOP)
+        yield open_page(pages[request.param], DESKTOP)
 
 
-def test_texts_stay_texts(opened: tuple[str, Visit]) -> None:
-    page = opened[1].page
+def test_texts_stay_texts(opened: Visit) -> None:
+    page = opened.page
     assert page.locator("h1").inner_text().startswith(EVIL)
     assert EVIL in page.title()
     assert page.evaluate("() => window.ran") is None
     assert page.locator("img[src=x]").count() == 0
 
 
-def test_every_control_has_a_name(opened: tuple[str, Visit]) -> None:
+def test_every_control_has_a_name(opened: Visit) -> None:
     """The names are those that the browser tells a screen reader."""
-    page = opened[1].page
+    page = opened.page
     tree = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")
     for node in tree["nodes"]:
         if not node["ignored"] and node["role"]["value"] in CONTROLS | {"image", "Canvas"}:
             assert node["name"]["value"].strip(), node
 
 
-def test_the_focus_is_seen_on_every_control(opened: tuple[str, Visit]) -> None:
-    page = opened[1].page
+def test_the_focus_is_seen_on_every_control(opened: Visit) -> None:
+    page = opened.page
     for _ in range(MOST_CONTROLS):
         page.keyboard.press("Tab")
         found = page.evaluate(FOCUSED)
@@ -70,13 +70,11 @@ def test_the_focus_is_seen_on_every_control(opened: tuple[str, Visit]) -> None:
     assert page.evaluate(NOT_VISITED) == []
 
 
-def test_no_page_scrolls_sideways(
-    opened: tuple[str, Visit], visit: Open, pages: dict[str, Path]
-) -> None:
-    kind, desktop = opened
-    for window in (desktop, visit(pages[kind], TELEPHONE)):
-        window.drawn()
-        assert not window.is_scrolled_sideways()
-        for folded in window.page.locator("details").all():
-            folded.evaluate("(each) => { each.open = true; }")
-        assert not window.is_scrolled_sideways()
+def test_no_page_scrolls_sideways(opened: Visit) -> None:
+    for width, height in (TELEPHONE, DESKTOP):
+        opened.page.set_viewport_size({"width": width, "height": height})
+        for unfolded in (False, True):
+            for each in opened.page.locator("details").all():
+                each.evaluate("(each, open) => { each.open = open; }", unfolded)
+            opened.drawn()
+            assert not opened.is_scrolled_sideways()

@@ -36,7 +36,7 @@ def image(design: SensorDesign) -> TactileImage:
 
 
 def opened(visit: Open, path: Path) -> Visit:
-    window = visit(path)
+    window = visit(path, (640, 600))
     window.page.wait_for_selector("#picture:not([hidden])")
     return window
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import http.client
 import subprocess
-import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +11,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from warm_python import programs
 
 import optisense as ots
 from optisense.design import SensorDesign
@@ -39,10 +39,10 @@ def result() -> SearchResult:
     return search(ots.load("gelsight-mini-ideal"), SPACE, [red], method="random", budget=25, seed=2)
 
 
-@pytest.fixture
-def page(result: SearchResult, tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def page(result: SearchResult, tmp_path_factory: pytest.TempPathFactory) -> Path:
     pictures = {result.best.number: np.full((6, 8, 3), (10, 200, 30), dtype=np.uint8)}
-    path = tmp_path / "study.html"
+    path = tmp_path_factory.mktemp("study") / "study.html"
     return write_study_report(path, result.study, pictures=pictures, named="my study")
 
 
@@ -174,7 +174,7 @@ def running(tmp_path: Path) -> Iterator[tuple[Running, str, Path]]:
             begun.may.release()
         while not (folder / "study.json").is_file():
             threading.Event().wait(0.05)
-        command = [sys.executable, "-m", "optisense", "report", str(folder), "--watch"]
+        command = [programs() / "optisense", "report", folder, "--watch"]
         with subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
         ) as process:

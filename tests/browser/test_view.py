@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from playwright.sync_api import Locator
+from playwright.sync_api import Browser, Locator
 
-from .conftest import Open
+from .conftest import opening
 from .visit import Visit
 
 CANVAS = "3-D view of the sensor"
+SIZE = (640, 600)
+"""Pixels of the window; the processor draws all of them anew whenever the view changes."""
+
+
+@pytest.fixture(scope="module")
+def window(browser: Browser, pages: dict[str, Path]) -> Iterator[Visit]:
+    with opening(browser) as open_page:
+        yield open_page(pages["ledger"], SIZE, has_touch=True)
 
 
 @pytest.fixture
-def view(visit: Open, pages: dict[str, Path]) -> Visit:
-    return visit(pages["ledger"], has_touch=True)
+def view(window: Visit) -> Visit:
+    """The window that these tests share; the sensor is whole, and seen from its corner."""
+    window.page.get_by_role("button", name="Corner").click()
+    assert window.page.get_by_label("axis of the cut").input_value() == "-1"
+    return window
 
 
 def canvas(view: Visit) -> Locator:
