@@ -24,7 +24,7 @@ def test_the_power_of_a_light_is_found_from_photographs(engine: Any, tmp_path: P
     }
     for name, contacts in shots.items():
         result = engine.ask(
-            "simulate", design=real, contacts=contacts, resolution=[160, 120], photons=100_000,
+            "simulate", design=real, contacts=contacts, resolution=[100, 75], photons=100_000,
             exposure=700.0, to=str(photos), name=name,
         )  # fmt: skip
         Path(result["files"]["picture"]).rename(photos / f"{name}.png")
