@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -163,53 +162,25 @@ def cross_readings(
 
 
 class _Reader:
-    """Polynomial that maps changes of colour and places to tilts, fitted by ridge regression.
-
-    Its variables and its terms are standardised. The normal equations are solved here, as
-    scikit-learn takes a second to load.
+    """Polynomial that maps changes of colour and places to tilts, fitted by ridge regression; its
+    variables and its terms are standardised.
     """
 
     def __init__(self, known: Sequence[Pixels], balls: Sequence[_Ball]) -> None:
-        given = np.concatenate([_variables(each) for each in known])
-        tilts = np.concatenate([ball.tilts for ball in balls])
-        self._variables = _Standard(given)
-        powers = _terms(self._variables(given))
-        self._terms = _Standard(powers)
-        terms = self._terms(powers)
-        self._mean = tilts.mean(axis=0)
-        weighted = terms.T @ terms + RIDGE * np.eye(terms.shape[1])
-        self._slopes = np.linalg.solve(weighted, terms.T @ (tilts - self._mean))
+        from sklearn.linear_model import Ridge  # takes a second to load
+        from sklearn.pipeline import make_pipeline
+        from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+
+        terms = PolynomialFeatures(DEGREE, include_bias=False)
+        self._polynomial = make_pipeline(StandardScaler(), terms, StandardScaler(), Ridge(RIDGE))
+        self._polynomial.fit(
+            np.concatenate([_variables(each) for each in known]),
+            np.concatenate([ball.tilts for ball in balls]),
+        )
 
     def normals(self, pixels: Pixels) -> FloatArray:
         """Return the read normals (n, 3); the third axis is the untouched normal."""
-        terms = self._terms(_terms(self._variables(_variables(pixels))))
-        return tilts_to_normals(terms @ self._slopes + self._mean)
-
-
-class _Standard:
-    """Shift and scale that give the columns of a table the mean 0 and the deviation 1; a constant
-    column is only shifted."""
-
-    def __init__(self, table: FloatArray) -> None:
-        self._mean, deviation = table.mean(axis=0), table.std(axis=0)
-        constant = deviation <= 1e-9 * np.abs(self._mean)  # up to the rounding of the mean
-        self._scale = np.where(constant, 1.0, deviation)
-
-    def __call__(self, table: FloatArray) -> FloatArray:
-        return np.asarray((table - self._mean) / self._scale)
-
-
-def _terms(variables: FloatArray) -> FloatArray:
-    """Return all products (n, k) of one up to `DEGREE` of the variables (n, m)."""
-    columns = range(variables.shape[1])
-    return np.stack(
-        [
-            variables[:, list(factors)].prod(axis=1)
-            for degree in range(1, DEGREE + 1)
-            for factors in combinations_with_replacement(columns, degree)
-        ],
-        axis=1,
-    )
+        return tilts_to_normals(self._polynomial.predict(_variables(pixels)))
 
 
 def _variables(pixels: Pixels) -> FloatArray:
