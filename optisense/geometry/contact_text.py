@@ -47,22 +47,11 @@ def parse_contact(text: str) -> Contact:
         coordinates = _numbers(fields[0], "the place", (2, 3))
         depth, force = _depth_or_force(fields[1])
         rotation = _numbers(fields[2], "the rotation", (1,))[0] if len(fields) == 3 else 0.0
-        indenter = parse_indenter(shape)
-        if len(coordinates) == 3:
-            x, y, z = coordinates
-            return Contact(
-                indenter,
-                point=(x, y, z),
-                depth=depth,
-                rotation=rotation,
-                force=force,
-                shift=shift,
-                twist=twist,
-            )
-        u, v = coordinates
+        u, v, *rest_of_point = coordinates
         return Contact(
-            indenter,
-            at=(u, v),
+            parse_indenter(shape),
+            at=None if rest_of_point else (u, v),
+            point=(u, v, rest_of_point[0]) if rest_of_point else None,
             depth=depth,
             rotation=rotation,
             force=force,

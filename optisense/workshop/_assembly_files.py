@@ -6,9 +6,7 @@ counter-clockwise, of LEDs on either side.
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,6 +16,7 @@ from optisense.workshop._boards import axes_at_rest, boards_of
 from optisense.workshop._dxf import closed, dxf
 from optisense.workshop._placement import (
     Placement,
+    csv_table,
     digits,
     light_entry,
     typical_colour,
@@ -97,7 +96,7 @@ def _cpl(leds: Sequence[Placement], turns: dict[str, float]) -> str:
          led.layer.capitalize(), digits(turns[led.designator], 3))
         for led in leds
     ]  # fmt: skip
-    return _table(("Designator", "Mid X", "Mid Y", "Layer", "Rotation"), rows)
+    return csv_table(("Designator", "Mid X", "Mid Y", "Layer", "Rotation"), rows)
 
 
 def _bom(design: SensorDesign, leds: Sequence[Placement]) -> str:
@@ -110,15 +109,7 @@ def _bom(design: SensorDesign, leds: Sequence[Placement]) -> str:
         designators = ",".join(led.designator for led in own)
         number = cell(what_to_order(design.lights[name]))
         rows.append((cell(words), designators, _footprint(design, own[0]), number))
-    return _table(("Comment", "Designator", "Footprint", "Part number"), rows)
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(head)
-    writer.writerows(rows)
-    return text.getvalue()
+    return csv_table(("Comment", "Designator", "Footprint", "Part number"), rows)
 
 
 def _outline(design: SensorDesign, leds: Sequence[Placement]) -> str:

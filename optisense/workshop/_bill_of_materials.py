@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from optisense import library
 from optisense.design import Role, SensorDesign, Status
-from optisense.errors import LibraryError
 from optisense.library import AnyEntry
 from optisense.library.facts import summary
 from optisense.text import cell, markdown
-from optisense.workshop._placement import light_entry, typical_colour, what_to_order
+from optisense.workshop._placement import (
+    csv_table,
+    entry_or_none,
+    light_entry,
+    typical_colour,
+    what_to_order,
+)
 from optisense.workshop.shapes import Shape, shapes
 
 MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0
@@ -68,19 +70,15 @@ class Bill:
 
     def csv(self) -> str:
         """Return the bill as a table (RFC 4180)."""
-        text = io.StringIO()
-        writer = csv.writer(text)
-        writer.writerow(
-            ("kind", "name", "quantity", "unit", "used for", "description", "maker", "part",
-             "package_mm", "note", "designators")
-        )  # fmt: skip
-        for item in self.items:
-            writer.writerow(
-                (item.kind, item.name, f"{item.quantity:.4g}", item.unit, cell(item.used_for),
-                 cell(item.description), cell(item.maker), cell(item.part), cell(item.package),
-                 cell(item.note), cell(item.designators))
-            )  # fmt: skip
-        return text.getvalue()
+        head = ("kind", "name", "quantity", "unit", "used for", "description", "maker", "part",
+                "package_mm", "note", "designators")  # fmt: skip
+        rows = [
+            (item.kind, item.name, f"{item.quantity:.4g}", item.unit, cell(item.used_for),
+             cell(item.description), cell(item.maker), cell(item.part), cell(item.package),
+             cell(item.note), cell(item.designators))
+            for item in self.items
+        ]  # fmt: skip
+        return csv_table(head, rows)
 
     def markdown(self) -> str:
         """Return the bill as Markdown, with a table for each kind."""
@@ -121,7 +119,7 @@ def _lights(design: SensorDesign) -> list[Item]:
     for name, group in design.lights.items():
         first, count = count + 1, count + len(group.lights)
         entry, colour = light_entry(group), typical_colour(group)
-        description = entry.description if entry is not None else "described in the design"
+        description, maker = _words(entry)
         if entry is None and group.emitter is not None:
             description += f": {group.emitter.in_words()}"
         package = entry.package if entry is not None else None
@@ -144,7 +142,7 @@ def _lights(design: SensorDesign) -> list[Item]:
                 unit="pieces",
                 used_for=name,
                 description=description,
-                maker=(entry.maker or "") if entry is not None else "",
+                maker=maker,
                 part=what_to_order(group),
                 package=" x ".join(f"{length:g}" for length in package) if package else "",
                 note=note,
@@ -156,7 +154,7 @@ def _lights(design: SensorDesign) -> list[Item]:
 
 def _camera(design: SensorDesign) -> Item:
     camera = design.camera
-    entry = _entry("camera", camera.model)
+    description, maker = _words(entry_or_none("camera", camera.model))
     note = f"{camera.fov:g} degrees across, {camera.projection}, used at "
     note += "{} x {} pixels".format(*camera.resolution)
     return Item(
@@ -165,8 +163,8 @@ def _camera(design: SensorDesign) -> Item:
         quantity=1,
         unit="pieces",
         used_for="camera",
-        description=entry.description if entry is not None else "described in the design",
-        maker=(entry.maker or "") if entry is not None else "",
+        description=description,
+        maker=maker,
         note=note,
     )
 
@@ -176,7 +174,7 @@ def _material(design: SensorDesign, shape: Shape) -> Item:
     description, maker, note = "absorbs all light" if shape.material is None else "", "", ""
     if shape.material is not None:
         value = design.materials[shape.material]
-        entry = _entry("material", shape.material)
+        entry = entry_or_none("material", shape.material)
         description = f"described in the design, {value.kind}"
         if entry is not None:
             description, maker = entry.description, entry.maker or ""
@@ -221,7 +219,8 @@ def _assumed(design: SensorDesign, path: str) -> str:
 
 def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
     coating = design.coating
-    entry = _entry("coating", coating.library) if coating.library else None
+    entry = entry_or_none("coating", coating.library) if coating.library else None
+    description, maker = _words(entry)
     return [
         Item(
             kind="coating",
@@ -229,8 +228,8 @@ def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
             quantity=shape.mesh.area / MM2_PER_CM2,
             unit="cm^2",
             used_for=f"{shape.name} ({shape.role.value})",
-            description=entry.description if entry is not None else "described in the design",
-            maker=(entry.maker or "") if entry is not None else "",
+            description=description,
+            maker=maker,
             note="; ".join(
                 filter(None, [coating.in_words(), _assumed(design, f"parts.{shape.name}")])
             ),
@@ -239,12 +238,11 @@ def _coating(design: SensorDesign, coated: Sequence[Shape]) -> list[Item]:
     ]
 
 
-def _entry(kind: str, name: str) -> AnyEntry | None:
-    """Return an entry of the library, or None if there is none that can be read."""
-    try:
-        return library.entry(kind, name)
-    except LibraryError:
-        return None
+def _words(entry: AnyEntry | None) -> tuple[str, str]:
+    """Return the description of an entry of the library, and its maker."""
+    if entry is None:
+        return "described in the design", ""
+    return entry.description, entry.maker or ""
 
 
 def _table(items: Sequence[Item]) -> list[str]:

@@ -17,6 +17,7 @@ from optisense.design import Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import as_manifold
+from optisense.geometry.patches import mean_normal
 from optisense.workshop.shapes import Shape
 
 WALL = 8.0
@@ -158,15 +159,14 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
 
 def _outward(skins: list[TriangleMesh]) -> FloatArray:
     """Return the outward direction (3,) of a skin, weighted by area; its normals point inward."""
-    corners = np.concatenate([mesh.triangles for mesh in skins])
-    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total, area = -twice.sum(axis=0), np.linalg.norm(twice, axis=1).sum()
-    if np.linalg.norm(total) < LEAST_FACING * area:
+    outward = -mean_normal(TriangleMesh.joined(skins))
+    length = np.linalg.norm(outward)
+    if length < LEAST_FACING:
         raise DesignError(
             "the skin faces all sides, so that no half of a mould could be pulled off it",
             hint="Leave --moulds out; cast a belt or a tube around a core instead",
         )
-    return np.asarray(total / np.linalg.norm(total), dtype=np.float64)
+    return np.asarray(outward / length)
 
 
 def _axes(pull: FloatArray, vertices: FloatArray) -> FloatArray:
@@ -230,10 +230,7 @@ def _ends(cut: Any, diameters: tuple[float, float]) -> tuple[FloatArray, FloatAr
 
 def _draft(local: TriangleMesh, parting: float) -> tuple[float, float]:
     """Return the areas of sides with too little draft, and of undercuts, in either half, mm^2."""
-    corners = local.triangles
-    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = 0.5 * np.linalg.norm(twice, axis=1)
-    up = twice[:, 2] / np.maximum(2.0 * areas, 1e-300)
+    corners, areas, up = local.triangles, local.face_areas, local.face_normals[:, 2]
     in_front = corners[:, :, 2].mean(axis=1) > parting
     opens = np.degrees(np.arcsin(np.clip(np.where(in_front, up, -up), -1.0, 1.0)))
     at_parting = np.ptp(corners[:, :, 2], axis=1) + np.abs(corners[:, 0, 2] - parting) < 1e-6

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from optisense import library
 from optisense.array_types import FloatArray
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.errors import LibraryError
-from optisense.library import LightEntry, TypicalLight
+from optisense.library import AnyEntry, LightEntry, TypicalLight
 from optisense.workshop._boards import axes_at_rest, boards_of
 
 
@@ -121,12 +120,17 @@ def what_to_order(group: LightGroup) -> str:
 
 def light_entry(group: LightGroup) -> LightEntry | None:
     """Return the library's entry of a group's light, or None if there is none that can be read."""
+    entry = entry_or_none("light", group.model)
+    assert entry is None or isinstance(entry, LightEntry)
+    return entry
+
+
+def entry_or_none(kind: str, name: str) -> AnyEntry | None:
+    """Return an entry of the library, or None if there is none that can be read."""
     try:
-        entry: Any = library.entry("light", group.model)
+        return library.entry(kind, name)
     except LibraryError:
         return None
-    assert isinstance(entry, LightEntry)
-    return entry
 
 
 COLUMNS = (
@@ -140,26 +144,30 @@ def placement_csv(placed: Sequence[Placement]) -> str:
     """Return a pick-and-place table (RFC 4180), a row for each LED; lengths are rounded to 0.1
     um.
     """
+    rows = [
+        [
+            led.designator,
+            *(digits(value, 4) for value in led.position),
+            *(digits(value, 6) for value in led.direction),
+            digits(led.rotation, 3),
+            led.board,
+            led.layer,
+            *(digits(value, 4) for value in led.on_board),
+            led.model,
+            led.part,
+            led.group,
+            *(f"{value:g}" for value in led.colour),
+            f"{led.flux:g}",
+        ]
+        for led in placed
+    ]
+    return csv_table(COLUMNS, rows)
+
+
+def csv_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table (RFC 4180) with a line of headings."""
     text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(COLUMNS)
-    for led in placed:
-        writer.writerow(
-            [
-                led.designator,
-                *(digits(value, 4) for value in led.position),
-                *(digits(value, 6) for value in led.direction),
-                digits(led.rotation, 3),
-                led.board,
-                led.layer,
-                *(digits(value, 4) for value in led.on_board),
-                led.model,
-                led.part,
-                led.group,
-                *(f"{value:g}" for value in led.colour),
-                f"{led.flux:g}",
-            ]
-        )
+    csv.writer(text).writerows([head, *rows])
     return text.getvalue()
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -88,16 +88,11 @@ def plates(made: Sequence[Shape]) -> list[Plate]:
             if twin is None:
                 own.append(plate)
             else:
-                own[twin] = _with(own[twin], count=own[twin].count + 1)
+                own[twin] = replace(own[twin], count=own[twin].count + 1)
         if len(own) > 1:
-            own = [_with(each, name=f"{each.name}-{k}") for k, each in enumerate(own, start=1)]
+            own = [replace(each, name=f"{each.name}-{k}") for k, each in enumerate(own, start=1)]
         found += own
     return found
-
-
-def _with(plate: Plate, *, name: str | None = None, count: int | None = None) -> Plate:
-    return Plate(name or plate.name, plate.material, count or plate.count, plate.thickness,
-                 plate.outlines, plate.size)  # fmt: skip
 
 
 def _plate(shape: Shape, mesh: TriangleMesh) -> Plate | None:
