@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from optisense.array_types import FloatArray
-from optisense.design.arrangement import straight_rays
+from optisense.design.arrangement import skin_distances, straight_rays
 from optisense.design.lenses.defocus import DISC_DEVIATION
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
@@ -72,14 +72,8 @@ def apparent_distances(design: SensorDesign, meshes: dict[str, TriangleMesh]) ->
     """
     camera, origin = design.camera, np.array(design.camera.position)
     rays = straight_rays(camera)
-    nearest = np.full(len(rays), np.inf)
-    blocked = nearest.copy()
-    for name in design.parts_of(Role.SENSING_SURFACE, Role.BLOCKER):
-        if name in meshes:
-            found = nearest if design.parts[name].role is Role.SENSING_SURFACE else blocked
-            hits = ray_hits(meshes[name], origin + 0 * rays, rays)
-            np.minimum.at(found, hits.ray, hits.distance)
-    seen = np.isfinite(nearest) & (nearest < blocked)
+    nearest = skin_distances(design, meshes, rays)
+    seen = np.isfinite(nearest)
     rays, nearest = rays[seen], nearest[seen]
     if not len(rays):
         return nearest

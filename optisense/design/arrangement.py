@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.camera import Camera
-from optisense.design.parts import TRANSPARENT_SOLIDS
+from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.projection import directions, picture_places
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import common_space
 from optisense.geometry.overlaps import CONTACT
+from optisense.geometry.rays import ray_hits
 
 EQUAL_INDEX = 1e-6
 """Largest difference of refractive indices for which solids count as one medium; it covers rounding
@@ -71,3 +72,18 @@ def straight_rays(camera: Camera) -> NDArray[np.float64]:
     """Return unit vectors (k, 3) of rays through a grid of `SAMPLES` points of the picture."""
     across, down = np.meshgrid(np.linspace(0.0, 1.0, SAMPLES[0]), np.linspace(0.0, 1.0, SAMPLES[1]))
     return directions(camera, across, down).reshape(-1, 3)
+
+
+def skin_distances(
+    design: SensorDesign, meshes: dict[str, TriangleMesh], rays: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the distances (k,), mm, at which rays (k, 3) from the camera meet the sensing surface;
+    infinite if they miss it or meet a blocker first.
+    """
+    skin, blocker = np.full((2, len(rays)), np.inf)
+    for role, nearest in ((Role.SENSING_SURFACE, skin), (Role.BLOCKER, blocker)):
+        for name in design.parts_of(role):
+            if name in meshes:
+                hits = ray_hits(meshes[name], np.array(design.camera.position) + 0 * rays, rays)
+                np.minimum.at(nearest, hits.ray, hits.distance)
+    return np.where(skin < blocker, skin, np.inf)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.arrangement import in_picture, straight_rays
+from optisense.design.arrangement import in_picture, skin_distances, straight_rays
 from optisense.design.camera import Camera
 from optisense.design.lens_checks import fold_problems
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
@@ -17,7 +17,6 @@ from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
-from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import closest_points
 
 WIDEST_PERSPECTIVE = 135.0
@@ -200,15 +199,12 @@ def view_shares(
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
     if not skins or design.parts_of(Role.MIRROR):
         return None
-    camera, position = design.camera, np.array(design.camera.position)
+    camera = design.camera
     seen = [
         float(skin.face_areas[in_picture(camera, skin.triangles.mean(axis=1))].sum())
         for skin in skins
     ]
-    rays = straight_rays(camera)
-    blockers = [meshes[name] for name in design.parts_of(Role.BLOCKER) if name in meshes]
-    nearest = _first(skins, position, rays)
-    picture = float((np.isfinite(nearest) & (nearest < _first(blockers, position, rays))).mean())
+    picture = float(np.isfinite(skin_distances(design, meshes, straight_rays(camera))).mean())
     return sum(seen) / max(sum(float(skin.face_areas.sum()) for skin in skins), 1e-300), picture
 
 
@@ -221,19 +217,6 @@ def _small(message: str, where: str) -> Diagnostic:
         "surface",
         severity="warning",
     )
-
-
-def _first(
-    meshes: list[TriangleMesh], position: NDArray[np.float64], rays: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Return the distance from a point to the first of some meshes along rays (k, 3), (k,) mm,
-    infinite if none.
-    """
-    nearest = np.full(len(rays), np.inf)
-    for mesh in meshes:
-        hits = ray_hits(mesh, position + 0 * rays, rays)
-        np.minimum.at(nearest, hits.ray, hits.distance)
-    return nearest
 
 
 def _distance(point: NDArray[np.float64], mesh: TriangleMesh) -> float:

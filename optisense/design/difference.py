@@ -15,6 +15,9 @@ from optisense.geometry import TriangleMesh
 SAME_NUMBER = 1e-9
 """Relative difference up to which numbers count as equal; it covers rounding in a file."""
 
+LONGEST_LIST = 60
+"""Largest number of characters of a list that is shown whole; it fits a line of a terminal."""
+
 SAME_PLACE = 1e-5
 """Distance up to which vertices count as equal, mm; mesh files hold a limited number of digits."""
 
@@ -106,7 +109,8 @@ def _same(old: Any, new: Any) -> bool:
 
 def _short(value: Any) -> str:
     if isinstance(value, list):
-        return f"{len(value)} entries"
+        text = json.dumps(value, ensure_ascii=False)
+        return text if len(text) <= LONGEST_LIST else f"{len(value)} entries"
     if isinstance(value, dict):
         return "a section"
     return f"{value:.10g}" if isinstance(value, float) else str(value)

@@ -26,15 +26,16 @@ def _figure(width: float, height: float) -> Figure:
 
 
 def _square_grid(
-    count: int, width: float, height: float, *, sharey: bool = False
+    count: int, width: float, height: float, *, sharey: bool = False, beside: float = 0.0
 ) -> tuple[Figure, NDArray[np.object_]]:
     """Return a figure with a square grid of axes (rows, columns) for at least ``count`` drawings.
 
-    ``width`` and ``height`` are the size of a drawing in inches; unused axes are hidden.
+    ``width`` and ``height`` are the size of a drawing, and ``beside`` the room beside the grid, in
+    inches; unused axes are hidden.
     """
     across = int(np.ceil(count**0.5))
     down = -(-count // across)
-    figure = _figure(width * across, height * down)
+    figure = _figure(width * across + beside, height * down)
     grid = figure.subplots(down, across, squeeze=False, sharey=sharey)
     for axes in grid.ravel()[count:]:
         axes.set_axis_off()
@@ -255,21 +256,16 @@ def _map_and_histogram(
 def draw_reading(score: Score) -> Figure:
     """Draw the error of the reading in each contact."""
     maps, places = score.arrays["maps"], score.parts["places"]
-    across = int(np.ceil(len(maps) ** 0.5))
-    down = -(-len(maps) // across)
-    figure = _figure(2.2 * across + 0.8, 2.3 * down)
-    grid = np.atleast_1d(figure.subplots(down, across, squeeze=False)).ravel()
+    figure, grid = _square_grid(len(maps), 2.2, 2.3, beside=0.8)
     seen = np.concatenate([each["errors"][np.isfinite(each["errors"])] for each in maps])
     most = max(1.0, float(np.percentile(seen, 98)))
-    for number, (axes, each) in enumerate(zip(grid, maps, strict=False)):
+    for number, (axes, each) in enumerate(zip(grid.ravel(), maps, strict=False)):
         axes.set_facecolor("#888888")
         shown = axes.imshow(each["errors"], cmap="magma", vmin=0.0, vmax=most)
         axes.set_title(f"{number + 1}: {places[number]['error']:.1f}°", fontsize=10)
         axes.set_xticks([])
         axes.set_yticks([])
-    for axes in grid[len(maps) :]:
-        axes.set_axis_off()
-    figure.colorbar(shown, ax=list(grid), label="error of the normal (°)", shrink=0.8)
+    figure.colorbar(shown, ax=list(grid.ravel()), label="error of the normal (°)", shrink=0.8)
     figure.suptitle("place and the mean over its contact", fontsize=11)
     return figure
 

@@ -11,7 +11,7 @@ from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
 from optisense.objectives._uniformity import COLOURS, UNLIT
 from optisense.objectives.registry import no_pixels, objective
-from optisense.objectives.settings import VIEW_ACROSS, size_for
+from optisense.objectives.settings import VIEW_ACROSS
 from optisense.quality import SCORE_PHOTONS
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _image(evaluation: Evaluation, contacts: Sequence[Contact]) -> TactileImage:
     settings = evaluation.settings
     image = evaluation.model.render(
         contacts,
-        resolution=size_for(evaluation.design.camera.resolution, VIEW_ACROSS),
+        resolution=evaluation.design.camera.size_at(VIEW_ACROSS),
         photons=SCORE_PHOTONS if settings.photons is None else settings.photons,
         seed=settings.seed,
         partial=False,

@@ -27,7 +27,7 @@ from optisense.objectives._unexposed import (
     radiance_in,
 )
 from optisense.objectives.frames import frame_of, nearest_press
-from optisense.objectives.settings import VIEW_ACROSS, Settings, size_for
+from optisense.objectives.settings import ACROSS, VIEW_ACROSS, Settings
 from optisense.objectives.view import View, view_of
 from optisense.quality import SCORE_PHOTONS
 
@@ -85,12 +85,12 @@ class Evaluation(CachedValues):
     @property
     def resolution(self) -> tuple[int, int]:
         """Size (width, height) of the images, pixels."""
-        return self.settings.resolution or size_for(self.design.camera.resolution)
+        return self.settings.resolution or self.design.camera.size_at(ACROSS)
 
     @property
     def ray_resolution(self) -> tuple[int, int]:
         """Size (width, height) of the grid of chief rays."""
-        return self.settings.ray_resolution or size_for(self.design.camera.resolution)
+        return self.settings.ray_resolution or self.design.camera.size_at(ACROSS)
 
     @property
     def sensing_faces(self) -> int:
@@ -124,7 +124,7 @@ class Evaluation(CachedValues):
         """The share of the surface that the camera sees, by separate rays (see
         `settings.VIEW_ACROSS`).
         """
-        size = size_for(self.design.camera.resolution, VIEW_ACROSS)
+        size = self.design.camera.size_at(VIEW_ACROSS)
         return self.shared(
             "view", lambda: view_of(self.model.chief_rays(size), self.model.sensing.face_areas)
         )

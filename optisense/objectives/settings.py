@@ -172,13 +172,6 @@ def _pairs(places: Any) -> tuple[tuple[float, float], ...]:
     return tuple((float(u), float(v)) for u, v in places)
 
 
-def size_for(camera: tuple[int, int], across: int = ACROSS) -> tuple[int, int]:
-    """Return the (width, height) of images and rays, `across` wide, with a camera's aspect
-    ratio.
-    """
-    return across, max(1, round(across * camera[1] / camera[0]))
-
-
 def _photons(given: int | str) -> int:
     try:
         number = photons_of(given)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from optisense.design import SensorDesign
 from optisense.objectives.named import are_rays_only, named_in
-from optisense.objectives.settings import Settings, size_for
+from optisense.objectives.settings import ACROSS, Settings
 from optisense.quality import SCORE_PHOTONS, photons_of
 from optisense.usual_times import LOADING, UsualTimes
 
@@ -167,7 +167,7 @@ def usual_score(design: SensorDesign, names: Iterable[str], settings: Settings) 
     if are_rays_only(wanted):
         starting = times.preparing() + building
         return UsualScore(starting, loading, building, 0.0, 0.0, judging * times.light)
-    width, height = settings.resolution or size_for(design.camera.resolution)
+    width, height = settings.resolution or design.camera.size_at(ACROSS)
     photons = photons_of(settings.photons or SCORE_PHOTONS)
     presses = USUAL_PLACES if settings.places is None else len(settings.places)
     images = 2 if settings.together else 1 + presses

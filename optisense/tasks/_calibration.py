@@ -133,9 +133,7 @@ class CalibratedSensor:
         """
         self._model = model
         self._settings = settings
-        camera = model.design.camera
-        height = max(1, round(settings.width * camera.resolution[1] / camera.resolution[0]))
-        self.resolution = settings.resolution or (settings.width, height)
+        self.resolution = settings.resolution or model.design.camera.size_at(settings.width)
         self.untouched = UntouchedSurface.of(model.chief_rays(self.resolution))
         self._frames = model.surface.tangents(self.untouched.normals)
         self._integrator = NormalIntegrator(self.untouched)

@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from optisense.design.difference import plain_differences
 from optisense.errors import OutputError, TaskError
 from optisense.untrusted_files import COPY_AGAIN, read_json, read_table
 from optisense.writing import written_whole
@@ -115,40 +116,11 @@ def read_rows(path: Path) -> list[dict[str, str]]:
     return read_table(path, TaskError)
 
 
-def differences(before: Mapping[str, Any], now: Mapping[str, Any], prefix: str = "") -> list[str]:
-    """Return the differences between two nested mappings, as "path: was A, is B", in the order of
-    `now`.
-    """
-    found: list[str] = []
-    for key in [*now, *(key for key in before if key not in now)]:
-        found += _difference(before.get(key, _NOTHING), now.get(key, _NOTHING), f"{prefix}{key}")
-    return found
-
-
-def _difference(old: object, new: object, path: str) -> list[str]:
-    """Return the differences between two values; short lists of plain values are compared as a
-    whole.
-    """
-    old, new = _plain(old), _plain(new)
-    if isinstance(old, dict) and isinstance(new, dict):
-        return differences(old, new, path + ".")
-    if old == new:
-        return []
-    if isinstance(old, list) and isinstance(new, list) and _alike_and_nested(old, new):
-        pairs = enumerate(zip(old, new, strict=True))
-        return [text for k, (a, b) in pairs for text in _difference(a, b, f"{path}[{k}]")]
-    return [f"{path} was {_shown(old)}, is {_shown(new)}"]
-
-
-def _alike_and_nested(one: list[Any], other: list[Any]) -> bool:
-    return len(one) == len(other) and any(isinstance(value, dict | list) for value in one)
-
-
 def refuse_differences(
     what: str, folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]
 ) -> None:
     """Raise TaskError if a folder was begun with other settings; the message lists them."""
-    found = differences(before, now)
+    found = plain_differences(*(json.loads(json.dumps(each)) for each in (before, now)))
     if not found:
         return
     more = f" and {len(found) - MOST_SHOWN} more" if len(found) > MOST_SHOWN else ""
@@ -157,21 +129,6 @@ def refuse_differences(
         where=str(folder),
         hint="Name another folder, or repeat the settings of this one to continue it",
     )
-
-
-_NOTHING = object()
-
-
-def _plain(value: object) -> object:
-    """Return a value as JSON would load it, so that tuples equal lists."""
-    return value if value is _NOTHING else json.loads(json.dumps(value))
-
-
-def _shown(value: object) -> str:
-    if value is _NOTHING:
-        return "nothing"
-    text = json.dumps(value, ensure_ascii=False)
-    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def _text(value: object) -> str:

@@ -43,7 +43,7 @@ def test_misalignment_prints_writes_and_continues(tmp_path: Path) -> None:
     assert (folder / "samples.csv").read_text().splitlines()[:11] == rows
     code, text = run(*command, "-n", "12", "--depth", "0.7")
     assert code == 2
-    assert "misalignment.depth was 0.8, is 0.7" in text.replace("\n", " ")
+    assert "misalignment.depth: 0.8 -> 0.7" in text.replace("\n", " ")
 
 
 def test_snr_runs_both_tasks(tmp_path: Path) -> None:

@@ -134,9 +134,9 @@ def test_a_folder_of_other_samples_is_left_alone(lambertian: Any, tmp_path: Path
     settings = replace(QUIET, count=2)
     collect(Misalignment(), lambertian, settings, tmp_path)
     kept = (tmp_path / "samples.csv").read_bytes()
-    with pytest.raises(TaskError, match=r"misalignment\.depth was 0\.8, is 0\.9"):
+    with pytest.raises(TaskError, match=r"misalignment\.depth: 0\.8 -> 0\.9"):
         collect(Misalignment(depth=0.9), lambertian, settings, tmp_path)
-    with pytest.raises(TaskError, match="task was"):
+    with pytest.raises(TaskError, match="task: misalignment -> cylinder-radius"):
         collect(CylinderRadius(), lambertian, settings, tmp_path)
     assert (tmp_path / "samples.csv").read_bytes() == kept
 

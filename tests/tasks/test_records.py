@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from optisense.errors import TaskError
-from optisense.tasks._records import CsvTable, differences, read_object, refuse_differences
+from optisense.tasks._records import CsvTable, read_object, refuse_differences
 
 COLUMNS = ("name", "value")
 ROWS = [{"name": 'a, "quoted" word', "value": 0.1}, {"name": "b", "value": 1 / 3}]
@@ -48,24 +48,16 @@ def test_other_columns_are_refused(tmp_path: Path) -> None:
         CsvTable(tmp_path / "t.csv", ("name",))
 
 
-def test_differences_within_lists_name_the_place() -> None:
-    before = {"points": [{"x": 0.0, "z": 1.0}, {"x": 0.0, "z": 2.0}], "size": [64, 48]}
-    now = {"points": [{"x": 0.0, "z": 1.0}, {"x": 0.0, "z": 2.5}], "size": (80, 48)}
-    assert differences(before, now) == [
-        "points[1].z was 2.0, is 2.5",
-        "size was [64, 48], is [80, 48]",
-    ]
-    assert differences(before, {**before, "points": before["points"][:1]})[0].startswith("points ")
-
-
-def test_differences_name_the_path_and_both_values() -> None:
-    before = {"a": 1, "b": {"c": [1, 2], "d": "x"}, "gone": True}
-    now = {"a": 1, "b": {"c": (1, 2), "d": "y"}, "new": None}
-    assert differences(before, now) == [
-        'b.d was "x", is "y"',
-        "new was nothing, is null",
-        "gone was true, is nothing",
-    ]
+def test_other_settings_are_refused_with_their_paths() -> None:
+    before = {"depth": (0.3, 1.0), "seen": {"seed": 3, "name": "x"}, "indenters": ["plane"]}
+    refuse_differences("things", Path(), {**before, "depth": [0.3, 1.0]}, before)
+    now = {"depth": (0.3, 0.9), "seen": {"seed": 4, "name": "x"}, "indenters": ["plane", "mesh"]}
+    with pytest.raises(TaskError) as raised:
+        refuse_differences("things", Path(), before, now)
+    assert raised.value.message == (
+        "the folder holds things with other settings: depth[1]: 1 -> 0.9; seen.seed: 3 -> 4; "
+        'indenters: ["plane"] -> ["plane", "mesh"]'
+    )
     with pytest.raises(TaskError, match="and 2 more"):
         refuse_differences("things", Path(), {}, {str(n): n for n in range(7)})
 

@@ -18,7 +18,7 @@ from optisense.errors import OptiSenseError, SetupError
 from optisense.objectives import Evaluation, Settings
 from optisense.objectives.frames import frame_of
 from optisense.objectives.run import split_settings
-from optisense.objectives.settings import size_for
+from optisense.objectives.settings import ACROSS
 from optisense.quality import PHOTONS, SCORE_PHOTONS, photons_of
 from optisense.search.evaluation.evaluator import DesignEvaluator
 
@@ -103,7 +103,7 @@ class CoarseEvaluator(DesignEvaluator):
 def _full_size(design: SensorDesign, settings: Mapping[str, Any]) -> tuple[int, int]:
     """Return the size (width, height) of the images of full scores, pixels."""
     given = Settings(resolution=settings.get("resolution")).resolution
-    return given or size_for(design.camera.resolution)
+    return given or design.camera.size_at(ACROSS)
 
 
 def _smallest_contact(evaluation: Evaluation) -> int:

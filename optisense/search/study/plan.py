@@ -13,7 +13,6 @@ from optisense.design.difference import fingerprint
 from optisense.errors import SearchError
 from optisense.objectives import Objective
 from optisense.objectives.combined import goal_of
-from optisense.objectives.settings import size_for
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, goal_name, placed
 from optisense.search.evaluation.relit import can_relight
@@ -69,9 +68,7 @@ class Plan:
         measured = [goal_of(goal) for goal in self.goals if isinstance(goal, str | Objective)]
         measured += [each.objective() for each in requirements]
         if any(each.rays_only for each in measured):
-            settings.setdefault(
-                "ray_resolution", list(size_for(design.camera.resolution, RAYS_ACROSS))
-            )
+            settings.setdefault("ray_resolution", list(design.camera.size_at(RAYS_ACROSS)))
         chosen = find(self.method)
         if not all(each.rays_only for each in measured) and not chosen.renders_once:
             settings.setdefault("photons", TRIAL_PHOTONS)
