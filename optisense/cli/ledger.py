@@ -12,7 +12,7 @@ from optisense.cli.console import handles_errors, output, table_of
 from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
-from optisense.commands.ledger import LedgerOptions
+from optisense.commands.rendering import LedgerOptions
 from optisense.writing import write_text
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Options of a rendered picture."""
+"""Options of a rendered picture, and of a light ledger."""
 
 from __future__ import annotations
 
@@ -61,3 +61,12 @@ class BeforeAndAfterOptions(CommandOptions):
     """Options of the pictures on a study's page."""
 
     photons: Photons = Field(PICTURE_PHOTONS, description="Photons to trace for each picture.")
+
+
+class LedgerOptions(CommandOptions):
+    """Options of the photons that a light ledger follows."""
+
+    photons: Photons = Field(
+        PICTURE_PHOTONS, description="Photons to trace, of all lights together."
+    )
+    seed: Seed = Field(0, description="The same seed gives the same photons.")

@@ -13,11 +13,10 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.search_process import SearchProcess, is_running
-from optisense.engine.trial_rows import trial_row
 from optisense.time_left import TimedStep, TimeLeft
 
 if TYPE_CHECKING:
-    from optisense.search import Study
+    from optisense.search import Study, Trial
     from optisense.search.study.store import Row
 
 POLL_INTERVAL = 0.25
@@ -201,3 +200,31 @@ def _score(row: Row, objective: str) -> float:
 
 def _failed(row: Row) -> bool:
     return row.outcome is not None and row.outcome.failed
+
+
+def curve_row(trial: Trial) -> dict[str, Any]:
+    """Return a point of the curve of scores."""
+    return {
+        "number": trial.number,
+        "start": trial.is_start,
+        "scores": trial.scores,
+        "failure": trial.failure,
+        "feasible": trial.failure is None and trial.is_feasible,
+    }
+
+
+def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
+    """Return a trial without its design."""
+    from optisense.search.study.conditions import margins
+    from optisense.search.study.study import beside
+
+    return {
+        **curve_row(trial),
+        "values": trial.values,
+        "vector": trial.vector,
+        "beside": beside(study, trial),
+        "conditions": [
+            {"condition": text, "value": value, "margin": margin}
+            for text, value, margin in margins(trial)
+        ],
+    }

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from optisense.commands.ledger import LedgerOptions
 from optisense.commands.options import MOST_PIXELS
-from optisense.commands.rendering import RenderOptions
+from optisense.commands.rendering import LedgerOptions, RenderOptions
 from optisense.design import LightGroup, SensorDesign, set_value
 from optisense.engine.contacts import (
     AnyContact,

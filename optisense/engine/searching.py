@@ -11,7 +11,7 @@ from pydantic import Field
 from optisense.commands.searching import SearchOptions
 from optisense.engine.designing import bent_shapes
 from optisense.engine.failures import ProtocolError
-from optisense.engine.following import Following
+from optisense.engine.following import Following, curve_row, trial_row
 from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, design_of
@@ -19,7 +19,6 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.scoring import own_objectives
 from optisense.engine.search_process import SearchProcess, is_running, stop_other
 from optisense.engine.session import Session
-from optisense.engine.trial_rows import curve_row, trial_row
 from optisense.sensors import save_design
 
 if TYPE_CHECKING:

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 import optisense as ots
 import optisense.commands.comparing
-import optisense.commands.ledger
 import optisense.commands.rendering
 import optisense.commands.sampling
 import optisense.commands.searching
