@@ -137,9 +137,7 @@ class FolderLock:
             raise _cannot_write(self.folder, error, self._hint) from error
 
     def is_whole(self) -> None:
-        """Record that the files of `will_make` are complete; from here on only `undo` removes
-        them.
-        """
+        """Record that the files of `will_make` are complete; from now only `undo` removes them."""
         with contextlib.suppress(OSError):
             self._write(self._me)
 

@@ -112,9 +112,7 @@ class Registry(Generic[T]):
         return known or any(point.name == name for point in entry_points(group=self.group))
 
     def names(self) -> list[str]:
-        """Return all names: first the built-in ones in their order, then all others in alphabetical
-        order.
-        """
+        """Return all names: the built-in ones in their order, then all others by the alphabet."""
         offered = {point.name for point in entry_points(group=self.group)}
         return [*self.built_in, *sorted((offered | set(self._registered)) - set(self.built_in))]
 

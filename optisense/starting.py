@@ -16,9 +16,7 @@ _begun = False
 
 
 def begin() -> None:
-    """Record that work has begun, for which a signal may have to wait; called as a command
-    begins.
-    """
+    """Record that work has begun, for which a signal may wait; called as a command begins."""
     global _begun
     _begun = True
 

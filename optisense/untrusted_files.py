@@ -254,9 +254,7 @@ def is_folder(path: Path) -> bool:
 
 
 def first_problem(error: ValidationError) -> str:
-    """Return the first problem of values that a pydantic model refuses, with its place among
-    them.
-    """
+    """Return the first problem of values that a pydantic model refuses, with its place."""
     report = error.errors(include_url=False, include_context=False)[0]
     place = ".".join(brief(str(step)) for step in report["loc"])
     if report["type"] == "missing":

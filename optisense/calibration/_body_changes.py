@@ -111,9 +111,7 @@ def _with_lights(design: SensorDesign, group: str, change) -> SensorDesign:  # t
 
 
 def turned(vector: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
-    """Return a vector (3,) rotated by an angle (degrees) about a unit axis (3,), by Rodrigues'
-    formula.
-    """
+    """Return a vector (3,) turned by an angle (degrees) about a unit axis (3,) (Rodrigues)."""
     cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     along = axis * float(axis @ vector) * (1.0 - cosine)
     return np.asarray(vector * cosine + np.cross(axis, vector) * sine + along)
@@ -197,9 +195,7 @@ def edge_roughness(design: SensorDesign, parts: list[str]) -> float | None:
 
 
 def with_edge_roughness(design: SensorDesign, parts: list[str], roughness: float) -> SensorDesign:
-    """Return a design with a roughness on the faces of parts towards the four sides of the
-    picture.
-    """
+    """Return a design with a roughness on the faces of parts towards the picture's four sides."""
     found = design.copy()
     right, up, _ = design.camera.axes()
     sides = {"right": right, "left": -right, "top": up, "bottom": -up}

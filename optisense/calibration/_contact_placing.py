@@ -99,9 +99,7 @@ def scaled_contact(place: SeenContact, factor: float) -> SeenContact:
 
 
 def moved_contact(place: SeenContact, amount: FloatArray) -> SeenContact:
-    """Return a contact after a change (3,) of column and row, pixels, and of the logarithm of its
-    radius.
-    """
+    """Return a contact after a change (3,) of column, row (pixels) and the radius's logarithm."""
     column, row, wider = (float(value) for value in amount)
     grown = place.radius * math.exp(min(max(wider, -WIDEST_CHANGE), WIDEST_CHANGE))
     return SeenContact((place.centre[0] + column, place.centre[1] + row), grown)

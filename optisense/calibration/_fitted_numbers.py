@@ -88,9 +88,7 @@ def fitted_numbers(
 def correlated_pairs(
     chosen: Sequence[FitQuantity], solution: Solution
 ) -> tuple[tuple[str, str, float], ...]:
-    """Return pairs of numbers, in words, that photographs can't distinguish, and their
-    correlation.
-    """
+    """Return pairs of numbers, in words, that photographs can't distinguish, with correlation."""
     deviations = np.sqrt(np.maximum(np.diag(solution.covariance), 1e-300))
     correlation = solution.covariance / np.outer(deviations, deviations)
     found = []

@@ -239,9 +239,7 @@ class LayeredFit:
     def _descend(
         self, steps: FloatArray, contacts: FloatArray, progress: Callable[[], None]
     ) -> tuple[FloatArray, FloatArray, list[FloatArray], Scales]:
-        """Return steps, contacts, their pictures and the scales of the residuals at the least
-        cost.
-        """
+        """Return steps, contacts, their pictures and the residuals' scales at the least cost."""
         pictures = self.pictures(steps, contacts)
         scales = self._scales(pictures, steps, contacts)
         cost = self._cost(pictures, steps, contacts, scales)
@@ -313,9 +311,7 @@ class LayeredFit:
     def _noise_of(
         self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
     ) -> list[FloatArray]:
-        """Return a sample of the light's noise, levels (h, w, 3), in the background and in each
-        response.
-        """
+        """Return a sample of the light's noise, levels (h, w, 3), in background and responses."""
         if self._noise is None:
             return [np.zeros_like(shown) for shown in pictures]
         ground = self._shown(-1, steps, None, self._noise) - pictures[0]
@@ -325,9 +321,7 @@ class LayeredFit:
         ]
 
     def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
-        """Return the residuals (k, 3) of the background (index -1), or of a press's pixels near its
-        contact.
-        """
+        """Return the residuals (k, 3) of the background (index -1), or those near a contact."""
         size = scales.of(index).size * scales.expected[index + 1]
         if index < 0:
             return np.asarray(((pictures[0] - self._real) / size).reshape(-1, 3))

@@ -163,9 +163,7 @@ def _marked(
     numbers: Sequence[FittedNumber],
     photographs: Photographs,
 ) -> SensorDesign:
-    """Return the design with provenance of its fitted numbers, with the fingerprints of the
-    photographs.
-    """
+    """Return the design with provenance of fitted numbers and fingerprints of the photographs."""
     prints = ", ".join(
         each[:12]
         for each in (photographs.fingerprint, *(p.fingerprint for p in photographs.presses))

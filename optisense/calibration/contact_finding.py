@@ -153,9 +153,7 @@ def _contact_in(
 
 
 def difference(picture: NDArray[np.uint8], background: NDArray[np.uint8]) -> FloatArray:
-    """Return a photograph minus the background, blurred, minus the median of all, (h, w, 3)
-    levels.
-    """
+    """Return a photograph minus the background, blurred, minus its median, (h, w, 3) levels."""
     found = picture.astype(np.float64) - background
     width = BLUR * picture.shape[1]
     blurred = gaussian_filter(found, (width, width, 0.0))
@@ -179,9 +177,7 @@ def _first_guess(strength: FloatArray, least: float) -> tuple[tuple[float, float
 def _antisymmetric_point(
     response: FloatArray, start: tuple[float, float], radius: float
 ) -> tuple[tuple[float, float], float]:
-    """Return the point about which the response is most nearly antisymmetric, and its asymmetry
-    there.
-    """
+    """Return the point of the most nearly antisymmetric response, and its asymmetry there."""
     steps = np.linspace(-REACH, REACH, 2 * SIDE + 1)
     x, y = np.meshgrid(steps, steps)
     half = (np.hypot(x, y) < REACH) & ((y > 0.0) | ((y == 0.0) & (x > 0.0)))
@@ -212,9 +208,7 @@ def _antisymmetric_point(
 
 
 def _edge(strength: FloatArray, column: float, row: float, reach: tuple[float, float]) -> float:
-    """Return the radius, in pixels, between the response's peak and its steepest fall, within two
-    radii.
-    """
+    """Return the radius, pixels, between the response's peak and its steepest fall, in `reach`."""
     rows, columns = np.mgrid[: strength.shape[0], : strength.shape[1]]
     distance = np.hypot(columns - column, rows - row)
     rings = np.round(distance).astype(np.int64).ravel()

@@ -208,9 +208,7 @@ def realism(
 
 
 def _press(name: str, real: FloatArray, model: FloatArray, seen: SeenContact) -> PressRealism:
-    """Return the figures of one press, from the differences (h, w, 3) between pictures with and
-    without it.
-    """
+    """Return the figures of one press, from differences (h, w, 3) from the untouched pictures."""
     distance = distances(real.shape[:2], seen)
     drifted = drift(real, distance)
     far_smooth = without_noise(model - real, distance > FAR)

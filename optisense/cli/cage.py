@@ -314,9 +314,7 @@ def _numbers(values: object) -> str:
 
 
 def _check_ends(design: SensorDesign, name: str) -> None:
-    """Print the problems of both ends of a range; a search may still find good shapes in
-    between.
-    """
+    """Print the problems of both ends of a range; a search may find good shapes in between."""
     from optisense.design import set_value
     from optisense.design.cage_checks import cage_problems
 

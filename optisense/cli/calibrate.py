@@ -88,9 +88,7 @@ def calibrate(
 
 
 def print_calibration(found: Calibration) -> None:
-    """Print the fitted numbers, and the distance of the design from the photographs before and
-    after.
-    """
+    """Print the fitted numbers, and the design's distance from the photographs before and after."""
     table = table_of("fitted", "before", "after", "±", "")
     for each in found.numbers:
         table.add_row(

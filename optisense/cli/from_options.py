@@ -17,9 +17,7 @@ from optisense.text import lone_surrogate
 
 
 def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a command whose parameters of a type `CommandOptions` are replaced by an option for
-    each field.
-    """
+    """Return a command that has an option for each field of its parameters `CommandOptions`."""
     hints = get_type_hints(command, include_extras=True)
     models = {
         name: kind

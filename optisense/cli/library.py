@@ -1,6 +1,4 @@
-"""``optisense library``: show and extend the materials, lights and cameras that designs can
-name.
-"""
+"""``optisense library``: show and extend the materials, lights and cameras of designs."""
 
 from __future__ import annotations
 

@@ -70,9 +70,7 @@ class ProgressLine:
         self.say(text or step, done, count)
 
     def advance(self, done: float, count: float | None = None, *notes: str) -> None:
-        """Show that ``done`` pieces of the step are finished; with ``count``, both numbers are
-        shown.
-        """
+        """Show that ``done`` pieces of the step are finished, of ``count`` if it is given."""
         with self._lock:
             self.time_left.advance(done)
         self.say(self._what, done, count, *notes)

@@ -67,9 +67,7 @@ class _Watched:
         self._version = version
 
     def answer(self) -> None:
-        """Wait up to `POLL_INTERVAL` seconds for a browser's request for a trial's picture, and
-        answer it.
-        """
+        """Wait up to `POLL_INTERVAL` seconds for a browser's request for a picture; answer it."""
         from optisense.picture_files import png
 
         asked = self._server.wait(POLL_INTERVAL)

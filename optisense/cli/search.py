@@ -170,9 +170,7 @@ def _new_study(out: Path, design: str | None, options: SearchOptions) -> Study:
 
 
 def _resumed_study(out: Path, design: str | None, wanted: dict[str, Any], trust: bool) -> Study:
-    """Return the study in a folder, after a check that given options are those that it was begun
-    with.
-    """
+    """Return the study in a folder, after a check that given options are those of its start."""
     from optisense.search import Study
     from optisense.search.study.trust import not_trusted
     from optisense.sensors import load

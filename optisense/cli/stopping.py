@@ -90,9 +90,7 @@ def print_wait() -> None:
 
 
 def exit_code(code: int) -> int:
-    """Return the exit code for a process that would exit with ``code``: 143 if SIGTERM stopped
-    it.
-    """
+    """Return the exit code for a process that would exit with ``code``: 143 after SIGTERM."""
     return EXIT_TERMINATED if _state.terminated and code == EXIT_INTERRUPTED else code
 
 
@@ -164,9 +162,7 @@ def finish(code: int) -> None:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Handle Ctrl-C: raise KeyboardInterrupt once a command has begun, unless Python is
-    importing.
-    """
+    """Handle Ctrl-C: raise KeyboardInterrupt once a command has begun, but not amid an import."""
     if not starting.has_begun():
         starting.leave(signal.SIGTERM if _state.terminated else signal.SIGINT)
     if _imports(frame):
@@ -203,9 +199,7 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _answer(reader: int) -> None:
-    """Print at once what the command waits for, and end the process shortly after a second
-    signal.
-    """
+    """Print at once what the command waits for; end the process shortly after a second signal."""
     while True:
         for number in os.read(reader, 16):
             if number not in (signal.SIGINT, signal.SIGTERM):
@@ -224,9 +218,7 @@ def _answer(reader: int) -> None:
 
 
 def _leave() -> NoReturn:
-    """End this process at once. Files are written whole or not at all, so none is left
-    incomplete.
-    """
+    """End this process at once. Files are written whole or not at all, so all stay complete."""
     if sys.stderr.isatty():
         sys.stderr.write("\r\x1b[2K\x1b[?25h")  # remove the live line, show the cursor
     sys.stderr.write("stopped at once\n")

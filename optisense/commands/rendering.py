@@ -50,9 +50,7 @@ class RenderOptions(CommandOptions):
     skin: Skin = Field(ELASTIC, description=SKIN_HELP)
 
     def photons_to_trace(self, usual: str = "normal") -> int | None:
-        """Return the number of photons asked for, or of the level `usual`; None if another limit is
-        given.
-        """
+        """Return the number of photons asked for, or of `usual`; None if another limit is given."""
         limited = self.photons or self.noise or self.seconds
         return self.photons if limited else photons_of(usual)
 

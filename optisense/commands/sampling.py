@@ -76,9 +76,7 @@ class SampleOptions(EstimatorOptions):
     )
 
     def settings(self) -> dict[str, Any]:
-        """Return the arguments of `optisense.tasks.SampleSettings`, which takes a second to
-        load.
-        """
+        """Return the arguments of `optisense.tasks.SampleSettings`, which is slow to load."""
         made = self.model_dump(include=set(EstimatorOptions.model_fields))
         return made | {"count": self.samples}
 
@@ -131,9 +129,7 @@ class DatasetOptions(EstimatorOptions):
     radiance: bool = Field(False, description="Also write linear radiance as EXR files.")
 
     def settings(self) -> dict[str, Any]:
-        """Return the arguments of `optisense.tasks.DatasetSettings`, which takes a second to
-        load.
-        """
+        """Return the arguments of `optisense.tasks.DatasetSettings`, which is slow to load."""
         from optisense.tasks import ContactDraw
 
         drawn = {"indenter", "depth", "rotation", "tilt", "margin"}

@@ -23,9 +23,7 @@ ScoreSettings = ScoreOptions.model_fields["settings"]
 
 
 class SearchOptions(CommandOptions):
-    """Options of a search: parameters, objectives and method. None is the default of a new
-    study.
-    """
+    """Options of a search: parameters, objectives, method. None is the default of a new study."""
 
     vary: Annotated[list[str], OptionNotation("PATH=LO:HI[:N]")] = Field(
         [],

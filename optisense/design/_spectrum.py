@@ -48,9 +48,7 @@ class Spectrum(Model):
 
 
 class LightSpectra(Model):
-    """Spectra of a light's dies. Light of a die without a spectrum belongs to its own channel
-    alone.
-    """
+    """Spectra of a light's dies. Light of a die without one belongs to its own channel alone."""
 
     red: Spectrum | None = None
     green: Spectrum | None = None

@@ -249,9 +249,7 @@ def _meetings(
 def _partings(
     design: SensorDesign, cage_name: str, name: str, other: str, bent: Meshes, overlap: Overlap
 ) -> list[Diagnostic]:
-    """Return the problems at places where a deformed part has lost contact with one that it touched
-    at rest.
-    """
+    """Return the problems where a deformed part lost contact with one that it touched at rest."""
     mesh, rest = design.meshes[name], design.meshes[other]
     change = np.linalg.norm(bent[name].vertices - mesh.vertices, axis=1)
     rows = touching_vertices(mesh, rest)

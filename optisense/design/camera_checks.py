@@ -220,9 +220,7 @@ def _small(message: str, where: str) -> Diagnostic:
 
 
 def _distance(point: NDArray[np.float64], mesh: TriangleMesh) -> float:
-    """Return the distance from a point to a mesh, mm; infinite if it is larger than the smallest
-    camera.
-    """
+    """Return the distance from a point to a mesh, mm; infinite beyond the smallest camera."""
     low, high = mesh.face_bounds
     near = ((low < point + SMALLEST_CAMERA) & (high > point - SMALLEST_CAMERA)).all(axis=1)
     if not near.any():

@@ -92,9 +92,7 @@ def is_left_out(value: object) -> bool:
 
 
 class Model(BaseModel):
-    """Base class of all models in a design file: unknown fields are refused, changes are
-    checked.
-    """
+    """Base class of all models in a design file: unknown fields are refused, changes checked."""
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True)
 

@@ -46,9 +46,7 @@ class IesProfile:
 
     @property
     def lumens(self) -> float:
-        """Luminous flux, lm: the integral of intensity, linear between the angles, over all
-        directions.
-        """
+        """Luminous flux, lm: the integral over directions of intensity, linear between angles."""
         theta = np.radians(self.vertical_angles)
         low, high = theta[:-1], theta[1:]
         # The integrals of the two hat functions times sin(theta) over each interval.

@@ -22,9 +22,7 @@ SMALLEST = 0.5
 
 
 def unit_slips(design: SensorDesign) -> list[Diagnostic]:
-    """Return problems of parts, lights and a camera whose sizes or distances suggest another unit
-    than mm.
-    """
+    """Return problems of parts, lights and camera whose sizes or distances suggest another unit."""
     problems: list[Diagnostic] = []
     for name, mesh in design.meshes.items():
         place = design.where("parts", name, "mesh")

@@ -27,9 +27,7 @@ that folds has a larger one, or no such position.
 
 
 def image_edges(camera: Camera) -> tuple[float, float]:
-    """Return half the width and half the height of the picture on the image plane (see
-    `distortion`).
-    """
+    """Return half the width and height of the picture on the image plane (see `distortion`)."""
     half = np.radians(0.5 * camera.fov)
     edge = float(half if camera.projection == "equidistant" else np.tan(half))
     return edge, edge * camera.resolution[1] / camera.resolution[0]
@@ -106,9 +104,7 @@ def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, Floa
 
 
 def _largest_height(camera: Camera) -> float:
-    """Return the largest distance from the axis, on the ideal image plane, that the picture
-    shows.
-    """
+    """Return the largest distance from the axis, on the ideal image plane, in the picture."""
     along = np.linspace(0.0, 1.0, FOLD_PLACES)
     across = np.concatenate([along, along, 0.0 * along, 0.0 * along + 1.0])
     down = np.concatenate([0.0 * along, 0.0 * along + 1.0, along, along])

@@ -154,9 +154,7 @@ def _anchor(lines: list[FloatArray], solid: bool) -> tuple[float, float]:
 
 
 def _light(x: float, y: float, colours: list[str]) -> str:
-    """Return a dot; if lights of several colours lie behind one another, it has a sector for
-    each.
-    """
+    """Return a dot; if lights of several colours lie behind one another, a sector for each."""
     circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{DOT}"'
     edge = f'stroke="{INK}" stroke-width="0.7"/>'
     if len(colours) == 1:
@@ -172,9 +170,7 @@ def _light(x: float, y: float, colours: list[str]) -> str:
 
 
 def _labels(labels: list[_Label], column: float, tall: float) -> list[str]:
-    """Return labels in a column, in the order of their anchors and near them, with lines to
-    these.
-    """
+    """Return labels in a column, in the order of their anchors and near them, with lines."""
     ordered = sorted(labels, key=lambda label: (label.y, -label.x))
     wanted = np.array([label.y for label in ordered])
     spots = np.maximum.accumulate(wanted - LINE * np.arange(len(wanted)))

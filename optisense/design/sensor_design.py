@@ -252,9 +252,7 @@ class SensorDesign(Model):
         return f"<div><b>{to_html(self.name)}</b><br>{drawing}</div>"
 
     def where(self, *path: str | int) -> str:
-        """Return file and line of a value if the design was read from a file, else its dotted
-        path.
-        """
+        """Return file and line of a value of a design read from a file, else its dotted path."""
         if self._source is None:
             return dotted(path)
         for length in range(len(path), -1, -1):

@@ -203,9 +203,7 @@ def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
 
 
 def _named_files(design: SensorDesign) -> dict[str, bytes]:
-    """Return the contents of the files of lamps and materials, by their paths inside the design
-    folder.
-    """
+    """Return the contents of the files of lamps and materials, by their paths in the folder."""
     files: dict[str, bytes] = {}
     owner: dict[str, str] = {}
     for path, value in design.values_of_kinds().items():

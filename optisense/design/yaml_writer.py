@@ -87,9 +87,7 @@ def _flow(value: Any) -> str:
 
 
 def _text(text: str) -> str:
-    """Return a text without quotes if that is unambiguous, else quoted (JSON's strings are
-    YAML's).
-    """
+    """Return a text without quotes if that is unambiguous, else quoted as JSON, which is YAML."""
     if _PLAIN.match(text) and text.casefold() not in _WORDS:
         return text
     quoted = json.dumps(text, ensure_ascii=False)

@@ -222,9 +222,7 @@ def export_robot(session: Session, fields: ExportRobot, job: Job) -> dict[str, A
 def bent_shapes(
     design: SensorDesign, files: Files, before: SensorDesign | None = None
 ) -> dict[str, dict[str, str]]:
-    """Write the parts whose present shape differs from their mesh at rest, or from that in
-    `before`.
-    """
+    """Write the parts whose present shape differs from their mesh at rest, or from `before`."""
     shapes = design.deformed_meshes()
     others = design.meshes if before is None else before.deformed_meshes()
     bent = {name: mesh for name, mesh in shapes.items() if not _alike(mesh, others.get(name))}

@@ -212,9 +212,7 @@ class Designs:
         return design
 
     def _checked(self, mesh: TriangleMesh, name: str, role: Role) -> TriangleMesh:
-        """Return the checked mesh, turned outward if it must be closed; the same object for the
-        same mesh.
-        """
+        """Return the checked mesh, turned outward if it must be closed; one object for one mesh."""
         closed = role in TRANSPARENT_SOLIDS
         kept = self._valid.setdefault(mesh, {})
         if closed not in kept:

@@ -143,9 +143,7 @@ def _made(
     more: dict[str, Any] | None = None,
     sources: dict[str, Any] | None = None,
 ) -> AnyEntry:
-    """Return an entry with these values; all numbers have the same source unless `sources` are
-    given.
-    """
+    """Return an entry with these values; all numbers have one source unless `sources` are given."""
     singular = kind_named(kind)
     own = {key: each for key, each in value.items() if each is not None}
     own.pop("library", None)

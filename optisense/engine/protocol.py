@@ -116,9 +116,7 @@ def answer(number: RequestId | None, result: Mapping[str, Any]) -> dict[str, Any
 
 
 def refusal(number: RequestId | None, error: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the message that a request has failed; see `optisense.engine.failures.as_data` for
-    `error`.
-    """
+    """Return the message that a request has failed; `failures.as_data` makes `error`."""
     return {"id": number, "ok": False, "error": error}
 
 

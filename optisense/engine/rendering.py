@@ -319,9 +319,7 @@ def write_image(
 
 
 def blender_pixels(picture: NDArray[np.uint8]) -> NDArray[np.float32]:
-    """Return Blender's pixels (h, w, 4) of a picture (h, w, 3): 0 to 1, opaque, row 0 at the
-    bottom.
-    """
+    """Return Blender's pixels (h, w, 4) of a picture (h, w, 3): 0 to 1, opaque, from the bottom."""
     height, width = picture.shape[:2]
     opaque = np.full((height, width, 4), 255, dtype=np.uint8)
     opaque[..., :3] = picture[::-1]

@@ -70,9 +70,7 @@ def names() -> list[str]:
 
 
 def _load() -> None:
-    """Import the modules that register requests; not at the start, so that `hello` need not
-    wait.
-    """
+    """Import the modules that register requests; not at the start, so that `hello` is fast."""
     for module in (
         "rendering",
         "footprint",

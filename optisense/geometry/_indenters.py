@@ -150,9 +150,7 @@ class Plane(IndenterKind):
     size: float = quantity("mm", "The side of the plate.", 8.0, low=SMALLEST, high=LARGEST)
 
     def tilted(self, tilt_x: float, tilt_y: float) -> Plane:
-        """Return the plate with an additional tilt; its middle stays above the place of the
-        contact.
-        """
+        """Return the plate with an additional tilt; its middle stays above the contact's place."""
         return replace(self, tilt_x=self.tilt_x + tilt_x, tilt_y=self.tilt_y + tilt_y)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
@@ -210,9 +208,7 @@ class MeshIndenter(IndenterKind):
         return cls(file, **rest)
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the values of `from_plain`; the mesh must come from a file. See
-        `IndenterKind.to_plain`.
-        """
+        """Return the values of `from_plain`; the mesh must come from a file."""
         if isinstance(self.source, TriangleMesh):
             raise ContactError(
                 "an indenter that is a mesh in memory cannot be written to a file",

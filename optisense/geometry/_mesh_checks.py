@@ -72,9 +72,7 @@ def _closed_and_outward(mesh: TriangleMesh, name: str) -> TriangleMesh:
 
 
 def unmatched_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Return the directed edges (k, 2), rows of the welded mesh, that occur more often than their
-    reverse.
-    """
+    """Return directed edges (k, 2) of the welded mesh that occur more often than their reverse."""
     forward, size = _directed_edges(mesh)
     keys, counts = np.unique(forward, return_counts=True)
     backward = (keys % size) * size + keys // size

@@ -85,9 +85,7 @@ def cage_weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) ->
 
 
 def deform(weights: FloatArray, points: ArrayLike) -> FloatArray:
-    """Return the deformed vertices (n, 3), mm, for `weights` (n, N) and control points (N, 3),
-    mm.
-    """
+    """Return the deformed vertices (n, 3), mm, for `weights` (n, N) and points (N, 3), mm."""
     moved: FloatArray = weights @ np.asarray(points, dtype=np.float64).reshape(-1, 3)
     return moved
 
@@ -192,9 +190,7 @@ def box_coordinates(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
 
 
 def bernstein(t: FloatArray, count: int) -> FloatArray:
-    """Return the values (n, count) of the `count` Bernstein polynomials of degree `count` - 1 at t
-    (n,).
-    """
+    """Return the values (n, count) of the Bernstein polynomials of degree `count` - 1 at t (n,)."""
     i = np.arange(count)
     degree = count - 1
     binomial = np.array([math.comb(degree, k) for k in range(count)], dtype=np.float64)

@@ -204,9 +204,7 @@ class _Frames:
 
 
 def _twins(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> Pairs:
-    """Return the pairs of faces with the same corners, the common case, which is much faster to
-    find.
-    """
+    """Return the pairs of faces with the same corners: the common case, much faster to find."""
     kept = np.flatnonzero(_in_reach(first, second, tolerance))
     if len(kept) == 0:
         return np.zeros((0, 2), dtype=np.int64)
@@ -233,9 +231,7 @@ def _in_reach(first: TriangleMesh, second: TriangleMesh, tolerance: float) -> ND
 def _near_pairs(
     first: TriangleMesh, second: TriangleMesh, tolerance: float, without: Pairs
 ) -> Pairs:
-    """Return the pairs of faces whose boxes, grown by `tolerance`, overlap, except those in
-    `without`.
-    """
+    """Return the pairs of faces, not in `without`, whose boxes, grown by `tolerance`, overlap."""
     reach_1, reach_2 = _in_reach(first, second, tolerance), _in_reach(second, first, tolerance)
     reach_1[without[:, 0]] = False
     reach_2[without[:, 1]] = False
@@ -266,9 +262,7 @@ def _apart(triangles: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
 
 
 def _inward(triangles: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the distance (k, 3, c) of points (k, c, 2) from each edge line, positive towards the
-    inside.
-    """
+    """Return the distance (k, 3, c) of points (k, c, 2) from each edge line, positive inside."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     length = np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
     turn = np.sign(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
@@ -305,9 +299,7 @@ def _united(
 
 
 def _heights(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Return the absolute height (k, c), over points (k, c, 2), of the planes of triangles
-    (k, 3, 3).
-    """
+    """Return the absolute height (k, c), over points (k, c, 2), of triangles' planes (k, 3, 3)."""
     a = triangles[:, 0]
     normal = np.cross(triangles[:, 1] - a, triangles[:, 2] - a)
     slope = -normal[:, :2] / np.where(normal[:, 2:] == 0.0, 1e-300, normal[:, 2:])
@@ -357,9 +349,7 @@ def _assembled(
 
 
 def _interpolated(values: FloatArray, corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Interpolate unit vectors at points (n, 2) from `values` (3, 3) at the corners (3, 2) of a
-    triangle.
-    """
+    """Interpolate unit vectors at points (n, 2) from a triangle's `values` (3, 3) at `corners`."""
     edges = (corners[1:] - corners[0]).T
     bary = np.linalg.solve(edges, (points - corners[0]).T).T
     mixed = values[0] + bary @ (values[1:] - values[0])

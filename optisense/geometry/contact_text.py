@@ -114,9 +114,7 @@ def parse_indenter(text: str) -> Indenter:
 
 
 def _depth_or_force(text: str) -> tuple[float, float | None]:
-    """Return the depth of a number without a unit, or the default depth and the force of one in
-    N.
-    """
+    """Return the depth of a number without a unit, or the default depth and a force in N."""
     word = text.strip()
     if word[-1:] in ("N", "n") and word[:-1].strip()[-1:] in "0123456789.":
         return Contact.depth, _numbers(word[:-1], "the force", (1,))[0]

@@ -46,9 +46,7 @@ def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
 
 
 def _frame() -> FloatArray:
-    """Return the axes (3, 3) as rows: two axes perpendicular to the rays, and the rays'
-    direction.
-    """
+    """Return the axes (3, 3) as rows: two perpendicular to the rays, and the rays' direction."""
     way = RAY_DIRECTION / np.linalg.norm(RAY_DIRECTION)
     across = np.cross(way, (1.0, 0.0, 0.0))
     across /= np.linalg.norm(across)

@@ -122,9 +122,7 @@ def _reach_through(heights: FloatArray) -> NDArray[np.bool_]:
 def _cut_out(
     triangles: FloatArray, heights: FloatArray, line: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the sections of triangles by a plane: start and end along the line (mm), and a point
-    of it.
-    """
+    """Return triangles' sections by a plane: start and end along the line (mm), a point of it."""
     rows = np.arange(len(triangles))
     # Both edges of the corner that is alone on its side of the plane pass through the plane.
     above = heights > 0.0

@@ -134,9 +134,7 @@ def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:
 
 
 def _single_outline(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Return the boundary vertices, in order, of a sheet that is a disc; empty for any other
-    shape.
-    """
+    """Return the boundary vertices, in order, of a sheet that is a disc; empty for others."""
     none = np.zeros(0, dtype=np.int64)
     faces = mesh.faces.astype(np.int64)
     size = len(mesh.vertices)

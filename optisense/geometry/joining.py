@@ -53,9 +53,7 @@ class Join:
 
 
 def touching_area(first: TriangleMesh, second: TriangleMesh, distance: float) -> float:
-    """Return the approximate area (mm^2) of `first` that lies within a distance (mm) of
-    `second`.
-    """
+    """Return the approximate area (mm^2) of `first` within a distance (mm) of `second`."""
     pairs = find_coincident(first, second, distance, facing=True).pairs
     if len(pairs) == 0:
         return 0.0
@@ -168,9 +166,7 @@ def _curved_moves(
 
 
 def closest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Return the point (k, 3), mm, of each triangle (k, 3, 3) that is nearest to its point (k,
-    3).
-    """
+    """Return the point (k, 3), mm, of each triangle (k, 3, 3) nearest to its point (k, 3)."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     squares = np.maximum(np.einsum("kei,kei->ke", edges, edges), 1e-300)
     way = points[:, None] - triangles

@@ -264,9 +264,7 @@ def _parse_obj(data: bytes, path: Path) -> MeshArrays:
 
 
 def _corner(word: str, n_vertices: int, n_normals: int) -> tuple[int, int]:
-    """Return the zero-based (vertex, normal) of 'v', 'v/t', 'v//n' or 'v/t/n'; a missing normal is
-    -1.
-    """
+    """Return the zero-based (vertex, normal) of 'v', 'v/t', 'v//n' or 'v/t/n'; -1 for no normal."""
     fields = word.split("/")
     vertex = _index(fields[0], n_vertices)
     normal = _index(fields[2], n_normals) if len(fields) > 2 and fields[2] else -1

@@ -147,9 +147,7 @@ def _face_boxes(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
 def _narrowed(
     first: TriangleMesh, second: TriangleMesh
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the faces of both meshes that lie in the box around those of the other, reduced in
-    rounds.
-    """
+    """Return the faces of both meshes in the box around those of the other, reduced in rounds."""
     boxes = [_face_boxes(first), _face_boxes(second)]
     rows = [np.arange(len(first.faces)), np.arange(len(second.faces))]
     for turn in range(2 * ROUNDS):
@@ -163,9 +161,7 @@ def _narrowed(
 
 
 def _depths(first: TriangleMesh, second: TriangleMesh, pairs: NDArray[np.int64]) -> FloatArray:
-    """Return the depths (k,), mm, to which the faces of each pair reach through each other's
-    plane.
-    """
+    """Return the depths (k,), mm, to which the faces of pairs reach through the other's plane."""
     depths = np.full(len(pairs), np.inf)
     for planes, others, this, that in ((first, second, 0, 1), (second, first, 1, 0)):
         height = np.einsum(
@@ -178,9 +174,7 @@ def _depths(first: TriangleMesh, second: TriangleMesh, pairs: NDArray[np.int64])
 
 
 def _distances(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Return the distances (k,), mm, between points (k, 3) and triangles (k, 3, 3), pair by
-    pair.
-    """
+    """Return the distances (k,), mm, between points (k, 3) and triangles (k, 3, 3), by pair."""
     edges = np.roll(triangles, -1, axis=1) - triangles
     offset = points[:, None] - triangles
     squares = np.maximum(np.einsum("kei,kei->ke", edges, edges), 1e-300)

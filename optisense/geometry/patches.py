@@ -87,8 +87,6 @@ def middle(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
 
 
 def mean_normal(mesh: TriangleMesh, faces: Faces | None = None) -> FloatArray:
-    """Return the area-weighted mean (3,) of the face normals; shorter than 1 on a curved
-    surface.
-    """
+    """Return the area-weighted mean (3,) of face normals; shorter than 1 on a curved surface."""
     chosen = np.arange(len(mesh.faces)) if faces is None else faces
     return np.asarray(mesh.face_vectors[chosen].sum(axis=0) / 2.0 / mesh.face_areas[chosen].sum())

@@ -165,9 +165,7 @@ def _refuse_crossings(mesh: TriangleMesh, where: str) -> None:
 
 
 def _consistent(mesh: TriangleMesh, notes: list[str]) -> TriangleMesh:
-    """Return an open mesh whose faces agree with their neighbours; in each shell the majority
-    decides.
-    """
+    """Return an open mesh whose faces agree with their neighbours, by majority in each shell."""
     faces = with_consistent_winding(mesh).faces
     turned = (faces != mesh.faces).any(axis=1)
     labels = shells(mesh)

@@ -66,9 +66,7 @@ def smooth_corners(
 def _averaged(
     vertex: NDArray[np.integer], weighted: FloatArray, normal: FloatArray, crease: float
 ) -> FloatArray:
-    """Return each corner's mean normal (c, 3) over the corners of its vertex within the crease
-    angle.
-    """
+    """Return each corner's mean normal (c, 3) over its vertex's corners within the crease angle."""
     from scipy import sparse  # takes a tenth of a second to load
 
     count = len(vertex)

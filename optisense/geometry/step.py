@@ -237,9 +237,7 @@ def _name(label: Any) -> str:
 
 
 def _bodies(shape: Any) -> Iterator[tuple[bool, Any]]:
-    """Yield solids, then the faces that belong to no solid; the first value tells whether it is a
-    solid.
-    """
+    """Yield solids, then the faces that belong to no solid, each with whether it is a solid."""
     from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
     from OCP.TopExp import TopExp_Explorer
 

@@ -139,9 +139,7 @@ class SensingSurface:
         return self._surface_point(*self._closest(point))
 
     def height_above(self, place: SurfacePoint) -> float:
-        """Return the largest height (mm) of the surface, outward, over its tangent plane at a
-        place.
-        """
+        """Return the largest height (mm) of the surface, outward, over its tangent plane."""
         outward = (self.mesh.vertices - place.point) @ -place.inward
         return max(0.0, float(outward.max()))
 

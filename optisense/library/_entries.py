@@ -159,9 +159,7 @@ class CameraModel(ImagingModel, LensFacts):
     """
 
     def imaging(self) -> dict[str, Any]:
-        """Return the known fields of its `ImagingModel`: plain values by field, as for a design
-        file.
-        """
+        """Return the known fields of its `ImagingModel`: plain values, as for a design file."""
         values = self.model_dump(mode="json", include=set(ImagingModel.model_fields))
         return {name: value for name, value in values.items() if value is not None}
 

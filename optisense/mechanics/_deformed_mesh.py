@@ -115,9 +115,7 @@ class SkinMesh:
         return SkinMesh(vertices + origin.displacement, self.faces, normals, self.state, origin)
 
     def part(self, *states: SkinState) -> TriangleMesh | None:
-        """Return the triangles in any of the given states, with shading normals; None if there are
-        none.
-        """
+        """Return the triangles in any of the states, with shading normals; None without any."""
         chosen = np.isin(self.state, states)
         if not chosen.any():
             return None

@@ -202,9 +202,7 @@ class DisplacementField:
 
     @cached_property
     def _tangential_splines(self) -> list[tuple[GridSpline, GridSpline]]:
-        """Return splines of the displacements along x and along y on the fine and the coarse
-        grid.
-        """
+        """Return splines of the displacements along x and y on the fine and the coarse grid."""
         found = []
         shears: list[FloatArray | None] = [None, None]
         if self.shear is not None:
@@ -223,9 +221,7 @@ class DisplacementField:
         return self._between(self._pressure, x, y)
 
     def penetration(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the depth (n,), mm, of points of the undeformed skin inside the indenter; 0
-        outside.
-        """
+        """Return the depth (n,), mm, of points of the undeformed skin in the indenter, or 0."""
         return self._between(np.maximum(self.place.overlap, 0.0), x, y)
 
     def _between(self, values: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -258,9 +254,7 @@ class DisplacementField:
         return np.asarray(maximum_filter(np.where(whole, found, 0.0), 2 * BEND_REACH + 1))
 
     def touching(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the points (n,), mm, of the tangent plane that lie in the
-        contact.
-        """
+        """Return a mask (n,) of the points (n,), mm, of the tangent plane in the contact."""
         rows, columns, inside = self._cells(x, y)
         return inside & self._touching[rows, columns]
 
@@ -293,9 +287,7 @@ class DisplacementField:
     def _cells(
         self, x: FloatArray, y: FloatArray
     ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
-        """Return the nearest row and column of the pressure's grid, and whether each point lies on
-        the grid.
-        """
+        """Return the nearest row and column of the pressure's grid, and which points are on it."""
         column = np.round((x - self.place.x[0]) / self.place.pitch).astype(np.int64)
         row = np.round((y - self.place.y[0]) / self.place.pitch).astype(np.int64)
         rows, columns = self._touching.shape

@@ -63,9 +63,7 @@ takes 7 % less time while a cage point is dragged."""
 
 
 def elasticity_of(design: SensorDesign) -> Elasticity:
-    """Return the elastic constants of a design's first elastomer; `USUAL_GEL` if it specifies
-    none.
-    """
+    """Return the elastic constants of a design's first elastomer; `USUAL_GEL` if it has none."""
     for name in design.parts_of(Role.ELASTOMER):
         material = design.materials.get(design.parts[name].material or "")
         if isinstance(material, Dielectric) and material.elasticity is not None:
@@ -75,9 +73,7 @@ def elasticity_of(design: SensorDesign) -> Elasticity:
 
 
 def elasticity_in_words(design: SensorDesign) -> str:
-    """Return a text with the elastic constants that are used for a design's gel, and the status of
-    each.
-    """
+    """Return a text with the elastic constants used for a design's gel, and their status."""
     used = elasticity_of(design)
     given = next(
         (

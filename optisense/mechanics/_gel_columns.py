@@ -301,9 +301,7 @@ def _folded(top: FloatArray, inward: FloatArray, length: FloatArray) -> BoolArra
 
 
 def _around_the_middle(cells: BoolArray) -> tuple[BoolArray, BoolArray] | None:
-    """Return the cells that are connected with the middle, and their columns; None if there are
-    none.
-    """
+    """Return the cells connected with the middle, and their columns; None if there are none."""
     labels, count = ndimage.label(cells)
     if count == 0:
         return None

@@ -281,9 +281,7 @@ class GelPatch:
         return (points - self._top[self._sources[new]][:, None]) @ self._frames[new]
 
     def _in_frame(self, vectors: FloatArray, new: IntArray) -> FloatArray:
-        """Transform vectors (new, n, 3) from the frames of the sources' half-spaces to the
-        contact's frame.
-        """
+        """Transform vectors (new, n, 3) from the frames of the sources to the contact's frame."""
         return np.asarray(vectors @ np.swapaxes(self._frames[new], 1, 2))
 
     @cached_property

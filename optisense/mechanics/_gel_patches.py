@@ -35,9 +35,7 @@ above the rounding of double precision."""
 
 
 class _Kept(NamedTuple):
-    """A patch (None where the gel is a flat layer) and the half sides (mm) of its loaded
-    rectangle.
-    """
+    """A patch (None where the gel is a flat layer) and half sides (mm) of its loaded rectangle."""
 
     loaded: tuple[float, float]
     patch: GelPatch | None
@@ -49,9 +47,7 @@ class GelPatches:
     def __init__(
         self, skin: TriangleMesh, elastomers: Sequence[TriangleMesh], poisson_ratio: float
     ) -> None:
-        """Create an empty cache for a sensing surface and the gels under it, in the design's
-        frame.
-        """
+        """Create an empty cache for a sensing surface and the gels under it, in the design."""
         self._skin, self._elastomers, self._nu = skin, elastomers, poisson_ratio
         self._kept: OrderedDict[tuple[float, ...], _Kept] = OrderedDict()
 

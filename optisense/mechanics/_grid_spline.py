@@ -35,9 +35,7 @@ class GridSpline(GridArea):
     """A cubic spline through values on a regular grid."""
 
     def __init__(self, values: FloatArray, x0: float, y0: float, pitch: float) -> None:
-        """Fit the spline to values (rows, columns) at points from (x0, y0) on, with a pitch
-        (mm).
-        """
+        """Fit the spline to values (rows, columns) at points from (x0, y0), with a pitch (mm)."""
         super().__init__(values.shape, x0, y0, pitch)
         self._values = values
         self._coefficients = spline_filter(values, order=3, mode="mirror")

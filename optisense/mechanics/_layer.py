@@ -249,9 +249,7 @@ class SquareLoad:
     def _sum(
         self, term: Callable[[FloatArray, FloatArray], FloatArray], x: FloatArray, y: FloatArray
     ) -> FloatArray:
-        """Return the definite integral (...) over the square, from an antiderivative at its
-        corners.
-        """
+        """Return the definite integral (...) over the square, from corners of an antiderivative."""
         half = self.side / 2.0
         upper = term(x + half, y + half) - term(x - half, y + half)
         return upper - term(x + half, y - half) + term(x - half, y - half)

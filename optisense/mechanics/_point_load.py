@@ -74,9 +74,7 @@ def gradients(offsets: FloatArray, poisson_ratio: float, axis: int = INTO) -> Fl
 def _gradient_into(
     x: FloatArray, y: FloatArray, z: FloatArray, nu: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the functions of position in the gradients by a force into the half-space; see
-    `gradients`.
-    """
+    """Return the functions of position in `gradients` by a force into the half-space."""
     r = np.sqrt(np.maximum(x * x + y * y + z * z, NEAREST_SQUARE))
     loss = 1.0 - 2.0 * nu
     g = _inverse_product(r, z)

@@ -94,9 +94,7 @@ class Pressed:
 
     @property
     def torque(self) -> float:
-        """Torque (N mm) with which the indenter turns the skin, counter-clockwise seen from
-        outside.
-        """
+        """Torque (N mm) by which the indenter turns the skin, counter-clockwise from outside."""
         if self.shear is None:
             return 0.0
         x, y = np.meshgrid(self.place.x, self.place.y)
@@ -198,9 +196,7 @@ class PressedSkin:
         )
 
     def displaced(self, points: FloatArray, inward: FloatArray) -> SkinDisplacement:
-        """Return the displacement of the skin at points (n, 3), mm, with unit normals (n, 3) into
-        the gel.
-        """
+        """Return the displacement of the skin at points (n, 3), mm, with normals (n, 3) inward."""
         moved, tilt = np.zeros_like(points), np.zeros_like(points)
         touching = np.zeros(len(points), dtype=bool)
         for contact in self.contacts:
@@ -275,9 +271,7 @@ def press(
 def _dragged(
     contact: Pressed, drag: Drag, elasticity: Elasticity, patch: GelPatch | None
 ) -> Pressed:
-    """Return a contact after a drag; shear and the correction for the gel's shape are iterated in
-    turn.
-    """
+    """Return a contact after a drag; shear and the correction for the gel's shape are iterated."""
     place = contact.place
     response = grid_response(contact.pressure.shape, place.pitch, place.thickness, elasticity)
     wanted = drag.displacement(place.x, place.y)

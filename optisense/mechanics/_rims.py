@@ -106,9 +106,7 @@ class Rims:
 
 
 def _distance_from_edges(point: FloatArray, edges: FloatArray) -> float:
-    """Return the distance (mm) of a point from the nearest of edges (n, 2, 3); infinite if there
-    are none.
-    """
+    """Return the distance (mm) of a point from the nearest of edges (n, 2, 3), or infinity."""
     way = edges[:, 1] - edges[:, 0]
     square = np.maximum(np.einsum("ni,ni->n", way, way), np.finfo(float).tiny)
     share = np.clip(np.einsum("ni,ni->n", point - edges[:, 0], way) / square, 0.0, 1.0)

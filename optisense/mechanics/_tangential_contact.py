@@ -30,9 +30,7 @@ class Drag(NamedTuple):
     twist: float
 
     def displacement(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the displacement (2, rows, columns), mm, of sticking skin at x (columns,) and y
-        (rows,).
-        """
+        """Return the displacement (2, rows, columns), mm, of sticking skin at x and y."""
         across, along = np.meshgrid(x, y)
         cosine, sine = np.cos(self.twist), np.sin(self.twist)
         return np.stack(

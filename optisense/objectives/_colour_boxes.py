@@ -112,9 +112,7 @@ def _ranked(
 
 
 def _blocks(points: FloatArray, size: int) -> list[NDArray[np.int64]]:
-    """Return the rows of blocks of similar points, halved along the widest axis until they are
-    small enough.
-    """
+    """Return the rows of blocks of similar points, halved along the widest axis while too large."""
     waiting, done = [np.arange(len(points))], []
     while waiting:
         rows = waiting.pop()

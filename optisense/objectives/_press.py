@@ -102,9 +102,7 @@ class Press:
 
     @cached_property
     def picture_places(self) -> FloatArray:
-        """Positions (h, w, 2) of the pixels in the picture, -1 to 1 across its width and its
-        height.
-        """
+        """Positions (h, w, 2) of the pixels in the picture, -1 to 1 across and down."""
         window = self.window or PictureWindow.whole(*self.mask.shape)
         y = np.linspace(-1.0, 1.0, window.height)[window.rows]
         x = np.linspace(-1.0, 1.0, window.width)[window.columns]
@@ -168,9 +166,7 @@ class Press:
 
 
 def refuse_kind(kind: str) -> None:
-    """Raise ObjectiveError if there is no such kind of colours, before anything is rendered for
-    them.
-    """
+    """Raise ObjectiveError if there is no such kind of colours, before anything is rendered."""
     if kind not in ("picture", "response"):
         raise _no_such(kind)
 

@@ -140,9 +140,7 @@ def triangle_areas(
 
 
 def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """Return half the length of the cross product, computed in bands of rows that fit into the
-    cache.
-    """
+    """Return half the length of the cross product, in bands of rows that fit into the cache."""
     half = np.empty_like(a[0])
     for top in range(0, len(half), BAND):
         band = slice(top, top + BAND)

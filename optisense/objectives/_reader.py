@@ -222,9 +222,7 @@ class _KnownPress:
         return Pixels(stored, untouched, chosen(press.picture_places))
 
     def read(self, press: Press, local: FloatArray) -> ReadPress:
-        """Return the reading of the press from its read normals (n, 3), given in the frames of its
-        pixels.
-        """
+        """Return the reading of the press from read normals (n, 3) in its pixels' frames."""
         normals = self.true_normals.copy()
         ordered = np.empty_like(local)
         ordered[self.order] = np.einsum("nij,ni->nj", self.frames, local)

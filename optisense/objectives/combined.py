@@ -124,9 +124,7 @@ def _refuse_unknown_part(quantity: ScoreTerm, numbers: Collection[str]) -> None:
 
 
 def _reads(terms: Mapping[str, Objective]) -> Any:
-    """Return a function that gives the pixels of a press that the objectives read, with common
-    settings.
-    """
+    """Return a function of a press and common settings: the pixels that the objectives read."""
     from optisense.objectives.registry import pixels_read
 
     def reads(press: Any, **settings: Any) -> Any:
@@ -142,9 +140,7 @@ def _reads(terms: Mapping[str, Objective]) -> Any:
 
 
 def _unit(expression: Expression, terms: Mapping[str, Objective]) -> str:
-    """Return the unit of an expression that is one objective's value or its negative; otherwise
-    none.
-    """
+    """Return the unit of an expression that is one objective's value or its negative, or ""."""
     single = expression.single or (
         expression.quantities[0]
         if expression.text == f"-{expression.quantities[0]}" and len(expression.quantities) == 1

@@ -121,9 +121,7 @@ class Evaluation(CachedValues):
 
     @property
     def view(self) -> View:
-        """The share of the surface that the camera sees, by separate rays (see
-        `settings.VIEW_ACROSS`).
-        """
+        """The share of the surface that the camera sees, by separate rays (`VIEW_ACROSS`)."""
         size = self.design.camera.size_at(VIEW_ACROSS)
         return self.shared(
             "view", lambda: view_of(self.model.chief_rays(size), self.model.sensing.face_areas)
@@ -280,9 +278,7 @@ class Evaluation(CachedValues):
 
     @property
     def _first_image(self) -> float:
-        """The share of the first image, which includes tracing the light, in the time of all
-        rendering.
-        """
+        """The share of the first image, with tracing the light, in the time of all rendering."""
         from optisense.objectives.registry import BUILT_IN
         from optisense.objectives.usual_score import usual_score
 
@@ -326,9 +322,7 @@ class Evaluation(CachedValues):
         ]
 
     def _untouched_response(self, exposure: float, noisy: bool = False) -> NDArray[np.float32]:
-        """Return the response (h, w, 3) of the untouched sensor, computed once for each
-        exposure.
-        """
+        """Return the response (h, w, 3) of the untouched sensor, computed once per exposure."""
         if (exposure, noisy) not in self._untouched_responses:
             chain = self.model.picture_chain
             camera = chain if noisy else chain.without_noise()

@@ -77,18 +77,14 @@ class ScoreTerm:
 
 @dataclass(frozen=True)
 class _Term:
-    """A node of the tree: the function that computes its value, its text, and the precedence of
-    this text.
-    """
+    """A node of the tree: the function of its value, its text, and the text's precedence."""
 
     value: Callable[[Mapping[ScoreTerm, float]], float]
     text: str
     strength: int
 
     def within(self, strength: int) -> str:
-        """Return the text as an operand of an operation, in brackets if that binds more
-        strongly.
-        """
+        """Return the text as an operand of an operation, in brackets if that binds stronger."""
         return f"({self.text})" if self.strength < strength else self.text
 
 
@@ -165,9 +161,7 @@ def marked(text: str, place: int, problem: str) -> ObjectiveError:
 
 
 def _parsed(text: str) -> Expression:
-    """Read an expression of any length, as the text with standard spacing may be longer than the
-    given one.
-    """
+    """Read an expression of any length, as standard spacing may lengthen a given text."""
     return _Parser(text).expression()
 
 

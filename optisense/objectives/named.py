@@ -13,9 +13,7 @@ _ARITHMETIC = re.compile(r"[-+*/().,'\"\s]")
 
 
 def is_plain(text: str) -> bool:
-    """Return whether a text is the name of an objective or of a Python file, and not an
-    expression.
-    """
+    """Return whether a text names an objective or a Python file, and is no expression."""
     file = text.rpartition(":")[0] or text
     return (
         file.endswith(".py")

@@ -207,9 +207,7 @@ def indented_pixels(press: Press, least: int = LEAST_PIXELS) -> NDArray[np.bool_
 def _indentation(
     press: Press, least_pixels: int
 ) -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
-    """Return the indented pixels of a press, and polar angle and azimuth of their normals,
-    degrees.
-    """
+    """Return the indented pixels of a press, and polar angles and azimuths there, degrees."""
 
     def indentation() -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
         indented = indented_pixels(press, least_pixels)

@@ -103,9 +103,7 @@ class Relighting:
         return np.array([group.channel_flux() for group in design.lights.values()])
 
     def untouched(self, flux: ArrayLike) -> NDArray[np.float32]:
-        """Return the radiance (h, w, 3) of the untouched sensor under lights of a power
-        (groups, 3), mW.
-        """
+        """Return the untouched radiance (h, w, 3) under lights of a power (groups, 3), mW."""
         return self._as_image(_mixed(self._untouched, flux))
 
     def image(self, flux: ArrayLike) -> TactileImage:
@@ -202,9 +200,7 @@ class Relighting:
         return _Seen(press, small, box, around, touched, own, layers)
 
     def _contacts(self, flux: ArrayLike) -> list[NDArray[np.float32]]:
-        """Return for each press the radiance (n, 3) of the pixels that contacts touch in its
-        image.
-        """
+        """Return for each press the radiance (n, 3) of the pixels that contacts touch."""
         return [_mixed(seen.layers, flux).T for seen in self._seen]
 
     def _as_image(self, planes: NDArray[np.float32]) -> NDArray[np.float32]:

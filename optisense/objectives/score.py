@@ -62,9 +62,7 @@ class Score:
 
     @property
     def file_name(self) -> str:
-        """The objective's name, with characters that are invalid in file names replaced by
-        dashes.
-        """
+        """The objective's name, with characters that file names can't have replaced by dashes."""
         return re.sub(r"[^\w.+-]+", "-", self.objective).strip("-.") or "score"
 
     @property
@@ -85,9 +83,7 @@ class Score:
         return (self.draw or draw_parts)(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything except figure data, ready for JSON (missing numbers are None instead of
-        NaN).
-        """
+        """Return everything except figure data, ready for JSON; missing numbers are None."""
         return {
             "objective": self.objective,
             "title": self.name,

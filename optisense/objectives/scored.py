@@ -59,9 +59,7 @@ class Scored:
         return deviation_of(values) if len(values) > 1 else None
 
     def beside(self, name: str) -> str:
-        """Return the parts to show beside a score, of the first seed, which is named if there are
-        several.
-        """
+        """Return parts to show beside a score, of the first seed, named if there are several."""
         shown = self.scores[name].beside
         if not shown or len(self.runs) == 1:
             return shown

@@ -118,9 +118,7 @@ def smooth_projection_warping(rays: Rays) -> Slopes:
 
 
 def smooth_distortion(rays: Rays) -> Slopes:
-    """Return the weighted geometric mean of the anisotropies of footprints between four
-    neighbours.
-    """
+    """Return the weighted geometric mean of the anisotropies of footprints of four neighbours."""
     corners = _quads(rays.codes)
     if not len(corners):
         return Slopes(1.0, None, np.zeros_like(rays.weight), None)
@@ -225,9 +223,7 @@ class _PixelTriangles:
 
 
 def _quads(codes: NDArray[np.uint32]) -> NDArray[np.int64]:
-    """Return the numbers (q, 4) of arriving rays in quads of neighbours with the same path, row by
-    row.
-    """
+    """Return the numbers (q, 4) of arriving rays in quads of neighbours with the same path."""
     number = np.cumsum(codes.ravel() > 0).reshape(codes.shape) - 1
     before, after = slice(None, -1), slice(1, None)
     corners = [(before, before), (before, after), (after, before), (after, after)]

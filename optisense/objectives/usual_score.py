@@ -102,9 +102,7 @@ class UsualScore:
 
     @property
     def share_of_first_image(self) -> float:
-        """Return the share of the first image, including tracing its light, in the time of all
-        rendering.
-        """
+        """Return the share of the first image, with tracing its light, in all rendering time."""
         first = self.light + self.images / 10.0
         return first / max(first + 0.9 * self.images, 1e-9)
 
@@ -129,9 +127,7 @@ class UsualTrials:
 
     @staticmethod
     def of(usual: UsualScore, trial: float, fresh_again: float) -> UsualTrials:
-        """Return the usual times of trials of a given time (s). Without light no score depends on a
-        seed.
-        """
+        """Return the usual times of trials of a given time (s); only light depends on seeds."""
         first = usual.loading + usual.first
         if usual.light == 0.0:
             return UsualTrials(usual, first, trial, 0.0, 0.0)
@@ -156,9 +152,7 @@ class UsualTrials:
 
 
 def usual_score(design: SensorDesign, names: Iterable[str], settings: Settings) -> UsualScore:
-    """Return the usual times of a sensor's scores by the named objectives, at this machine's
-    current load.
-    """
+    """Return the usual times of a sensor's scores by the objectives, at this machine's load."""
     wanted = named_in(names)
     times = UsualTimes.here(design.sensing_area, len(design.lights))
     judging = sum(JUDGING.get(name, OWN_JUDGING) for name in wanted) * times.pace

@@ -97,9 +97,7 @@ def tilt_grid(steepest: float) -> FloatArray:
 
 
 def tilts_to_normals(tilts: FloatArray) -> FloatArray:
-    """Return the unit normals (..., 3) of tilts (..., 2), degrees; the third axis is the untouched
-    normal.
-    """
+    """Return the unit normals (..., 3) of tilts (..., 2), degrees; z is the untouched normal."""
     angle = np.radians(np.linalg.norm(tilts, axis=-1, keepdims=True))
     along = np.radians(tilts) * np.sinc(angle / np.pi)
     return np.concatenate([along, np.cos(angle)], axis=-1)

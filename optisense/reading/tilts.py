@@ -27,9 +27,7 @@ def tilts_of(normals: NDArray[np.floating], first: FloatArray, second: FloatArra
 def normals_of(
     tilts: FloatArray, first: FloatArray, second: FloatArray, normals: FloatArray
 ) -> FloatArray:
-    """Return the unit normals (..., 3) with tilts (..., 2) from the untouched ones, by at most
-    STEEPEST.
-    """
+    """Return unit normals (..., 3) at tilts (..., 2) from untouched ones, by at most STEEPEST."""
     most = np.sin(np.radians(STEEPEST))
     length = np.linalg.norm(tilts, axis=-1, keepdims=True)
     within = tilts * np.minimum(1.0, most / np.maximum(length, 1e-12))

@@ -74,9 +74,7 @@ def find_balls(
 
 
 def _around(piece: NDArray[np.bool_]) -> FloatArray:
-    """Return the convex polygon (k, 2) around all pixels of a piece, half a pixel wider than
-    these.
-    """
+    """Return the convex polygon (k, 2) around all pixels of a piece, half a pixel wider."""
     from shapely import MultiPoint
 
     rows, columns = np.nonzero(piece)

@@ -71,9 +71,7 @@ class CageChange:
         return np.asarray(np.linalg.norm(self.moves, axis=1))
 
     def rows(self) -> list[list[str]]:
-        """Return number, position before, displacement and its length of each point, the longest
-        first.
-        """
+        """Return number, position before, displacement and length of each point, longest first."""
         return [
             [
                 str(number),

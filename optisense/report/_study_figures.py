@@ -304,9 +304,7 @@ def sections(before: SensorDesign, after: SensorDesign) -> Figure:
 
 
 def _limits(axes: Axes, values: FloatArray, horizontal: bool = False) -> None:
-    """Set limits so that few very bad scores do not squeeze all others; the lowest may lie
-    outside.
-    """
+    """Set limits so that few very bad scores do not squeeze the others; they may lie outside."""
     if len(values) < 2:
         return
     low, middle, high = np.quantile(values, [0.0, 0.25, 1.0]).tolist()

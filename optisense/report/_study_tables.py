@@ -159,9 +159,7 @@ def _figure(side: RayFigures | None, field: str, percent: bool) -> str:
 
 
 def worsened_figures(before: RayFigures | None, after: RayFigures | None) -> list[str]:
-    """Return the ray measures in which the second design is worse than the first, each with both
-    numbers.
-    """
+    """Return the ray measures in which the second design is worse, each with both numbers."""
     if before is None or after is None:
         return []
     found = []

@@ -59,9 +59,7 @@ class Marks:
         self.drawn.append((axes, np.asarray(numbers, dtype=np.int64), places))
 
     def places(self, figure: Figure, of: set[int]) -> list[Place]:
-        """Return the positions of trials in a figure that was drawn; those outside of its axes are
-        left out.
-        """
+        """Return the positions of trials in a drawn figure; those outside its axes are left out."""
         found: list[Place] = []
         for axes, numbers, places in self.drawn:
             inside = axes.bbox.padded(2.0)

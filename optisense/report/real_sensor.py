@@ -72,9 +72,7 @@ class RealComparison:
     shading: FloatArray
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return labels and measures of the real and of the model's picture, in red, green and
-        blue.
-        """
+        """Return labels and measures of the real and the model's picture, in red, green, blue."""
         shares, evenness = 100.0 * self.shares, self.evenness
         return [
             ("light in red / green / blue, %", _channels(shares[0], 0), _channels(shares[1], 0)),

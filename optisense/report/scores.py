@@ -76,9 +76,7 @@ def _headline(scored: Scored) -> list[tuple[str, str]]:
 
 
 def _rays(scored: Scored) -> Sequence[DrawnRay]:
-    """Return chief rays for the section; none if nothing was scored or the camera can't be
-    traced.
-    """
+    """Return chief rays for the section; none without scores or if the camera can't be traced."""
     if not scored.runs:
         return ()
     try:
@@ -138,9 +136,7 @@ def _figure(score: Score) -> str:
 
 
 def _table(value: Any) -> Table | None:
-    """Return lists of dicts as tables and dicts of single values as rows; deeper nesting is left
-    out.
-    """
+    """Return lists of dicts as tables, dicts of single values as rows, without deeper nesting."""
     if isinstance(value, Mapping):
         flat = {k: v for k, v in value.items() if not isinstance(v, list | Mapping)}
         return ([str(k) for k in flat], [[_text(v) for v in flat.values()]]) if flat else None

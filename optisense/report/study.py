@@ -261,9 +261,7 @@ def _front_row(trial: Trial, names: Sequence[str]) -> list[str]:
 def _sides(
     study: Study, best: Trial | None, views: Mapping[str, DesignView]
 ) -> list[dict[str, Any]]:
-    """Return the views before and after: the picture with its balls, and the section with chief
-    rays.
-    """
+    """Return the views before and after: the picture with its balls, the section with rays."""
     found = []
     for label in ("before", "after"):
         design = _design(best) if label == "after" else study.space.design

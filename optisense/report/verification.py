@@ -170,9 +170,7 @@ def _around(mask: NDArray[np.bool_]) -> tuple[slice, slice]:
 
 
 def _error_colours(angles: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Return colours (h, w, 3): black is correct, yellow `WORST_ANGLE` or more, grey outside of
-    contacts.
-    """
+    """Return colours (h, w, 3): black is correct, yellow `WORST_ANGLE` or more, grey outside."""
     from matplotlib import colormaps
 
     share = np.clip(np.nan_to_num(angles) / WORST_ANGLE, 0.0, 1.0)

@@ -64,9 +64,7 @@ def gelsight_mini() -> SensorDesign:
 
 
 def general_spaces() -> dict[str, dict[str, object]]:
-    """Return spaces of every size and kind; numbers have steps, so that a grid can search them
-    too.
-    """
+    """Return spaces of every size and kind; numbers have steps, so that grids can search them."""
     design = gelsight_mini()
     lights = [
         f"lights.{group}.lights[{index}].{what}.{axis}"
@@ -193,15 +191,11 @@ class MethodContract:
         return run_study(self.study(space, goal, budget or self.budget))
 
     def result_of(self, case: str) -> SearchResult:
-        """Return the result of a case of `cases`, which is run once for all tests that only read
-        it.
-        """
+        """Return the result of a case of `cases`, run once for all tests that only read it."""
         return _whole(type(self), case)  # type: ignore[arg-type]  # classes can be hashed
 
     def test_it_searches_every_space_by_every_score(self) -> None:
-        """Every study ends normally, with valid points, and names the trial with the highest
-        score.
-        """
+        """Every study ends normally, with valid points, and names the highest-scored trial."""
         for case, _, _ in self.cases():
             result = self.result_of(case)
             assert result.ended in ("the budget is spent", "the method has finished"), case
@@ -284,9 +278,7 @@ class MethodContract:
     def _function(
         self, space: Mapping[str, object], landscape: Landscape, number: int
     ) -> Callable[[SensorDesign], float]:
-        """Return a goal for a landscape; the second goal is highest where the first one is
-        lowest.
-        """
+        """Return a goal for a landscape; the second is highest where the first is lowest."""
         bound = SearchSpace(space).bind(self.design(), tried=False)  # a study tries the bounds
 
         def score(design: SensorDesign) -> float:

@@ -44,9 +44,7 @@ class BeltHalf:
     bends: dict[int, tuple[float, float]]
 
     def raised(self, height: float) -> FloatArray:
-        """Return the curve that lies `height` mm outside the inner face, point by point, (n, 2)
-        mm.
-        """
+        """Return the curve `height` mm outside the inner face, point by point, (n, 2) mm."""
         return self.points + height * self.normals
 
     def wheel(self, number: int, gap: float, tessellation: float) -> FloatArray:

@@ -333,9 +333,7 @@ def _resampled(polygon: FloatArray, count: int) -> FloatArray:
 
 
 def _coated(gel: TriangleMesh) -> TriangleMesh:
-    """Return all faces of the gel except its flat underside, on the same vertices, turned into the
-    gel.
-    """
+    """Return all faces of the gel but its flat underside, on its vertices, turned into the gel."""
     bottom = gel.bounds[0, 2]
     coated = ~(gel.triangles[:, :, 2] == bottom).all(axis=1)
     return gel.with_faces(gel.faces[coated]).compacted().flipped()

@@ -114,9 +114,7 @@ def check_green(half: BeltHalf, place: tuple[float, float]) -> None:
 
 
 def check_leds(length: float, window_size: tuple[float, float], thickness: float) -> None:
-    """Check that the rows (`length` mm) fit beside the faces opposite, which are `thickness` mm
-    thick.
-    """
+    """Check that the rows (`length` mm) fit beside the opposite faces, `thickness` mm thick."""
     require(
         length <= min(window_size),
         f"a row of LEDs {length:g} mm long is longer than a side of the window "

@@ -251,9 +251,7 @@ def _check_colours(light_colours: str, base_ring: str) -> None:
 
 
 def _check_layers(radius: float, edge_radius: float, gel: float, shell: float) -> None:
-    """Check that gel and shell are thinner than the rounded edge, since else the innermost surface
-    folds.
-    """
+    """Check that gel and shell are thinner than the rounded edge, or its inner side folds."""
     layers = f"gel_thickness {gel:g} mm and shell_thickness {shell:g} mm"
     require(
         gel + shell < radius,

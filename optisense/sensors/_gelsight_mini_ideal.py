@@ -304,9 +304,7 @@ def _field_of_view(view_width: float, layers: list[tuple[float, float]]) -> floa
 
 
 def _gel(size: tuple[float, float], thickness: float, tessellation: float) -> TriangleMesh:
-    """Return a closed box with its top at z = 0, divided finely so that the cage bends it
-    smoothly.
-    """
+    """Return a closed box with top at z = 0, divided finely so that the cage bends it smoothly."""
     divisions = (
         max(1, round(size[0] / tessellation)),
         max(1, round(size[1] / tessellation)),

@@ -139,9 +139,7 @@ def ring(colour: str, radius: float, count: int, flux: float) -> LightGroup:
 
 
 def _turned(board: int) -> FloatArray:
-    """Return the rotation matrix (3, 3) about z that takes the first board to another, without
-    rounding.
-    """
+    """Return the exact rotation matrix (3, 3) about z that takes the first board to another."""
     cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[board]
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 

@@ -170,9 +170,7 @@ def arc(
 
 
 def pieces_of_arc(radius: float, degrees: float, tessellation: float, least: int = 2) -> int:
-    """Return the number of pieces of about `tessellation` mm for an arc; each is 15 degrees at
-    most.
-    """
+    """Return the number of pieces of about `tessellation` mm, 15 degrees at most, of an arc."""
     length = abs(math.radians(degrees)) * radius
     return max(least, math.ceil(length / tessellation), math.ceil(abs(degrees) / 15.0))
 

@@ -92,9 +92,7 @@ class Palm:
         return inner
 
     def at(self, share: float, depth: float) -> tuple[FloatArray, FloatArray]:
-        """Return the point `depth` mm inside at a share (0..1) of the length, and the tangent
-        there.
-        """
+        """Return the point `depth` mm inside at a share (0..1) of the length, and the tangent."""
         rows = np.arange(len(self.points)) / (len(self.points) - 1)
         middle = self.points + depth * self.inward
         point = np.array([np.interp(share, rows, middle[:, k]) for k in (0, 1)])
@@ -202,9 +200,7 @@ def _spline_slopes(knots: FloatArray, values: FloatArray) -> FloatArray:
 def _hermite(
     at: FloatArray, knots: FloatArray, values: FloatArray, slopes: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return points and slopes (n, 2) of the piecewise cubic with these values and slopes at the
-    knots.
-    """
+    """Return points and slopes (n, 2) of the piecewise cubic with these values and slopes."""
     piece = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
     width = np.diff(knots)[piece, None]
     t = (at[:, None] - knots[piece, None]) / width

@@ -39,7 +39,5 @@ class BallForce(BallPress):
         return contact, (model.pressed([contact]).contacts[0].force,)
 
     def measure(self, picture: NDArray[np.uint8], image: TactileImage) -> Sequence[float]:
-        """Return the standard deviation of each channel over a picture (h, w, 3), in levels of
-        255.
-        """
+        """Return the standard deviation of each channel of a picture (h, w, 3), levels of 255."""
         return spread_of_colours(picture)

@@ -26,9 +26,7 @@ def spread_of_colours(pixels: NDArray[np.uint8]) -> Sequence[float]:
 
 
 def place_aside(rng: np.random.Generator, aside: float) -> tuple[float, float]:
-    """Draw a place (u, v), mm, uniformly from a square of half side ``aside`` (mm) around the
-    middle.
-    """
+    """Draw a place (u, v), mm, from a square of half side ``aside`` (mm) around the middle."""
     u, v = rng.uniform(-aside, aside, 2).tolist()
     return u, v
 

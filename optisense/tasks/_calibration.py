@@ -159,9 +159,7 @@ class CalibratedSensor:
         return fit_reader(settings.method, known[:, :3], known[:, 3:5], known[:, 5:], seed_of_fit)
 
     def read(self, picture: NDArray[np.uint8], reader: int = 0) -> tuple[FloatArray, FloatArray]:
-        """Return normals (h, w, 3) and depth (h, w), mm, from a picture (h, w, 3), by one of the
-        readers.
-        """
+        """Return normals (h, w, 3) and depth (h, w), mm, that a reader finds in a picture."""
         seen = self.untouched.seen
         colours, places = self._features(picture)
         tilts = np.zeros((*seen.shape, 2))
@@ -239,9 +237,7 @@ class CalibratedSensor:
         return add_camera_noise(picture, self._settings.camera_noise, seed)
 
     def _features(self, picture: NDArray[np.uint8]) -> tuple[FloatArray, FloatArray]:
-        """Return the colour differences (h, w, 3), levels of 255, and places (h, w, 2) of a
-        picture.
-        """
+        """Return the colour differences (h, w, 3), levels of 255, and places (h, w, 2)."""
         height, width = picture.shape[:2]
         y, x = np.meshgrid(np.linspace(-1, 1, height), np.linspace(-1, 1, width), indexing="ij")
         return picture - self._background, np.stack([x, y], axis=-1)

@@ -93,9 +93,7 @@ class ColourNetwork:
     def __init__(
         self, colours: FloatArray, places: FloatArray, tilts: FloatArray, seed: int = 0
     ) -> None:
-        """Fit the network to colours and places, as in `TiltReader.tilts`, with known tilts (n,
-        2).
-        """
+        """Fit the network to colours and places, as in `TiltReader.tilts`, with tilts (n, 2)."""
         batch = min(BATCH, len(colours))
         epochs = min(MOST_EPOCHS, round(STEPS * batch / len(colours)))
         network = MLPRegressor(

@@ -12,9 +12,7 @@ from optisense.untrusted_files import MOST_MESH, MOST_STEP, read_bytes
 
 
 def design_values(design: SensorDesign) -> dict[str, Any]:
-    """Return the values that determine a design's pictures, without file names and sources of
-    numbers.
-    """
+    """Return the values that determine a design's pictures, without file names and sources."""
     values = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
     for part in values["parts"].values():
         part.pop("mesh", None)

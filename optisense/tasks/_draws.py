@@ -88,9 +88,7 @@ class Places:
         return self._points[self._middle]
 
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-        """Draw a place; return its point (3,), mm, and its position (2,) in the image as shares of
-        its size.
-        """
+        """Draw a place; return its point (3,), mm, and its position (2,) in shares of the image."""
         chosen = int(np.searchsorted(self._share, rng.uniform(0.0, self._share[-1])))
         return self._points[chosen], self._spots[chosen]
 

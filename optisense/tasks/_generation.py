@@ -151,9 +151,7 @@ class _Maker:
         return self._labelled | self._failed
 
     def undamaged(self) -> set[int]:
-        """Return the indices of `done` except samples with damaged files; restore a damaged
-        background.
-        """
+        """Return the indices of `done` except those with damage; restore a damaged background."""
         dataset = Dataset.load(self._folder)
         try:
             dataset.background()
@@ -306,9 +304,7 @@ class _Maker:
             _save_arrays(arrays, temporary)
 
     def _common(self) -> dict[str, Any]:
-        """Return the values that all samples share and that must not change when a dataset is
-        continued.
-        """
+        """Return the values of all samples, which must not change when a dataset is continued."""
         from optisense.optics.backend.versions import versions
 
         values = asdict(self._settings)

@@ -52,9 +52,7 @@ class TiltedPlate:
     half: tuple[float, float]
 
     def mesh(self, reach: float, facet_error: float = 0.0) -> TriangleMesh:
-        """Return the mesh; see `optisense.geometry.Indenter`. A tilted plate reaches below z =
-        0.
-        """
+        """Return the mesh; see `optisense.geometry.Indenter`. It reaches below z = 0 if tilted."""
         u, v = self.half
         block = TriangleMesh.box((-u, -v, 0.0), (u, v, THICKNESS)).vertex_normals()
         return block.transformed(turn_about_x_and_y(self.angle_x, self.angle_y))

@@ -126,9 +126,7 @@ class SampleSettings:
 
 @dataclass(frozen=True)
 class Samples:
-    """The features (n, f), in levels of 255 or the task's own units, and targets (n, t), in the
-    task's unit.
-    """
+    """The features (n, f), levels of 255 or the task's units, and targets (n, t), its unit."""
 
     features: FloatArray
     targets: FloatArray

@@ -46,9 +46,7 @@ slope that a reader can detect in the camera's noise."""
 
 
 def unseen_objects() -> dict[str, Contact]:
-    """Return the objects reconstructed by default, none of which is a ball of the radius used for
-    the fit.
-    """
+    """Return the objects reconstructed by default; none is a ball of the fit's radius."""
     return {
         "ball of 3 mm": Contact(Sphere(3.0), at=(-2.0, 1.5), depth=0.6),
         "cylinder of 2 mm": Contact(Cylinder(2.0), at=(0.0, 0.0), depth=0.5, rotation=30.0),
@@ -172,9 +170,7 @@ class ReconstructionResult:
 
     @property
     def ring_depth_error(self) -> float:
-        """Mean absolute error of the depth over the rings of the objects, mm; NaN if there are
-        none.
-        """
+        """Mean absolute error of the depth over the rings of the objects, mm; NaN without any."""
         return _mean_of_known(each.ring_depth_error for each in self.objects.values())
 
     def to_dict(self) -> dict[str, Any]:

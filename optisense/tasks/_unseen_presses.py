@@ -255,9 +255,7 @@ def _narrower_side(points: FloatArray) -> float:
 
 
 def _inside(points: FloatArray, models: Sequence[OpticalModel], rim: float) -> NDArray[np.bool_]:
-    """Return a mask (n,) of the points that are at least ``rim`` (mm) from the border of every
-    model's skin.
-    """
+    """Return a mask (n,) of the points at least ``rim`` (mm) from the border of each skin."""
     kept = np.ones(len(points), dtype=bool)
     for model in models:
         border = _border(model.surface.mesh)

@@ -63,9 +63,7 @@ FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class _KeptContacts(BaseModel):
-    """The stored ranges of contacts. They are compared with the requested ones, so any values are
-    allowed.
-    """
+    """The stored ranges of contacts: any values, which are compared with the requested ones."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -162,9 +160,7 @@ ROW_AGAIN = "Delete the line; the command that made the dataset then makes the s
 
 
 def columns_of(folder: Path) -> tuple[str, ...]:
-    """Return the columns of `LABELS` in a folder: those of release 0.1 if its file has them, else
-    all.
-    """
+    """Return the columns of `LABELS` in a folder: all, or those of release 0.1 in its file."""
     path = folder / LABELS
     begun = read_text(path, MOST_TABLE, TaskError, "the table") if path.exists() else ""
     return FIRST_COLUMNS if begun.startswith(",".join(FIRST_COLUMNS) + "\n") else COLUMNS

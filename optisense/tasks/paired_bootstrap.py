@@ -40,9 +40,7 @@ class ErrorChange:
 
     @property
     def change(self) -> float:
-        """The change of the error, after - before; if it is negative, the second sensor is
-        better.
-        """
+        """The change of the error, after - before; below 0 the second sensor is better."""
         return self.after - self.before
 
     @property

@@ -198,8 +198,6 @@ def whole_errors(
 
 
 def flat_errors(press: PressReading) -> tuple[float, float]:
-    """Return the errors in normals (degrees) and depth (mm) of a reader that always reads a flat
-    surface.
-    """
+    """Return the errors in normals (degrees) and depth (mm) of reading a flat surface."""
     shares = press.areas / press.areas.sum()
     return float(press.flat_angles @ shares), float(press.flat_depths @ shares)

@@ -81,9 +81,7 @@ def boards_of(lights: Sequence[Light]) -> list[BoardPosition]:
 
 
 def axes_at_rest(light: Light) -> FloatArray:
-    """Return rows (3, 3): right and up of the window seen from in front, and the direction of the
-    light.
-    """
+    """Return rows (3, 3): right and up of the window from in front, and the light's direction."""
     forward = np.array(light.direction) / np.linalg.norm(light.direction)
     right = np.cross((0.0, 0.0, 1.0), forward)
     if np.linalg.norm(right) < 1e-6:

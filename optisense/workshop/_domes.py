@@ -37,9 +37,7 @@ class Dome:
 
 
 def dome(mesh: TriangleMesh) -> Dome | None:
-    """Return the dome of a mesh, closed by a flat foot or open there; None if the mesh is no
-    dome.
-    """
+    """Return the dome of a mesh, closed by a flat foot or open there; None if it is no dome."""
     level = np.round(mesh.vertices[:, 2], 6)
     levels = np.unique(level)
     if not FEWEST // 2 < len(levels) <= MOST:

@@ -27,9 +27,7 @@ def line(layer: str, start: Sequence[float], end: Sequence[float]) -> list[Pair]
 
 
 def arc(layer: str, centre: Sequence[float], radius: float, start: float, end: float) -> list[Pair]:
-    """Return an arc about a centre (x, y) with a radius, mm, anticlockwise from `start` to `end`,
-    degrees.
-    """
+    """Return an arc about a centre (x, y), mm, anticlockwise from `start` to `end`, degrees."""
     return [(0, "ARC"), (8, layer), (10, centre[0]), (20, centre[1]), (30, 0.0), (40, radius),
             (50, start), (51, end)]  # fmt: skip
 

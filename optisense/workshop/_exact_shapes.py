@@ -71,9 +71,7 @@ def exact_body(shape: Shape) -> Any | None:
 
 
 def _plates(sheet: Shape, thickness: float) -> Iterator[Any]:
-    """Yield the bodies that Open CASCADE makes of a sheet by a parallel surface on either side,
-    mitred.
-    """
+    """Yield the bodies that Open CASCADE makes of a sheet by a parallel surface, mitred."""
     from OCP.BRepOffset import BRepOffset_MakeOffset, BRepOffset_Skin
     from OCP.GeomAbs import GeomAbs_Intersection
     from OCP.TopAbs import TopAbs_SOLID

@@ -208,9 +208,7 @@ def _rod(
 
 
 def _ends(cut: Any, diameters: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the positions of two holes in the back of a gel, at its two ends, clear of the
-    camera's view.
-    """
+    """Return the places of two holes at the ends of a gel's back, out of the camera's view."""
     from shapely import Polygon, unary_union
 
     back = unary_union([Polygon(each) for each in cut.to_polygons() if len(each) > 2])

@@ -27,9 +27,7 @@ def point(place: FloatArray) -> Any:
 
 
 def array_of(kind: str) -> Any:
-    """Return the class of a table of points, which has another name before release 8 of Open
-    CASCADE.
-    """
+    """Return the class of a table of points, named otherwise before release 8 of Open CASCADE."""
     try:
         module, name = importlib.import_module("OCP.collections"), f"{kind}_gp_Pnt"
     except ImportError:

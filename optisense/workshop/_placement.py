@@ -89,9 +89,7 @@ def part_number(group: LightGroup) -> str:
 
 
 def typical_colour(group: LightGroup) -> tuple[str, TypicalLight] | None:
-    """Return name and numbers of the colour of a library light that matches the group's, or
-    None.
-    """
+    """Return name and numbers of the library light's colour that matches a group's, or None."""
     entry = light_entry(group)
     if entry is None:
         return None
@@ -141,9 +139,7 @@ COLUMNS = (
 
 
 def placement_csv(placed: Sequence[Placement]) -> str:
-    """Return a pick-and-place table (RFC 4180), a row for each LED; lengths are rounded to 0.1
-    um.
-    """
+    """Return a pick-and-place table (RFC 4180), a row per LED; lengths are rounded to 0.1 um."""
     rows = [
         [
             led.designator,

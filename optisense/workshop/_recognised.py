@@ -68,9 +68,7 @@ def across(axis: int) -> tuple[int, int]:
 
 
 def turned(mesh: TriangleMesh) -> Revolution | None:
-    """Return the profile of a body of revolution about an axis along x, y or z; None if the mesh is
-    none.
-    """
+    """Return the profile of a body of revolution about x, y or z; None if the mesh is none."""
     for axis in (2, 0, 1):
         found = _turned_about(mesh, axis)
         if found is not None:
@@ -223,9 +221,7 @@ def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:
 
 
 def rims(mesh: TriangleMesh) -> list[list[int]] | None:
-    """Return the loops of edges with only one face, by their vertices, the first again at the
-    end.
-    """
+    """Return the loops of edges with one face, by their vertices, the first again at the end."""
     used, numbered = np.unique(mesh.open_edges, return_inverse=True)
     loops = _loops(numbered.reshape(-1, 2), len(used))
     if loops is None or any(loop[0] != loop[-1] for loop in loops):
@@ -234,9 +230,7 @@ def rims(mesh: TriangleMesh) -> list[list[int]] | None:
 
 
 def smooth_patches(mesh: TriangleMesh, sharp: float) -> list[NDArray[np.int64]]:
-    """Return the faces of a mesh in patches that are separated by edges sharper than `sharp`
-    degrees.
-    """
+    """Return the faces of a mesh in patches separated by edges sharper than `sharp` degrees."""
     left = np.ones(len(mesh.faces), dtype=bool)
     found = []
     for face in range(len(mesh.faces)):

@@ -34,9 +34,7 @@ NAMESPACE = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
 
 
 def stl_bytes(shape: Shape) -> bytes:
-    """Return a binary STL file. Its coordinates are single precision: exact to about 1e-6 of their
-    size.
-    """
+    """Return a binary STL file, in single precision: exact to about 1e-6 of the size."""
     return stl_bytes_of(f"{shape.name}, millimetres", shape.mesh)
 
 

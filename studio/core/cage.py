@@ -44,9 +44,7 @@ def weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) -> Floa
 
 
 def edges(resolution: Resolution) -> NDArray[np.int32]:
-    """Return the pairs of neighbouring control points between which the lattice is drawn, (m, 2)
-    indices.
-    """
+    """Return the pairs of neighbouring control points, (m, 2), that the lattice's lines join."""
     index = np.arange(math.prod(resolution)).reshape(resolution)
     pairs = [
         np.stack([index.take(range(n - 1), axis), index.take(range(1, n), axis)], -1).reshape(-1, 2)

@@ -226,9 +226,7 @@ class Engine:
         return request
 
     def cancel(self, request: Request) -> None:
-        """Ask the engine to give a request up; the request still gets an answer, which may be its
-        result.
-        """
+        """Ask the engine to give a request up; it still gets an answer, which may be its result."""
         if not request.done:
             self.send("cancel", of=request.number)
 

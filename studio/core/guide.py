@@ -17,9 +17,7 @@ _FENCE = "```"
 
 
 def folder() -> Path:
-    """Return the folder of the pages: in the extension, or in the project if Blender runs from its
-    source.
-    """
+    """Return the folder of the pages: in the extension, or the project if run from source."""
     own = Path(__file__).parents[1] / "help"
     return own if own.is_dir() else Path(__file__).parents[2] / "docs"
 

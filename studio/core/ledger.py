@@ -32,9 +32,7 @@ def group_rows(ledger: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]
 
 
 def place_text(place: dict[str, Any]) -> list[str]:
-    """Return for each light group a line with the brightness of a place and the ways its light
-    takes.
-    """
+    """Return for each light group a line with the brightness of a place and its light's ways."""
     lines = []
     for group, light in place["groups"].items():
         ways = sorted(light["ways"].items(), key=lambda way: -way[1])

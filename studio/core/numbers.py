@@ -15,9 +15,7 @@ FloatArray = NDArray[np.float64]
 
 
 def short(shown: float) -> float:
-    """Return the shortest decimal number with the same single-precision value: 0.3, not
-    0.30000001192.
-    """
+    """Return the shortest decimal of the same single-precision value: 0.3, not 0.30000001192."""
     return float(str(np.float32(shown)))
 
 

@@ -30,9 +30,7 @@ def updated(before: dict[str, Any], now: dict[str, Any]) -> dict[str, Any]:
 
 
 def value_at(document: Any, path: str) -> tuple[Any, ...]:
-    """Return the value at a dotted path as a tuple of one; an empty tuple if the path leads
-    nowhere.
-    """
+    """Return the value at a dotted path as a tuple of one; an empty tuple if there is none."""
     for step in re.findall(r"[^.\[\]]+", path):
         if isinstance(document, dict) and step in document:
             document = document[step]

@@ -25,9 +25,7 @@ def is_known() -> bool:
 
 
 def kinds(noun: str) -> list[Row]:
-    """Return all kinds of `emitter`, `material` or `coating`; empty before an engine has described
-    them.
-    """
+    """Return all kinds of `emitter`, `material` or `coating`; empty before an engine answers."""
     return _told.get("kinds", {}).get(noun, [])
 
 

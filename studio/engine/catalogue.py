@@ -22,16 +22,12 @@ _NO_ENGINE: Items = [("NONE", "(no engine runs)", "The panel Sensor says what to
 
 
 def entries(name: str) -> list[dict[str, Any]]:
-    """Return the engine's entries for `sensors`, `objectives`, `methods` or a kind of the
-    library.
-    """
+    """Return the engine's entries for `sensors`, `objectives`, `methods` or a library kind."""
     return _lists.get(name, [])
 
 
 def items(name: str) -> Items:
-    """Return the same entries as items of a menu; the strings are kept alive, as Blender
-    requires.
-    """
+    """Return the same entries as items of a menu; Blender requires that the strings stay alive."""
     return _items.get(name) or (_NONE if session.running() is not None else _NO_ENGINE)
 
 

@@ -105,9 +105,7 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
 
 
 def _copy_lamp_files(document: dict[str, Any], source: Path, folder: Path) -> None:
-    """Copy the files of lamps into the folder; those from elsewhere are renamed to their file
-    name.
-    """
+    """Copy the files of lamps into the folder; those from elsewhere get their bare file name."""
     for group in document["lights"].values():
         emitter = group.get("emitter") or {"kind": "library"}
         for field in schema.file_fields("emitter", emitter["kind"]):

@@ -68,9 +68,7 @@ def engine_command() -> list[str]:
 
 
 def _split(command: str) -> list[str]:
-    """Split a command into words; a path with spaces needs no quotes, and `engine` may be
-    omitted.
-    """
+    """Split a command into words; a path with spaces needs no quotes, `engine` may be omitted."""
     program = command.removesuffix(" engine").strip()
     if not Path(program).is_file():
         return shlex.split(command)

@@ -230,9 +230,7 @@ def cancel_job() -> None:
 
 @bpy.app.handlers.persistent
 def _loading(*_: Any) -> None:
-    """Drop pending answers before another .blend file is opened: they are for the scene that
-    goes.
-    """
+    """Drop pending answers before another .blend file is opened: their scene goes away."""
     if _job is not None:
         _job.ignore()
         if _engine is not None and not _job_goes_on:

@@ -23,9 +23,7 @@ _setting = False
 
 
 def of_one_group(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """Return the selected lights in the order of the design; empty if they are of several
-    groups.
-    """
+    """Return the selected lights in the design's order; empty if they are of several groups."""
     chosen = [each for each in objects_of(context.scene, "LIGHT") if each.select_get()]
     return chosen if len({each.optisense.group for each in chosen}) == 1 else []
 

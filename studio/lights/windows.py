@@ -1,6 +1,4 @@
-"""Windows of the lamps of light groups, queried from the engine to draw lamps in their real
-size.
-"""
+"""Windows of the lamps of light groups, queried from the engine to draw their real size."""
 
 from __future__ import annotations
 
@@ -22,9 +20,7 @@ def ask_for_windows(scene: bpy.types.Scene) -> None:
 
 
 def ask_for_window(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
-    """Query the lamps of a group, and draw them; if the engine refuses, the drawing stays as it
-    is.
-    """
+    """Query the lamps of a group, and draw them; if the engine refuses, the drawing stays."""
     name, lamps = scene.name, group.name
     value = emitter_values(group)
     asked = {"entry": group.model} if value is None else {"value": value}

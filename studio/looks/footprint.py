@@ -53,9 +53,7 @@ def is_on(scene: bpy.types.Scene | None) -> bool:
 
 
 def wanted() -> None:
-    """Schedule a new footprint: something that the camera sees changed, or the footprint was
-    switched.
-    """
+    """Schedule a new footprint: something that the camera sees, or the switch, changed."""
     _request.want()
     if not is_on(bpy.context.scene):
         _leave()

@@ -1,6 +1,4 @@
-"""Markers, the dots printed on the skin: their drawing in 3D views, and operators to change
-them.
-"""
+"""Markers, the dots printed on the skin: their drawing in 3D views, and their operators."""
 
 from __future__ import annotations
 
@@ -82,9 +80,7 @@ def _take(result: dict[str, Any]) -> None:
 def discs(
     points: NDArray[np.float32], normals: NDArray[np.float32], radius: float
 ) -> NDArray[np.float32]:
-    """Return the corners of triangles that fill a disc at each point (k, 3), on both sides, (3 n,
-    3) mm.
-    """
+    """Return the corners (3 n, 3), mm, of two-sided triangles that fill discs at points (k, 3)."""
     helper = np.where(np.abs(normals[:, :1]) < 0.9, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     one = np.cross(normals, helper)
     one /= np.maximum(np.linalg.norm(one, axis=1, keepdims=True), 1e-9)

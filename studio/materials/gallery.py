@@ -20,9 +20,7 @@ the place in the list.
 
 
 def items(kind: str) -> list[tuple[Any, ...]]:
-    """Return the entries of a kind of the library as choices of a menu, with their pictures if
-    drawn.
-    """
+    """Return the entries of a kind of the library as choices of a menu, with any pictures."""
     plain = catalogue.items(kind)
     # Kept alive, as Blender requires, and rebuilt only for another list or picture: this is called
     # at each drawing of the panel.

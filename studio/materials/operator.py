@@ -76,9 +76,7 @@ def _is_for_a_coating(context: bpy.types.Context) -> bool:
 
 
 def _is_for_a_material(context: bpy.types.Context) -> bool:
-    """Return whether a part other than the sensing surface is selected, or the chosen entry is no
-    material.
-    """
+    """Return whether a part but the sensing surface is selected, or the entry is no material."""
     return _choice(context).kind != "material" or not all(_are_coated(context))
 
 

@@ -44,9 +44,7 @@ class OPTISENSE_PG_vary(bpy.types.PropertyGroup):
 
 
 class OPTISENSE_PG_search(bpy.types.PropertyGroup):
-    """Settings of the search of a scene; kept in the .blend file, so that it can be continued
-    later.
-    """
+    """Settings of the search of a scene; kept in the .blend file, to be continued later."""
 
     vary: CollectionProperty(type=OPTISENSE_PG_vary)
     vary_index: IntProperty(description="Chosen parameter of the list", options={"HIDDEN"})

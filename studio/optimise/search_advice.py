@@ -23,9 +23,7 @@ BRIGHTNESS = re.compile(r"coating\.|lights\.[^.]+\.(flux|colour)|materials\.[^.]
 
 
 def choose_objective(search: bpy.types.PropertyGroup) -> None:
-    """Set the default objective that suits the parameters; an objective chosen by the user
-    stays.
-    """
+    """Set the default objective that suits the parameters; one chosen by the user stays."""
     texts = search_parameters.texts_of(search.vary)
     if search.objective in (BY_RAYS, BY_PICTURES) and texts:
         bright = all(BRIGHTNESS.match(text) for text in texts)

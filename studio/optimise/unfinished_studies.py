@@ -1,6 +1,4 @@
-"""Recovery of a study that was not over when Blender was closed, when its sensor is opened
-again.
-"""
+"""Recovery of a study that had not ended when Blender was closed, when its sensor is reopened."""
 
 from __future__ import annotations
 

@@ -93,8 +93,6 @@ def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
 
 
 def imaging(values: dict[str, Any]) -> dict[str, Any]:
-    """Return the fields of a camera besides its view and pose: lens, image sensor and
-    processing.
-    """
+    """Return the fields of a camera besides view and pose: lens, image sensor and processing."""
     others = (*VIEW, *POSE, *FACTS)
     return {name: value for name, value in values.items() if name not in others and value}

@@ -65,9 +65,7 @@ def next_order(scene: bpy.types.Scene, kind: str) -> int:
 
 
 def clear(scene: bpy.types.Scene, *but: str) -> None:
-    """Remove the design from a scene: its objects, except those of some kinds, and data that only
-    they used.
-    """
+    """Remove the design from a scene: its objects, except some kinds, and data they alone used."""
     for each in [one for one in _ours(scene) if one.optisense.kind not in but]:
         data = each.data
         bpy.data.objects.remove(each, do_unlink=True)

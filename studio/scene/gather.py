@@ -84,9 +84,7 @@ def gather_document(scene: bpy.types.Scene) -> dict[str, Any]:
 
 
 def _cages(scene: bpy.types.Scene) -> dict[str, Any]:
-    """Return the cages; copies made in Blender are refused, as they would bend the same parts
-    twice.
-    """
+    """Return the cages; copies made in Blender are refused, as they would bend parts twice."""
     cages: dict[str, Any] = {}
     for each in objects_of(scene, "CAGE"):
         key = each.optisense.key

@@ -61,9 +61,7 @@ def light_pose(light: bpy.types.Object) -> dict[str, Any]:
 
 @lru_cache(maxsize=MOST_POSES)
 def _pose(matrix: tuple[tuple[float, ...], ...], data: str) -> dict[str, list[float]]:
-    """Return the pose of a light from its matrix and the pose as read; cached, as most lights stand
-    still.
-    """
+    """Return the pose of a light from its matrix and the pose as read; cached."""
     return pose_of(np.array(matrix), json.loads(data) if data else {}, up=False)
 
 
@@ -104,9 +102,7 @@ def _mesh(group: bpy.types.PropertyGroup) -> bpy.types.Mesh:
 def lamp_drawing(
     shape: str, size: tuple[float, float]
 ) -> tuple[list[tuple[float, ...]], list[tuple[int, int]], list[list[int]]]:
-    """Return vertices (mm), edges and faces of a lamp that shines along -z, with its height along
-    y.
-    """
+    """Return vertices (mm), edges and faces of a lamp that shines along -z; y is its height."""
     width, height = size[0] / 2, size[1] / 2
     if shape == "rectangle":
         rim = [(-width, -height), (width, -height), (width, height), (-width, height)]

@@ -42,9 +42,7 @@ def remember(mesh: bpy.types.Mesh, name: str, values: ArrayLike) -> None:
 
 
 def remembered(mesh: bpy.types.Mesh, name: str) -> NDArray[np.float64] | None:
-    """Return the numbers that `remember` stored, or None if there are none for the present
-    vertices.
-    """
+    """Return the numbers that `remember` stored; None if the vertices are others now."""
     parts = []
     for number in range(3):
         attribute = mesh.attributes.get(f"{name}_{number}")
@@ -69,9 +67,7 @@ def shown_vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
 
 
 def corners_of(mesh: bpy.types.Mesh) -> NDArray[np.int32]:
-    """Return the index of the vertex at each corner of the faces, (m,), one face after the
-    other.
-    """
+    """Return the index of the vertex at each corner of the faces, (m,), face after face."""
     values = np.empty(len(mesh.loops), dtype=np.int32)
     stored = mesh.attributes.get(".corner_vert")
     if stored is not None and len(stored.data) == len(mesh.loops):
@@ -89,9 +85,7 @@ def show_vertices(mesh: bpy.types.Mesh, vertices: ArrayLike) -> None:
 
 
 def mesh_of(mesh: bpy.types.Mesh) -> Mesh:
-    """Return a Blender mesh as triangles; positions unchanged since `new_mesh` have full
-    precision.
-    """
+    """Return a Blender mesh as triangles; positions as `new_mesh` set them have full precision."""
     return Mesh(kept_array(remembered(mesh, REST), shown_vertices(mesh)), _triangles(mesh))
 
 

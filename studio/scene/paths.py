@@ -43,7 +43,5 @@ def suggested(scene: bpy.types.Scene, end: str = "") -> str:
 
 
 def objective(text: str) -> str:
-    """Return an objective as the engine names it; the file of `FILE.py:FUNCTION` becomes
-    absolute.
-    """
+    """Return an objective as the engine names it; the path in `FILE.py:FUNCTION` is absolute."""
     return str(absolute(text)) if ".py" in text else text.strip()

@@ -56,9 +56,7 @@ def _loaded(*_: Any) -> None:
 
 
 def _splash(is_shown: bool) -> None:
-    """Hide Blender's splash screen while a design is being opened, or enable it for the next
-    start.
-    """
+    """Hide Blender's splash screen while a design is opened, or show it at the next start."""
     global _hidden
     preferences = bpy.context.preferences
     if _hidden == (not is_shown):

@@ -58,9 +58,7 @@ class OPTISENSE_PG_tour(bpy.types.PropertyGroup):
 
 
 def step_now(context: bpy.types.Context) -> int:
-    """Return the number of the first step that is not done, from 0; the number of steps if all are
-    done.
-    """
+    """Return the number of the first step that is not done, from 0, or of all steps."""
     return next(
         (number for number, step in enumerate(STEPS) if not step.is_done(context)), len(STEPS)
     )

@@ -1,6 +1,4 @@
-"""Selection of cages in a list; cages can't be clicked in the view, where they would cover
-lights.
-"""
+"""Selection of cages in a list; in the view, clickable cages would cover lights."""
 
 from __future__ import annotations
 

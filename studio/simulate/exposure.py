@@ -16,9 +16,7 @@ _keeping = False
 
 
 def resolution(scene: bpy.types.Scene) -> list[int] | None:
-    """Return width and height to simulate, in the camera's proportions; None for the camera's
-    own.
-    """
+    """Return width and height to simulate, in the camera's proportions; None for its own."""
     size = scene.optisense_simulation.size
     cameras = objects_of(scene, "CAMERA")
     if size == "CAMERA" or not cameras:

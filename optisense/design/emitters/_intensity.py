@@ -42,9 +42,7 @@ class Intensity:
         return np.where(inside, low * (1 - g) + high * g, 0.0)
 
     def without_azimuth(self) -> Intensity:
-        """Return the table with one azimuth if it is symmetric about the axis, else the table
-        itself.
-        """
+        """Return the table with one azimuth if it is symmetric about the axis, else itself."""
         if np.ptp(self.values, axis=0).max() > SYMMETRIC * self.values.max():
             return self
         return Intensity(self.polar, np.zeros(1), self.values[:1])

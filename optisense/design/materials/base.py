@@ -71,9 +71,7 @@ class Reflection:
         return self.specularity == 1.0
 
     def in_medium(self, ior: float) -> Reflection:
-        """Return the same surface in a medium with this index: the metal's index is divided by
-        it.
-        """
+        """Return the same surface in a medium with this index, by which the metal's is divided."""
         red, green, blue = (value / ior for value in self.eta)
         k_red, k_green, k_blue = (value / ior for value in self.k)
         return Reflection(

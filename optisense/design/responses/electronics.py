@@ -32,9 +32,7 @@ ChannelMatrix = Annotated[tuple[Row, Row, Row], AfterValidator(_invertible)]
 
 
 class BlackLevel(Model):
-    """Level that a sensor adds to all its readings, and the share of it that is subtracted
-    again.
-    """
+    """Level that a sensor adds to all its readings, and the share that is subtracted again."""
 
     level: Annotated[Number, Field(ge=0.0, lt=0.9)] = Field(
         description="level that the sensor reads in the dark, a share of its range"

@@ -23,9 +23,7 @@ def disc(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
 
 
 def rectangle(x: FloatArray, y: FloatArray, width: float, height: float) -> FloatArray:
-    """Return the distance (...), mm, to a rectangle around the origin; ``width`` (mm) is its side
-    along x.
-    """
+    """Return the distance (...), mm, to a rectangle around the origin, ``width`` along x."""
     over_x, over_y = np.abs(x) - 0.5 * width, np.abs(y) - 0.5 * height
     outside = np.hypot(np.maximum(over_x, 0.0), np.maximum(over_y, 0.0))
     return outside + np.minimum(np.maximum(over_x, over_y), 0.0)

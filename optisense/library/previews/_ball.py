@@ -145,9 +145,7 @@ def _metal(
     studio: Studio,
     u: FloatArray,
 ) -> FloatArray:
-    """Return the radiance reflected by metal facets; for rough facets that of lamps by their
-    angle.
-    """
+    """Return the radiance reflected by metal facets; of rough ones that of lamps by their angle."""
     view = _to_local(-towards, place)
     facet = _facets(view, alpha, u)
     cosine = np.einsum("ij,ij->i", view, facet)

@@ -104,9 +104,7 @@ def white_studio(solid: float) -> Studio:
 
 
 def coloured_studio() -> Studio:
-    """Return a studio with a red, a green and a blue lamp around the view, for coatings, as in a
-    sensor.
-    """
+    """Return a studio for coatings: a red, a green and a blue lamp around the view."""
     lamps = [
         _lamp((-0.86, -0.45, 0.20), [5.0, 0.1, 0.1], 19.0),
         _lamp((0.86, -0.45, 0.20), [0.1, 4.0, 0.1], 19.0),

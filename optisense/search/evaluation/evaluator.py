@@ -202,9 +202,7 @@ class DesignEvaluator(PickledWithoutCaches):
         return Outcome(scores, failure, parts, time.perf_counter() - began)
 
     def report_progress_to(self, callback: ProgressCallback) -> None:
-        """Call `callback` while images are rendered in this process. Pickled copies do not call
-        it.
-        """
+        """Call `callback` while images are rendered in this process; pickled copies do not."""
         self._progress = callback
 
     @property
@@ -213,9 +211,7 @@ class DesignEvaluator(PickledWithoutCaches):
         return self.settings
 
     def usual_score(self) -> UsualScore | None:
-        """Return the usual duration of a score, or None if all goals are functions of the
-        design.
-        """
+        """Return the usual duration of a score; None if all goals are functions of the design."""
         if not self.renders:
             return None
         shared, _ = split_settings(self.settings, self._all_objectives)
@@ -291,9 +287,7 @@ class DesignEvaluator(PickledWithoutCaches):
         return scores, parts, failures
 
     def _add_preserving(self, apart: bool) -> None:
-        """Add the constraints that keep properties of the starting design which the space may
-        change.
-        """
+        """Add the constraints that keep properties of the start which the space may change."""
         design, names, moved = self.space.design, self.space.names, moved_parts(self.space)
         if apart and moved:
             self.kept += [PartsInContact(design, moved), LightsOnSupports(design, moved)]
@@ -356,9 +350,7 @@ class DesignEvaluator(PickledWithoutCaches):
 
 
 def _failures(scores: Sequence[Score]) -> list[str]:
-    """Return the reasons why scores are missing, each once, with the objectives that it
-    concerns.
-    """
+    """Return the reasons why scores are missing, each once, with the objectives concerned."""
     reasons: dict[str, list[str]] = {}
     for score in scores:
         if score.failure is not None:

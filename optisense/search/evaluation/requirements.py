@@ -185,9 +185,7 @@ def _refuse_impossible(wanted: Requirement) -> None:
 
 @lru_cache(maxsize=256)
 def _requirement(text: str) -> Requirement:
-    """Parse a condition. The results are cached, since all trials of a study have the same few
-    conditions.
-    """
+    """Parse a condition; results are cached, as all trials of a study have the same few."""
     return Requirement.parse(text)
 
 

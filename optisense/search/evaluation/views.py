@@ -53,9 +53,7 @@ class SameMirrors:
         self._ways: frozenset[frozenset[str]] | None = None
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Return a message with the share of rays that miss the mirrors if it is too large, else
-        None.
-        """
+        """Return a message with the share of rays that miss the mirrors if it is too large."""
         if self._ways is None:
             self._ways = frozenset(self._seen(self._design))
         seen = self._seen(design)

@@ -20,13 +20,9 @@ class EvaluatorPlugin(WorkerPlugin):
         self.blob = blob
 
     def setup(self, worker: Worker) -> None:
-        """Remember the evaluator; Dask calls this when the worker starts or the plugin reaches
-        it.
-        """
+        """Remember the evaluator; Dask calls this when the worker starts or gets the plugin."""
         store_evaluator(self.key, self.blob)
 
     def teardown(self, worker: Worker) -> None:
-        """Forget the evaluator; Dask calls this when the worker ends or the study unregisters the
-        plugin.
-        """
+        """Forget the evaluator; Dask calls this when the worker or the plugin ends."""
         drop_evaluator(self.key)

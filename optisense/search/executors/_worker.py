@@ -55,9 +55,7 @@ def main() -> None:
 
 
 def _listen(stream: BinaryIO, messages: queue.SimpleQueue[Any]) -> None:
-    """Pass messages on, and end this process, even during a trial, when the pool closes the
-    pipe.
-    """
+    """Pass messages on, and end this process, even amid a trial, when the pool closes the pipe."""
     try:
         while True:
             messages.put(receive(stream))

@@ -90,9 +90,7 @@ class AugmentedLagrangian:
         return float(values[0]) - cost, gradients[0] - (pull * self._signs()) @ gradients[1:]
 
     def violations(self, values: FloatArray) -> FloatArray:
-        """Return g of each condition, (m,): positive where it misses its limit, or comes too near
-        to it.
-        """
+        """Return g of each condition, (m,): positive where it misses its limit, or nearly."""
         limits = np.array([each.limit for each in self.requirements])
         return self._signs() * (values[1:] + self.offsets - limits) + LIMIT_MARGIN
 

@@ -124,9 +124,7 @@ class CmaEs(Method):
             self._strategy.tell(solutions, (-values).tolist())
 
     def describe(self) -> dict[str, Any]:
-        """Return the spread of the current generation, the number of restarts, and the
-        population.
-        """
+        """Return the spread of the current generation, the number of restarts, the population."""
         return {
             "sigma": float(self._strategy.sigma),
             "restarts": self.restarted,
@@ -176,9 +174,7 @@ class CmaEs(Method):
         return np.concatenate([points, idle], axis=-1)
 
     def _point(self, inner: FloatArray) -> FloatArray:
-        """Return the points (k, n) of the space for points in pycma's coordinates, without idle
-        dimensions.
-        """
+        """Return points (k, n) of the space for pycma's, which lack idle dimensions."""
         point = self._origin + inner[:, : self.space.size] * self._unit
         point = np.where(self.space.discrete, np.round(point), point)
         return np.clip(point, self.space.lower, self.space.upper)

@@ -53,9 +53,7 @@ class Combinations(Method):
 
     @abstractmethod
     def plan(self) -> Iterator[Stage]:
-        """Yield the stages; the plan is a generator, so that later stages can start from the best
-        so far.
-        """
+        """Yield the stages as a generator, so that later ones can start from the best so far."""
 
     def ask(self) -> FloatArray:
         """Return combinations that were not tried yet, (k, n)."""
@@ -126,9 +124,7 @@ class Combinations(Method):
             yield from self.climb(stage, movable, self._perturbed(self.best()))
 
     def best(self) -> Combination:
-        """Return the best combination so far; before there is one, the one nearest to the
-        design.
-        """
+        """Return the best combination so far; before there is one, that nearest to the design."""
         if self._known:
             return max(self._known, key=lambda each: self._known[each])
         return tuple(

@@ -144,9 +144,7 @@ class FeasibleRegion:
         return space.apply(point)
 
     def _bisect(self, wanted: FloatArray, allowed: FloatArray) -> FeasiblePoint:
-        """Return the last feasible point on the line from a feasible point to a wanted one, by
-        bisection.
-        """
+        """Return the last feasible point from a feasible one to a wanted one, by bisection."""
         way, low, high = wanted - allowed, 0.0, 1.0
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
@@ -178,9 +176,7 @@ class FeasibleRegion:
     def _separating_planes(
         self, design: SensorDesign, before: SensorDesign, unit: FloatArray, one: str, other: str
     ) -> _Planes:
-        """Return the inequalities for the corners of a part that have crossed planes of another
-        part.
-        """
+        """Return the inequalities for corners of a part that crossed planes of another part."""
         meshes, old = design.deformed_meshes(), before.deformed_meshes()
         mesh, against = meshes[one], meshes[other]
         pairs = crossings(mesh, against).pairs
@@ -238,9 +234,7 @@ def _nearest(wanted: FloatArray, planes: _Planes) -> FloatArray | None:
 
 
 def _active_normals(wanted: FloatArray, point: FloatArray, planes: _Planes) -> FloatArray:
-    """Return orthonormal directions (k, n) in which active constraints keep a point from the wanted
-    one.
-    """
+    """Return orthonormal directions (k, n) in which active constraints hold a point back."""
     binding = planes.normals[planes.limits - planes.normals @ point < ACTIVE_TOLERANCE]
     bounds = np.eye(len(point))[np.abs(point - wanted) > 0.0]
     bounds = bounds[((point <= 0.0) | (point >= 1.0))[np.abs(point - wanted) > 0.0]]

@@ -70,14 +70,10 @@ def source_of(problem: Problem) -> GradientSource:
 
 
 class TrialDifferences:
-    """Central differences of trials over `STEP` of the ranges, or as much of it as the bounds
-    allow.
-    """
+    """Central differences of trials over `STEP` of the ranges, or as far as the bounds allow."""
 
     def __init__(self, problem: Problem, requirements: Sequence[Requirement]) -> None:
-        """Store what is differentiated: the first objective, and the quantities that conditions
-        limit.
-        """
+        """Store what is differentiated: the first objective, and what conditions limit."""
         self._space, self._objective = problem.space, problem.objectives[0]
         self._span = problem.space.upper - problem.space.lower
         self._requirements = requirements

@@ -21,17 +21,13 @@ the cube root of double precision (6e-6), at which central differences are most 
 
 @dataclass(frozen=True)
 class SmoothScore:
-    """Objective, or arithmetic expression of several, whose value is a smooth function of chief
-    rays.
-    """
+    """Objective, or expression of several, whose value is a smooth function of chief rays."""
 
     expression: Expression
 
     @staticmethod
     def of(text: str) -> SmoothScore | None:
-        """Return the smooth form of an objective or an expression, or None if a part of it has
-        none.
-        """
+        """Return the smooth form of an objective or an expression; None if a part has none."""
         try:
             expression = Expression.parse(text)
         except ObjectiveError:  # a function of a program or a file

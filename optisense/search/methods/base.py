@@ -91,9 +91,7 @@ class Method(ABC):
         """Receive the outcomes of the whole generation (k, n), in the order of its points."""
 
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
-        """Return the evaluator of the points. A method with a faster or richer evaluator overrides
-        it.
-        """
+        """Return the evaluator of the points; a method with a faster or richer one overrides it."""
         return usual
 
     def describe(self) -> dict[str, Any]:

@@ -286,9 +286,7 @@ class GradientEvaluator(PickledWithoutCaches):
         return found
 
     def steady(self, vector: FloatArray, gradient: FloatArray, seed: int) -> bool:
-        """Return whether a gradient (n,) of differences over `STEP` agrees with those over half of
-        it.
-        """
+        """Return whether a gradient (n,) of differences over `STEP` agrees with that over half."""
         for check in self._checks(vector, gradient):
             near = self.difference(vector, check.way, STEP / 2, seed)
             if near is None:
@@ -338,9 +336,7 @@ class GradientEvaluator(PickledWithoutCaches):
         return None if found is None else float(found[0])
 
     def _values(self, vector: FloatArray, seed: int) -> FloatArray:
-        """Return the smoothed values (1 + m,) at a point; exact ones for quantities without a
-        smooth form.
-        """
+        """Return the smoothed values (1 + m,) at a point, or exact ones without a smooth form."""
         design = self.usual.space.apply(vector)
         values = np.full(len(self.wanted), np.nan)
         if any(smooth is not None for smooth in self._smooth):

@@ -160,9 +160,7 @@ class Gradient(Method):
         )
 
     def ask(self) -> FloatArray:
-        """Return the next points (k, n) that L-BFGS-B needs; none when all ascents have
-        converged.
-        """
+        """Return the next points (k, n) that L-BFGS-B needs; none when all ascents converged."""
         space = self.space
         try:
             for start in self._starts:
@@ -201,9 +199,7 @@ class Gradient(Method):
             best = value
 
     def _offsets(self, unit: FloatArray, known: LocalValues) -> FloatArray:
-        """Return the differences (m,) between exact and smooth values of the limited quantities at
-        a point.
-        """
+        """Return the differences (m,) between exact and smooth values of limited quantities."""
         true = self._known[self._point(unit).tobytes()].conditions
         exact = [true.get(str(each)) for each in self.requirements]
         smooth = known.values[1:]
@@ -295,9 +291,7 @@ class Gradient(Method):
         return LocalValues(values, outcome.gradient.reshape(len(values), -1) * span)
 
     def _placed(self, unit: FloatArray, allowed: FloatArray) -> FeasiblePoint:
-        """Return the nearest feasible point to a wanted point (n,), which is scored in its
-        place.
-        """
+        """Return the nearest feasible point to a wanted one (n,), which is scored in its place."""
         key = unit.tobytes()
         if key not in self._places:
             if self._region is None:

@@ -93,9 +93,7 @@ def point_parameters(
 
 
 def _images(cage: Cage, symmetry: str | None) -> np.ndarray:
-    """Return the index of each control point's mirror image, (N,), or its own index without
-    symmetry.
-    """
+    """Return the index of each control point's mirror image, (N,); its own without symmetry."""
     lattice = np.arange(int(np.prod(cage.resolution))).reshape(cage.resolution)
     return (np.flip(lattice, "xyz".index(symmetry)) if symmetry else lattice).reshape(-1)
 

@@ -76,9 +76,7 @@ def _below(value: Any, node: Node | int, values: Sequence[Any]) -> Any:
 
 
 def _key(container: Any, step: str | int) -> str | int:
-    """Return the index of a letter of `_LETTERS` if the container is a sequence, else the step
-    itself.
-    """
+    """Return the index of a letter of `_LETTERS` in a sequence, else the step itself."""
     if isinstance(container, list | tuple) and step in _LETTERS:
         return _LETTERS[str(step)]
     return step

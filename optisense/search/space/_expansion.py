@@ -179,9 +179,7 @@ def _of_variable(
 
 
 def _of_value(path: str, value: Any, spec: Specification) -> list[Parameter]:
-    """Return the parameters for an ordinary path: one value, or the two or three numbers of a
-    vector.
-    """
+    """Return the parameters of an ordinary path: one value, or two or three numbers of a vector."""
     if isinstance(spec, Choice):
         spec = _colours_read(path, spec)
         return [Parameter(path, spec, _number_of(value, spec), (Target(path),))]

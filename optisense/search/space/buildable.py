@@ -146,9 +146,7 @@ class ContactPoints(NamedTuple):
         return found
 
     def kept(self, mesh: TriangleMesh, other: TriangleMesh) -> float:
-        """Return the share of the points that still touch the other part; 0 if there are too few
-        points.
-        """
+        """Return the share of the points that still touch the other part; 0 for too few."""
         if len(self.faces) < LEAST_CONTACT_POINTS:
             return 0.0
         return float(np.isfinite(near_surface(self.points(mesh), other)).mean())
@@ -250,9 +248,7 @@ class DeformedPartsInContact:
         self._always = {problem.where for problem in contact_problems(design)}
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Return a message with the part that has lost contact with another, or grown into it, or
-        None.
-        """
+        """Return a message with a part that lost contact with another, or grew into it, or None."""
         for problem in contact_problems(design):
             if problem.where not in self._always:
                 return problem.message

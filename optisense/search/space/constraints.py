@@ -63,9 +63,7 @@ class NoCrossings:
         )
 
     def meeting(self, design: SensorDesign) -> CrossingParts | None:
-        """Return the first two parts that cut through each other and did not at the start, or
-        None.
-        """
+        """Return the first two parts that cut through each other unlike at the start, or None."""
         meshes = design.deformed_meshes()
         moved = {
             name for name, mesh in meshes.items() if not same_shape(mesh, self._meshes.get(name))

@@ -55,9 +55,7 @@ class LibraryCoating(DesignVariable):
     """Replacement of the whole coating by one of the library."""
 
     def start(self, design: SensorDesign) -> str | None:
-        """Return the name of the coating in the library, or None for a coating of the design's
-        own.
-        """
+        """Return the name of the coating in the library, or None for one of the design's own."""
         return design.coating.library
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:

@@ -263,9 +263,7 @@ def _label(option: object) -> str:
 
 @dataclass(frozen=True)
 class Target:
-    """Value that follows a parameter: `scale` times the parameter plus `offset` (choices: as they
-    are).
-    """
+    """Value that follows a parameter: `scale` times it plus `offset` (choices: as they are)."""
 
     path: str
     scale: float = 1.0

@@ -153,9 +153,7 @@ def rotation(axis: FloatArray, degrees: float) -> FloatArray:
 def _with_poses(
     design: SensorDesign, group: str, turn: FloatArray, shift: FloatArray, only: int | None = None
 ) -> SensorDesign:
-    """Return a design with the lights of a group, or one of them, turned about the origin and then
-    shifted.
-    """
+    """Return a design with lights of a group, or one, turned about the origin and then shifted."""
     moved = list(design.lights[group].lights)
     for index in range(len(moved)) if only is None else (only,):
         light = moved[index]

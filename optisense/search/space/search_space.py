@@ -77,9 +77,7 @@ class SearchSpace:
         return BoundSpace(self, design, tried=tried)
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the parameters as values ready for JSON, without constraints, which are
-        functions.
-        """
+        """Return the parameters ready for JSON, without constraints, which are functions."""
         return {path: to_plain(spec) for path, spec in self.parameters.items()}
 
     @staticmethod
@@ -148,9 +146,7 @@ class BoundSpace:
         return [parameter.name for parameter in self.parameters]
 
     def values(self, vector: ArrayLike) -> dict[str, float | int | str]:
-        """Return the values of a point (n,) by the names of the parameters: numbers, and labels of
-        options.
-        """
+        """Return the values of a point (n,) by parameters: numbers, and labels of options."""
         return {
             parameter.name: _meaning(parameter, coordinate)
             for parameter, coordinate in zip(

@@ -108,9 +108,7 @@ def _leader(promoted: Sequence[Trial]) -> Trial | None:
 def _scored(
     trials: Sequence[Trial], seeds: Sequence[int], work: Work, more: int = 0
 ) -> list[Trial]:
-    """Return the trials with their full scores by these seeds; `more` scores are expected after
-    them.
-    """
+    """Return the trials with full scores by these seeds; `more` scores are expected later."""
     jobs = [(trial, seed) for trial in trials for seed in seeds if seed not in trial.fresh]
     outcomes = work(jobs, more, 0.0) if jobs else []
     fresh = {trial.number: dict(trial.fresh) for trial in trials}

@@ -42,9 +42,7 @@ def ranked(trials: Iterable[Trial]) -> list[Trial]:
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
-    """Return the best trial by the rule above, or None if no trial has a score and meets the
-    conditions.
-    """
+    """Return the best trial by the rule above; None if none has a score and meets conditions."""
     fine = ranked(trials)
     again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
     if again:

@@ -42,9 +42,7 @@ def margins(trial: Trial) -> list[tuple[str, float | None, float | None]]:
 
 
 def condition_lines(trial: Trial, start: Trial | None) -> list[str]:
-    """Return a line of text for each condition: value of a trial, margin, and value of the
-    start.
-    """
+    """Return a line of text for each condition: value of a trial, margin, value of the start."""
     lines = []
     for text, value in trial.conditions.items():
         wanted = Requirement.parse(text)
@@ -58,9 +56,7 @@ def condition_lines(trial: Trial, start: Trial | None) -> list[str]:
 
 
 def condition_note(trials: Sequence[Trial]) -> str | None:
-    """Return a note for the user if the start breaks conditions, or no trial meets them, else
-    None.
-    """
+    """Return a note for the user if the start breaks conditions or no trial meets them."""
     close = nearest(trials)
     if close is not None:
         again = " with fresh seeds" if close.fresh else ""

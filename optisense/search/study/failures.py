@@ -31,9 +31,7 @@ class FailureCause:
 
 
 def cause_of(reason: str) -> str:
-    """Return the cause in a reason: the text without the numbers that differ from trial to
-    trial.
-    """
+    """Return the cause in a reason: the text without numbers that differ among trials."""
     return _NUMBER.sub("…", _PLACE.sub("", reason))
 
 

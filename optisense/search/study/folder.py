@@ -49,9 +49,7 @@ def lock_new_folder(folder: Path, design: SensorDesign) -> FolderLock:
 
 
 def save_and_reload(folder: Path, design: SensorDesign) -> SensorDesign:
-    """Save the design, and return it as it is read again, so that a resumed study has exactly the
-    same one.
-    """
+    """Save the design, and return it as read again, exactly as a resumed study has it."""
     save_design(design, folder / DESIGN_FOLDER)
     return load_design(folder / DESIGN_FOLDER)
 

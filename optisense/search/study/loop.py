@@ -356,9 +356,7 @@ class StudyRun:
         self._time_left.expect(FRESH, count=whole, seconds=known)
 
     def _in_first_scores(self, count: float, seeds: float) -> float:
-        """Return the number of first scores that take as long as `count` scores with `seeds`
-        seeds.
-        """
+        """Return how many first scores take as long as `count` scores with `seeds` seeds."""
         return seeds + (count - seeds) * self._again
 
     def _trial_progress(self, fraction: float, text: str) -> None:

@@ -172,9 +172,7 @@ def known_goals(settings: StudySettings, given: Sequence[Goal] | None) -> list[G
 
 
 def known_rules(settings: StudySettings, given: Sequence[Constraint] | None) -> list[Constraint]:
-    """Return the constraints of a stored study, without those that are not known in this
-    process.
-    """
+    """Return the constraints of a stored study, without those unknown in this process."""
     if given:
         return list(given)
     return [UserRule(rule) for rule in settings.rules if not rule.startswith(ONLY_HERE)]

@@ -252,9 +252,7 @@ class Study:
 
     @property
     def start(self) -> Trial | None:
-        """Trial of the starting design, or of the nearest point to it in the space; None if not
-        scored.
-        """
+        """Trial of the starting design, or of the nearest point in the space; None if unscored."""
         return next((trial for trial in self.trials if trial.is_start), None)
 
     @property

@@ -52,9 +52,7 @@ def trust(references: Iterable[str]) -> None:
 
 
 def _note(reference: str) -> str:
-    """Return a line with the hash of the file's present content, and the reference without line
-    breaks.
-    """
+    """Return a line with the hash of the file's present content, and the reference in one line."""
     file = file_of(reference)
     try:
         content = b"" if file is None else read_bytes(file, MOST_PROGRAM, SearchError)

@@ -305,9 +305,7 @@ def _work(
     time_left: TimeLeft,
     usual: UsualTrials | None,
 ) -> tuple[list[Outcome | None], bool]:
-    """Return the outcome of each job, None for jobs after Ctrl-C, and whether Ctrl-C was
-    pressed.
-    """
+    """Return the outcome of each job, None for jobs after Ctrl-C, and whether it was pressed."""
     found: list[Outcome | None] = [None] * len(jobs)
     running: dict[Future[Outcome], int] = {}
     time_left.begin(FIRST)

@@ -71,9 +71,7 @@ def paired_errors(bound: BoundManufacturingErrors, rows: int, seed: int) -> Floa
 
 
 def percentile_of(scores: ArrayLike, share: float) -> Estimate:
-    """Return a percentile of scores (rows, k), with failed ones (NaN) below all others; NaN without
-    rows.
-    """
+    """Return a percentile of scores (rows, k), failed ones (NaN) lowest; NaN without rows."""
     values = np.asarray(scores, dtype=np.float64)
     if not values.size:
         return Estimate(np.nan, np.nan, np.nan)

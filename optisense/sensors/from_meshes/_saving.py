@@ -44,9 +44,7 @@ def _with_files(recipe: Recipe) -> list[ShapeReference | FromTable]:
 
 
 def _from(file: Path, folder: Path) -> str:
-    """Return a file's path relative to a folder, or the absolute path if there is none (another
-    drive).
-    """
+    """Return a file's path relative to a folder; the absolute path for another drive."""
     try:
         return Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder))).as_posix()
     except ValueError:

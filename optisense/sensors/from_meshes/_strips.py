@@ -68,9 +68,7 @@ def along(choice: LightsAlong, mesh: TriangleMesh) -> list[Light]:
 
 
 def _outline(mesh: TriangleMesh, axis: int, height: float, frame: FloatArray) -> FloatArray:
-    """Return the largest outline of a section, anticlockwise, in a frame of two directions, (n, 2)
-    mm.
-    """
+    """Return the largest outline of a section, anticlockwise, in a plane frame, (n, 2) mm."""
     level = mesh.vertices[:, axis] - height
     level[level == 0.0] = 1e-9  # a plane through a vertex passes just below it
     signs = level[mesh.faces] > 0.0

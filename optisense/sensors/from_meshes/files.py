@@ -171,9 +171,7 @@ def largest_dimension(meshes: Iterable[TriangleMesh]) -> float:
 
 
 def likely_units(size: float) -> list[str]:
-    """Return the units in which a sensor whose largest dimension is the number `size` has a
-    plausible size.
-    """
+    """Return the units in which the number `size` is a plausible size of a sensor."""
     return [unit for unit in COMMON_UNITS if SMALLEST <= size * MM_PER[unit] <= LARGEST]
 
 

@@ -134,9 +134,7 @@ def guess_use(name: str) -> Use | None:
 
 
 def guess_units(found: Iterable[CadBody]) -> Units | None:
-    """Return the only unit in which the files have a plausible size, if that is not mm; else
-    None.
-    """
+    """Return the only unit that gives the files a plausible size, if that is not mm; else None."""
     meshes = [each.body.mesh for each in found if not each.body.own_units]
     if not meshes:
         return None
@@ -252,9 +250,7 @@ def part_of(found: CadBody, role: Role, material: str | None = None) -> PartChoi
 def insert_skin(
     parts: dict[str, PartChoice], name: str, carrier: str, outward: str, tangent: bool = False
 ) -> dict[str, PartChoice]:
-    """Return the parts with a sensing surface on the outer faces of one of them, inserted behind
-    it.
-    """
+    """Return the parts with a sensing surface on the outer faces of one, inserted behind it."""
     skin = PartChoice(
         faces_of=carrier,
         towards=outward,
@@ -270,9 +266,7 @@ def insert_skin(
 
 
 def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightChoice:
-    """Return a light on each face of a reference that points to the gel; its colour is taken from
-    its name.
-    """
+    """Return a light on each face of a reference towards the gel, of the colour in its name."""
     side = nearest_side(gel.bounds.mean(axis=0) - mesh.bounds.mean(axis=0))
     colour = next(
         (c for c in ("red", "green", "blue", "white") if c in found.name.lower()), "white"

@@ -161,9 +161,7 @@ class Recipe(Model):
         return self
 
     def where(self, *path: str | int) -> str:
-        """Return file and line of a value if the recipe was read from a file, else its dotted
-        path.
-        """
+        """Return file and line of a value of a recipe read from a file, else its dotted path."""
         for length in range(len(path), -1, -1):
             if path[:length] in self._lines:
                 return f"{self._source}:{self._lines[path[:length]]}"
