@@ -151,9 +151,7 @@ class Registry(Generic[T]):
 
 
 def _home(thing: object) -> str:
-    """Return the place of definition of a function or class: "module:name"; that of an objective is
-    its function's.
-    """
+    """Return the place of a function, class or objective's function, as "module:name"."""
     thing = getattr(thing, "function", thing)
     name = getattr(thing, "__qualname__", type(thing).__qualname__)
     return f"{getattr(thing, '__module__', '')}:{name}"

@@ -178,9 +178,7 @@ def _widened(emitter: LightModel, factor: float) -> LightModel:
 
 
 def edge_parts(design: SensorDesign) -> list[str]:
-    """Return the rigid transparent parts whose edges may be rough: those without finished faces
-    other than such edges.
-    """
+    """Return the rigid transparent parts whose edges may be rough, without other finished faces."""
     return [
         name
         for name in design.parts_of(Role.SUPPORT)

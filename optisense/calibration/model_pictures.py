@@ -80,9 +80,7 @@ def model_pictures(
 
 
 def levels_of(radiance: NDArray[np.floating], chain: PictureChain, exposure: float) -> FloatArray:
-    """Return the levels (h, w, 3) that a camera stores for radiance (h, w, 3), mW/(mm^2 sr): 0 to
-    255, not rounded.
-    """
+    """Return the unrounded levels (h, w, 3), to 255, of radiance (h, w, 3), mW/(mm^2 sr)."""
     return 255.0 * np.asarray(chain.curve(chain.respond(exposure * radiance)), dtype=np.float64)
 
 

@@ -175,9 +175,7 @@ class Realism:
         return float(np.median([getattr(press.noise, name) for press in self.presses]))
 
     def median_reading(self, name: str) -> float:
-        """Return the median over the presses of one of the figures of readings; NaN without
-        it.
-        """
+        """Return the median over presses of one of the figures of readings; NaN without any."""
         values = [value for each in self.readings if (value := getattr(each, name)) is not None]
         return float(np.median(values)) if values else math.nan
 
@@ -263,9 +261,7 @@ def _noise_figures(real: FloatArray, seen: SeenContact, noise: float) -> NoiseFi
 
 
 def distances(shape: tuple[int, ...], seen: SeenContact) -> FloatArray:
-    """Return the distances (h, w) of the pixels of a picture of a shape (h, w) from the contact's
-    middle, in its radii.
-    """
+    """Return the distances (h, w) of pixels from the contact's middle, in its radii."""
     rows, columns = np.mgrid[: shape[0], : shape[1]] + 0.5
     found = np.hypot(columns - seen.centre[0], rows - seen.centre[1])
     return np.asarray(found / max(seen.radius, 1e-9))

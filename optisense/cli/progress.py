@@ -78,9 +78,7 @@ class ProgressLine:
     def say(
         self, what: str, done: float | None = None, count: float | None = None, *notes: str
     ) -> None:
-        """Change the texts: the step, the number of finished pieces and of all, and notes, the most
-        important first.
-        """
+        """Change the texts: the step, the pieces finished and in all, and notes by importance."""
         self._what = what
         self._count = f"{int(done or 0)}/{int(count)}" if count is not None else ""
         self._notes = notes

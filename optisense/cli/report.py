@@ -110,9 +110,7 @@ WRITING, TRIALS = "writing the page", "rendering trials"
 
 
 def _steps(photons: int, pictures: bool, trials: int) -> list[TimedStep]:
-    """Return the steps, with their usual durations (s on two cores of a desktop processor, for
-    GelSight Mini).
-    """
+    """Return the steps, with usual durations (s on two desktop cores, for GelSight Mini)."""
     per_view = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
     return [
         TimedStep("the sensor before the search", 1, 3.0 + per_view),

@@ -105,9 +105,7 @@ class Cage(Model):
         return (i * ny + j) * nz + k
 
     def current_points(self) -> NDArray[np.float64]:
-        """Return the control points (N, 3), mm, of the present shape, blended if `blend` is
-        given.
-        """
+        """Return the present control points (N, 3), mm, blended if `blend` is given."""
         if self.blend is None:
             return as_array(self.points)
         assert self.c_min is not None and self.c_max is not None  # the validator has checked it

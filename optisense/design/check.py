@@ -158,9 +158,7 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
 
 
 def _check_kinds(design: SensorDesign) -> list[Diagnostic]:
-    """Return the problems that emitters, materials and the like report about themselves, such as a
-    missing file.
-    """
+    """Return the problems that emitters, materials and others find in themselves."""
     problems: list[Diagnostic] = []
     for path, value in design.values_of_kinds().items():
         try:

@@ -1,6 +1,4 @@
-"""Checks of transparent materials: refractive indices that no material has, and media that absorb
-all light.
-"""
+"""Checks of transparent materials: impossible indices, and media that absorb all light."""
 
 from __future__ import annotations
 

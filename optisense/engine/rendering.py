@@ -244,9 +244,7 @@ def report(session: Session, fields: Report, job: Job) -> dict[str, Any]:
 
 @handles("ledger", Ledger, Lane.RENDER)
 def ledger(session: Session, fields: Ledger, job: Job) -> dict[str, Any]:
-    """Return the ledger of the light of each group, and the causes of brightness at places of the
-    skin.
-    """
+    """Return the ledger of each group's light, and the causes of brightness at places."""
     from optisense.optics import camera_light, light_at, light_ledger
     from optisense.optics.ledger import cells_in_view
 

@@ -245,17 +245,13 @@ def _near_pairs(
 
 
 def _contains(triangles: FloatArray, points: FloatArray, tolerance: float) -> NDArray[np.bool_]:
-    """Return a mask (k,) of the triangles (k, 3, 2), of either winding, that contain all their
-    points (k, c, 2).
-    """
+    """Return a mask (k,) of triangles (k, 3, 2), of either winding, that contain their points."""
     inside: NDArray[np.bool_] = np.all(_inward(triangles, points) >= -tolerance, axis=(1, 2))
     return inside
 
 
 def _apart(triangles: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
-    """Return a mask (k,) of the triangles (k, 3, 2) with an edge beyond which all their points
-    (k, c, 2) lie.
-    """
+    """Return a mask (k,) of triangles (k, 3, 2) with an edge beyond which all their points lie."""
     beyond = _inward(triangles, points) <= _THINNEST
     apart: NDArray[np.bool_] = np.any(np.all(beyond, axis=2), axis=1)
     return apart

@@ -60,9 +60,7 @@ def thick_place(common: Any, thinnest: float) -> FloatArray | None:
 
 
 def as_manifold(mesh: TriangleMesh) -> Any:
-    """Return a mesh as a manifold3d object; a mesh that is not a valid volume gives an empty object
-    with a status.
-    """
+    """Return a mesh as a manifold3d object; empty with a status if it is not a valid volume."""
     import manifold3d
 
     welded = mesh.welded()

@@ -234,9 +234,7 @@ def surface_axes(
 def _axes(
     inward: NDArray[np.float64], surface: SensingSurface, contact: Contact
 ) -> NDArray[np.float64]:
-    """Return the indenter's axes (3, 3) as columns x, y, z; z points outward, and x along u or
-    `along`, rotated.
-    """
+    """Return the indenter's rotated axes (3, 3) as columns: x near u or `along`, z outward."""
     z = -inward
     x, y, _ = surface_axes(inward, surface, contact.along).T
     a = math.radians(contact.rotation)

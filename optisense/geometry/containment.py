@@ -54,9 +54,7 @@ def _frame() -> FloatArray:
 
 
 def _crossings(corners: FloatArray) -> int | None:
-    """Return the number of exits minus entries of a ray from the origin along +z, or None if it is
-    uncertain.
-    """
+    """Return the exits minus entries of a ray from the origin along +z; None if uncertain."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     edges = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
     area = edges.sum(axis=1)

@@ -76,9 +76,7 @@ def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.in
 
 
 def _outline(faces: NDArray[np.int64]) -> list[Loop] | None:
-    """Return the closed loops of vertices around a patch, with its inside on the left; None if two
-    loops touch.
-    """
+    """Return the loops of vertices around a patch, inside on the left; None if two loops touch."""
     directed = {
         (int(a), int(b)) for f in faces for a, b in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))
     }

@@ -209,9 +209,7 @@ class TriangleMesh:
     # ---- changing
 
     def transformed(self, matrix: ArrayLike) -> TriangleMesh:
-        """Return the mesh transformed by a (4, 4) or (3, 3) affine matrix, mm; a mirroring matrix
-        also turns the faces over.
-        """
+        """Return the mesh after a (4, 4) or (3, 3) matrix, mm; a mirroring one turns faces over."""
         full = np.eye(4)
         given = np.asarray(matrix, dtype=np.float64)
         full[: given.shape[0], : given.shape[1]] = given

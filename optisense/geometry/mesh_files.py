@@ -136,9 +136,7 @@ def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:
 
 
 def _refuse_cut_off_stl(data: bytes, path: Path) -> None:
-    """Refuse a truncated STL file: a binary file has 84 bytes and 50 per triangle, and a text file
-    ends in endsolid.
-    """
+    """Refuse a truncated STL file: binary ones have 84 bytes + 50 a triangle, text endsolid."""
     ended = b"endsolid" in data.lower()
     text = data.lstrip()[:5].lower() == b"solid" and (ended or b"facet" in data[:2000].lower())
     if text:

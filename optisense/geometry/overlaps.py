@@ -102,9 +102,7 @@ def touching(mesh: TriangleMesh, vertices: NDArray[np.int64], other: TriangleMes
 
 
 def near_surface(points: FloatArray, other: TriangleMesh) -> FloatArray:
-    """Return the distances (k,), mm, of points (k, 3) from a mesh; infinite where they are larger
-    than `CONTACT`.
-    """
+    """Return the distances (k,), mm, of points (k, 3) from a mesh; infinite beyond `CONTACT`."""
     result = np.full(len(points), np.inf)
     if len(points) == 0:
         return result

@@ -1,6 +1,4 @@
-"""Selection of faces of a mesh as in CAD tools: by the direction of their normals, and along smooth
-edges.
-"""
+"""Selection of faces of a mesh as in CAD tools: by their normals, and along smooth edges."""
 
 from __future__ import annotations
 
@@ -19,9 +17,7 @@ curved surface differ by some degrees, and the edges of machined parts by 45 deg
 
 
 def faces_towards(mesh: TriangleMesh, direction: ArrayLike, within: float) -> Faces:
-    """Return the numbers (k,) of the faces whose normals are within an angle (degrees) of a
-    direction (3,) of any length.
-    """
+    """Return the faces (k,) with normals within an angle (degrees) of a direction (3,)."""
     way = np.asarray(direction, dtype=np.float64)
     cosine = mesh.face_normals @ (way / np.linalg.norm(way))
     return np.flatnonzero((cosine >= np.cos(np.radians(within)) - 1e-12) & (mesh.face_areas > 0))

@@ -159,9 +159,7 @@ class SensingSurface:
         return int(near[face]), np.asarray(on_faces[face], dtype=np.float64)
 
     def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
-        """Return the place with the smooth normal, so that neighbouring presses have nearly the
-        same direction.
-        """
+        """Return the place with the smooth normal, which is nearly that of neighbouring places."""
         smooth = self._smooth
         assert smooth.normals is not None
         share = _barycentric(self.mesh.triangles[face], point)

@@ -1,6 +1,4 @@
-"""Check that a gel is held by a part of its design: a gel that is bonded to nothing resists no
-press.
-"""
+"""Check that a gel is held by a part of its design, as an unbonded gel resists no press."""
 
 from __future__ import annotations
 

@@ -69,9 +69,7 @@ def refuse_holes(place: Footprint, indenter: TriangleMesh) -> None:
 
 
 def _overlap_at(place: Footprint, local: FloatArray) -> FloatArray:
-    """Return the greatest overlap (n,), mm, at the grid points around points of a contact's
-    frame.
-    """
+    """Return the greatest overlap (n,), mm, at grid points around points of a contact's frame."""
     column = np.floor((local[:, 0] - place.x[0]) / place.pitch).astype(np.int64)
     row = np.floor((local[:, 1] - place.y[0]) / place.pitch).astype(np.int64)
     rows, columns = place.overlap.shape

@@ -112,9 +112,7 @@ class GridResponse:
         return np.stack([self._restored(each) for each in (x, y, z)])
 
     def tangential(self, shear: FloatArray) -> FloatArray:
-        """Return the displacement (2, rows, columns), mm, along x and y due to a shear
-        (2, rows, columns), MPa.
-        """
+        """Return the displacement (2, rows, columns), mm, by a shear (2, rows, columns), MPa."""
         kernels = self._kernels
         along_x, along_y = self._transformed(shear[0]), self._transformed(shear[1])
         return np.stack(

@@ -274,9 +274,7 @@ class DisplacementField:
 
     @cached_property
     def _depth(self) -> FloatArray:
-        """Return the distance (rows, columns), mm, from points of the contact to the nearest point
-        outside it.
-        """
+        """Return the distance (rows, columns), mm, of points of the contact from its outside."""
         inside = distance_transform_edt(np.pad(self._touching, 1))[1:-1, 1:-1]
         return np.asarray(inside) * self.place.pitch
 

@@ -1,6 +1,4 @@
-"""The footprint of a contact: the overlap of indenter and undeformed skin on a grid of their
-tangent plane.
-"""
+"""The footprint of a contact: the overlap of indenter and skin at rest on a tangent grid."""
 
 from __future__ import annotations
 
@@ -154,9 +152,7 @@ def outer_faces(skin: TriangleMesh, x: FloatArray, y: FloatArray) -> TriangleMes
 
 
 def _tangent_axes(inward: FloatArray) -> FloatArray:
-    """Return right-handed axes (3, 3) as columns x, y, z: z points outward, and x is close to the
-    design's x axis.
-    """
+    """Return right-handed axes (3, 3) as columns: z points outward, x is close to the design's."""
     z = -inward
     x = np.eye(3)[int(np.argmin(np.abs(z)))]
     x = x - (x @ z) * z

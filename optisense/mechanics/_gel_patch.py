@@ -254,9 +254,7 @@ class GelPatch:
         return np.asarray(smooth[0][:, None] * smooth[1])
 
     def _beside_into(self, new: IntArray) -> FloatArray:
-        """Return the normal displacement (columns, new) of the half-spaces at new sources, minus
-        that of the flat layer.
-        """
+        """Return the normal displacement (columns, new) by new sources, minus the flat layer's."""
         moved = self._in_frame(
             point_load.displacements(self._offsets(self._top, new), self._nu), new
         )
@@ -286,9 +284,7 @@ class GelPatch:
 
     @cached_property
     def _frames(self) -> FloatArray:
-        """Return the axes (sources, 3, 3) of the half-spaces, as columns: two along the skin, and
-        one into the gel.
-        """
+        """Return the axes (sources, 3, 3) of the half-spaces as columns: two along, one inward."""
         z = self._inward[self._sources]
         x = np.array([1.0, 0.0, 0.0]) - z[:, :1] * z
         x /= np.linalg.norm(x, axis=1, keepdims=True)

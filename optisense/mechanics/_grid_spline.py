@@ -20,9 +20,7 @@ class GridArea:
         self._start, self._pitch, self._shape = (x0, y0), pitch, shape
 
     def holds(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Return a mask (n,) of the points (n,), mm, on the grid that are at least one grid point
-        from its rim.
-        """
+        """Return a mask (n,) of points (n,), mm, one grid point or more inside the grid's rim."""
         column, row = self._place(x, y)
         rows, columns = self._shape
         return (column >= 1) & (column <= columns - 2) & (row >= 1) & (row <= rows - 2)
@@ -46,9 +44,7 @@ class GridSpline(GridArea):
         return self._between(row, column)
 
     def at(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the value, and its slopes by x and y from differences over one pitch, (3, n), at
-        points (n,), mm.
-        """
+        """Return the value and its slopes by x and y over one pitch, (3, n), at points (n,), mm."""
         column, row = self._place(x, y)
         half = 0.5
         rows = np.concatenate([row, row, row, row - half, row + half])

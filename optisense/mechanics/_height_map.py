@@ -149,9 +149,7 @@ def _on_triangles(
     x: FloatArray,
     y: FloatArray,
 ) -> FloatArray:
-    """Return the heights (n,), mm, of points on faces, from the barycentric coordinates of the
-    second and third corner.
-    """
+    """Return the heights (n,), mm, of points on faces by barycentric coordinates of corners."""
     second, third = shares
     all_three = 1.0 - second - third, second, third
     flat = sum(share * corners[face, k, 2] for k, share in enumerate(all_three))

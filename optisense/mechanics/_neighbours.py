@@ -42,9 +42,7 @@ class Neighbours:
             self._caused[number][k] = upright * depth.reshape(shape)
 
     def at(self, number: int) -> FloatArray:
-        """Return the inward displacement (rows, columns), mm, of the skin on a contact's grid due
-        to the others.
-        """
+        """Return the inward displacement (rows, columns), mm, on a contact's grid due to others."""
         place = self._places[number]
         caused = [at_places[number] for at_places in self._caused if number in at_places]
         if not caused:

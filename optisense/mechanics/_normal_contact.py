@@ -99,9 +99,7 @@ def solve_normal_contact(
 
 
 def _first(response: GridResponse, overlap: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a pressure in proportion to the overlap, scaled to the minimum of the energy, and its
-    displacement.
-    """
+    """Return a pressure in proportion to the overlap, of least energy, and its displacement."""
     pressure = np.maximum(overlap, 0.0)
     displacement = response.normal(pressure)
     scale = float((pressure * overlap).sum() / (pressure * displacement).sum())

@@ -29,9 +29,7 @@ STEEP = "skin that is steeper than 60 degrees against it"
 
 
 def rims_in_words(design: SensorDesign) -> str:
-    """Return a sentence part that says where forces of contacts on a design's skin are inaccurate;
-    empty if nowhere.
-    """
+    """Return words on where forces of contacts on a skin are inaccurate; empty if nowhere."""
     meshes = design.deformed_meshes()
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     return Rims(TriangleMesh.joined(skins).welded()).in_words() if skins else ""
@@ -63,9 +61,7 @@ class Rims:
         return ""
 
     def in_words(self) -> str:
-        """Return a sentence part that says where forces of contacts are inaccurate; empty if the
-        skin has no rim.
-        """
+        """Return words on where forces of contacts are inaccurate; empty if the skin has no rim."""
         if self._has_steep_rim():
             return f"forces within {STEEP_RIM:g} mm of the steep rim of the gel are not reliable"
         if len(self._border):

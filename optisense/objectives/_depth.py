@@ -1,6 +1,4 @@
-"""Depth: the error of the shape that a calibrated reader finds on presses that it was not fitted
-to.
-"""
+"""Depth: the error of the shape that a reader finds on presses that it was not calibrated on."""
 
 from __future__ import annotations
 

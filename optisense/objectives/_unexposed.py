@@ -19,9 +19,7 @@ sensor, so that no pixel sees two contacts."""
 
 
 class UnexposedPress(NamedTuple):
-    """A press with the mask (h, w) of the n pixels that contacts touch in its image, and their
-    radiance (n, 3).
-    """
+    """A press with the mask (h, w) of the pixels that contacts touch, and their radiance (n, 3)."""
 
     press: Press
     touched: NDArray[np.bool_]
@@ -37,9 +35,7 @@ def radiance_in(image: TactileImage, where: NDArray[np.bool_]) -> NDArray[np.flo
 
 
 def box_around(mask: NDArray[np.bool_], reach: int) -> tuple[slice, slice]:
-    """Return the rows and columns of a box around the true pixels of a mask (h, w), extended by
-    `reach` pixels.
-    """
+    """Return the box (rows, columns) around a mask (h, w), extended by `reach` pixels."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return (
         slice(max(0, rows[0] - reach), rows[-1] + 1 + reach),

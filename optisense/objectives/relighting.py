@@ -112,9 +112,7 @@ class Relighting:
         return self._image.relight(dict(zip(self.groups, given, strict=True)))
 
     def exposure(self, flux: ArrayLike) -> float:
-        """Return the exposure (factor from radiance to the camera's response) under lights of a
-        power (groups, 3), mW.
-        """
+        """Return the exposure (radiance to response) under lights of a power (groups, 3), mW."""
         return self._exposure(self.untouched(flux), self._contacts(flux))
 
     def presses(self, flux: ArrayLike, *, whole: bool = False) -> list[Press]:

@@ -244,9 +244,7 @@ def signed_angles(press: Press, angle: float, normals: ArrayLike) -> FloatArray:
 
 
 def fit(angles: ArrayLike, colours: ArrayLike, axis: FloatArray | None = None) -> Fit:
-    """Fit the dominant colour of colours (m, 3) to angles (m,) in degrees; see `dominant_colour`
-    for the axis.
-    """
+    """Fit the dominant colour of colours (m, 3), see `dominant_colour`, to angles (m,), degrees."""
     x, y = np.asarray(angles, dtype=np.float64), dominant_colour(colours, axis)
     if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:  # constant values have no linear relation
         return Fit(x, y, 0.0, float(y.mean()), 0.0)
@@ -281,9 +279,7 @@ def _line_of(angle: float, fits: dict[float, Fit]) -> float:
 
 
 def _step(values: FloatArray, axis: int) -> FloatArray:
-    """Return the change of values from pixel to pixel along an axis, the mean of the differences to
-    both neighbours.
-    """
+    """Return the change of values per pixel along an axis, the mean of both differences."""
     edge = np.full_like(values.take([0], axis), np.nan)
     change = np.concatenate([edge, np.abs(np.diff(values, axis=axis)), edge], axis)
     length = values.shape[axis]

@@ -84,9 +84,7 @@ def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slop
 
 
 def smooth_coverage(rays: Rays) -> Slopes:
-    """Return the share of the surface's triangles that are seen, as the integral of their density
-    over the visible area.
-    """
+    """Return the seen share of the surface's triangles: the integral of their density in view."""
     triangles = _PixelTriangles(rays)
     density = triangles.mean_of_corners(rays.density)
     value = float((density * triangles.weight * triangles.area).sum())
@@ -97,9 +95,7 @@ def smooth_coverage(rays: Rays) -> Slopes:
 
 
 def smooth_projection_warping(rays: Rays) -> Slopes:
-    """Return the weighted mean over the weighted standard deviation of the areas between
-    neighbouring pixels' points.
-    """
+    """Return weighted mean over weighted deviation of the areas between neighbouring points."""
     triangles = _PixelTriangles(rays)
     area, weight = triangles.area, triangles.weight
     if len(area) < 2:

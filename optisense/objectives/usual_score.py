@@ -144,9 +144,7 @@ class UsualTrials:
         )
 
     def done(self, rendered: float) -> float:
-        """Return the finished share of the first score when the share ``rendered`` of its images is
-        rendered.
-        """
+        """Return the finished share of the first score at the share ``rendered`` of its images."""
         done = self.score.loading + self.score.done(rendered, first=True)
         return min(1.0, done / max(self.first, 1e-9))
 

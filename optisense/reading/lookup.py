@@ -207,9 +207,7 @@ class TiltLookup:
     def _fit(
         self, change: FloatArray, within: FloatArray, channel: int
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the coefficients (k, 7) at each tilt, and the variance (k,) of the fit, levels
-        squared.
-        """
+        """Return the coefficients (k, 7) at each tilt, and the fit's variance (k,), levels^2."""
         terms = self._terms(self._places, self._levels[:, channel], channel)
         weights = self._weights
         penalty = np.diag([1e-9, *[SLOPE_PENALTY] * 3, *[CURVE_PENALTY] * 3])

@@ -100,9 +100,7 @@ def convergence(
 
 
 def influences(trials: Sequence[Trial], name: str) -> list[Influence]:
-    """Return the association of a score with each parameter, the strongest first; failed trials are
-    left out.
-    """
+    """Return the association of a score with each parameter, strongest first, without failures."""
     known = [trial for trial in trials if np.isfinite(trial.scores.get(name, np.nan))]
     if len(known) < 3:
         return []

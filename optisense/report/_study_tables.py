@@ -85,9 +85,7 @@ def scores(study: Study, start: Trial | None, best: Trial | None) -> Table:
 
 
 def conditions(study: Study, start: Trial | None, best: Trial | None) -> Table | None:
-    """Return each condition with the value before and after, and the margin of the best; None if
-    there are none.
-    """
+    """Return each condition with its values before and after, and the best's margin."""
     rows = []
     for text in study.settings.requirements:
         wanted = Requirement.parse(text)

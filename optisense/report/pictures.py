@@ -75,9 +75,7 @@ def pressure_colours(pressure: FloatingArray) -> ByteArray:
 
 
 def mask_overlay(picture: ByteArray, mask: NDArray[np.bool_]) -> ByteArray:
-    """Return a picture (h, w, 3) in grey, with the pixels of a mask (h, w) in their own colours and
-    a white outline.
-    """
+    """Return a picture (h, w, 3), grey but for a mask (h, w), with a white outline."""
     from scipy.ndimage import binary_erosion
 
     grey = (picture.astype(np.float64) @ [0.299, 0.587, 0.114] * 0.45)[..., None]

@@ -1,6 +1,4 @@
-"""Comparison of a built-in sensor with a picture of a real one: the same press, and their
-differences.
-"""
+"""Comparison of a built-in sensor with a picture of a real one under the same press."""
 
 from __future__ import annotations
 

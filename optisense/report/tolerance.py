@@ -1,6 +1,4 @@
-"""Page of a tolerance analysis: the distribution of scores, and the share of each manufacturing
-error.
-"""
+"""Page of a tolerance analysis: the distribution of scores, and each error's share in it."""
 
 from __future__ import annotations
 

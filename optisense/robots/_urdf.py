@@ -1,6 +1,4 @@
-"""A sensor as a robot description (URDF): a link with its meshes, and links for its camera and its
-skin.
-"""
+"""A sensor as a robot description (URDF): links for its meshes, its camera and its skin."""
 
 from __future__ import annotations
 

@@ -61,9 +61,7 @@ def check_numbers(
 
 
 def check_camera(pupil_distance: float, window_bottom: float, loop: float) -> None:
-    """Check the camera; lengths are depths of window and inside of the returning belt below the
-    sensing surface, mm.
-    """
+    """Check the camera; lengths are depths of the window and of the returning belt, mm."""
     require(
         pupil_distance > window_bottom,
         f"the camera is inside the belt or the window, which reach {window_bottom:g} mm deep",

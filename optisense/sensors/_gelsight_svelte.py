@@ -259,9 +259,7 @@ def _mirror_cage(mesh: TriangleMesh, mirror: CurvedMirror, most: float, blend: f
 
 
 def _lights(palm: Palm, size: GelSightSvelteDimensions, flux: float) -> dict[str, LightGroup]:
-    """Return rows of lights along both sides of the gel, in the middle of its thickness, that shine
-    across it.
-    """
+    """Return rows of lights along both sides of the gel, amid its thickness, that shine across."""
     count, pitch, gap = size.leds_per_side, size.led_pitch, size.led_gap
     shares = 0.5 + (np.arange(count) - 0.5 * (count - 1)) * pitch / palm.length
     if shares[0] < 0.0:

@@ -121,9 +121,7 @@ class HalfRound:
 
     @property
     def half_way(self) -> float:
-        """Distance along the outline from the middle of the straight end to the middle of the
-        round, mm.
-        """
+        """Distance along the outline from the middle of the straight end to the round's, mm."""
         flat, bend = self.radius - self.corner, 0.5 * math.pi * self.corner
         return flat + bend + self.straight - self.corner + 0.5 * math.pi * self.radius
 

@@ -119,9 +119,7 @@ class CurvedMirror:
 
     @staticmethod
     def from_arc(lower: ArrayLike, upper: ArrayLike, sagitta: float) -> CurvedMirror:
-        """Return the mirror of an arc by its ends, (2,) mm, and the distance of its middle behind
-        the chord, mm.
-        """
+        """Return the mirror of an arc by its ends, (2,) mm, and its depth behind the chord, mm."""
         first, last = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
         along = (last - first) / np.linalg.norm(last - first)
         forward = np.array([along[1], -along[0]])
@@ -221,9 +219,7 @@ def mirrored(point: ArrayLike, on: ArrayLike, direction: ArrayLike) -> FloatArra
 def crossing(
     start: FloatArray, ends: FloatArray, on: FloatArray, direction: FloatArray
 ) -> FloatArray:
-    """Return the distances along a line at which the lines from `start` (2,) to `ends` (n, 2) cross
-    it, (n,) mm.
-    """
+    """Return distances (n,), mm, along a line at which lines from `start` to `ends` cross it."""
     way = ends - start
     normal = np.array([-direction[1], direction[0]])
     step = ((on - start) @ normal) / (way @ normal)
@@ -287,9 +283,7 @@ class FlatMirror:
         return np.array([self.bottom, self.bottom + self.length * self.along])
 
     def seen_between(self) -> tuple[float, float]:
-        """Return the angles of its ends seen from the pupil, from the x axis towards the tip,
-        radians.
-        """
+        """Return the angles of its ends seen from the pupil, from x towards the tip, radians."""
         low, high = np.arctan2(self.ends()[:, 1], self.ends()[:, 0])
         return float(low), float(high)
 

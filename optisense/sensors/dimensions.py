@@ -139,9 +139,7 @@ def _argument_error(
 
 
 def _dimension_error(error: ValidationError, sensor: str) -> DesignError:
-    """Return the error for a value that a part of the design refuses; it names the field, which
-    usually is the argument.
-    """
+    """Return the error for a value that a part of the design refuses; it names the field."""
     report = error.errors(include_url=False)[0]
     message = report["msg"].removeprefix("Value error, ").replace("Input should", "it should")
     field = ".".join(str(step) for step in report["loc"])

@@ -194,9 +194,7 @@ LEAST = 50
 
 
 def _seen(rays: ChiefRays) -> tuple[FloatArray, FloatArray]:
-    """Return points (n, 3) of the skin at rest and at `PRESSED` (mm) along the rays, and their
-    pixels (n, 2).
-    """
+    """Return points (n, 3) of the skin at rest and at `PRESSED` (mm), and their pixels (n, 2)."""
     rows, columns = np.nonzero(rays.hit)
     every = max(1, len(rows) // MOST_POINTS)
     rows, columns = rows[::every], columns[::every]

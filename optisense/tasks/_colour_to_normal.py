@@ -69,9 +69,7 @@ class ColourTable:
     """
 
     def __init__(self, colours: FloatArray, places: FloatArray, tilts: FloatArray) -> None:
-        """Fit the table to colours and places, as in `TiltReader.tilts`, with known tilts (n,
-        2).
-        """
+        """Fit the table to colours and places, as in `TiltReader.tilts`, with tilts (n, 2)."""
         bins, which = np.unique(np.round(colours / BIN), axis=0, return_inverse=True)
         which = which.reshape(-1)
         count = np.bincount(which)

@@ -71,9 +71,7 @@ class _KeptContacts(BaseModel):
 
 
 class _KeptSettings(BaseModel):
-    """The stored settings of a dataset. They are compared with the requested ones, so any further
-    values are allowed.
-    """
+    """The stored settings of a dataset: any further values, compared with the requested ones."""
 
     model_config = ConfigDict(extra="allow")
 

@@ -1,6 +1,4 @@
-"""Figures of tasks. Matplotlib is imported when a figure is drawn; figures are neither shown nor
-saved.
-"""
+"""Figures of tasks. Matplotlib is imported when a figure is drawn; none is shown or saved."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Export to the workshop: shapes to print or machine, positions of the LEDs, and a bill of
-materials.
-"""
+"""Export to the workshop: shapes to print or machine, positions of LEDs, bill of materials."""
 
 from optisense.workshop._bill_of_materials import Bill, bill_of_materials
 from optisense.workshop._formats import FORMATS, ShapeFormat

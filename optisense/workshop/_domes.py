@@ -1,6 +1,4 @@
-"""Domes: bodies whose corners lie in horizontal rings over a vertical wall, from the foot to one
-top.
-"""
+"""Domes: bodies with corners in horizontal rings over a vertical wall, and one at the top."""
 
 from __future__ import annotations
 

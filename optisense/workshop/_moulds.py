@@ -170,9 +170,7 @@ def _outward(skins: list[TriangleMesh]) -> FloatArray:
 
 
 def _axes(pull: FloatArray, vertices: FloatArray) -> FloatArray:
-    """Return rows (3, 3): along the gel's longest side perpendicular to the pull, across it, and
-    the pull itself.
-    """
+    """Return rows (3, 3): along the gel's longest side across the pull, across it, and the pull."""
     flat = vertices - np.outer(vertices @ pull, pull)
     flat = flat - flat.mean(axis=0)
     along = np.linalg.svd(flat, full_matrices=False)[2][0]

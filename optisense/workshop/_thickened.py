@@ -51,9 +51,7 @@ def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh | None:
 
 
 def _pieces(mesh: TriangleMesh) -> list[NDArray[np.int64]]:
-    """Return the faces of each piece; pieces are joined where exactly two faces with the same
-    winding share an edge.
-    """
+    """Return the faces of each piece; edges shared by just two faces of one winding join them."""
     ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
     owner = np.tile(np.arange(len(mesh.faces)), 3)
     _, inverse, counts = np.unique(

@@ -1,6 +1,4 @@
-"""Shapes of a design for manufacturing: deformed by their cages, in one piece, with outward
-normals.
-"""
+"""Shapes of a design for manufacturing: bent by their cages, in one piece, normals outward."""
 
 from __future__ import annotations
 

@@ -19,9 +19,7 @@ OUTSIDE_TOLERANCE = 1e-6
 
 
 def rest_points(box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """Return the control points at rest, (nx * ny * nz, 3) mm; the index of x varies slowest, that
-    of z fastest.
-    """
+    """Return the control points at rest, (nx * ny * nz, 3) mm; x varies slowest, z fastest."""
     lower, upper = np.asarray(box, dtype=np.float64)
     axes = [np.linspace(lower[k], upper[k], resolution[k]) for k in range(3)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -1,6 +1,4 @@
-"""Triangle meshes as the engine writes and reads them: OBJ files with the keywords v, vn and f
-only.
-"""
+"""Triangle meshes as the engine writes and reads them: OBJ files with v, vn and f only."""
 
 from __future__ import annotations
 

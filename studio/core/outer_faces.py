@@ -57,9 +57,7 @@ def outer_faces(mesh: Mesh, outward: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def skin_of(mesh: Mesh, faces: NDArray[np.int64]) -> Mesh:
-    """Return the sensing surface on some faces of a gel, with the faces reversed so that they face
-    into the gel.
-    """
+    """Return the sensing surface on some faces of a gel, reversed so that they face into it."""
     chosen = _welded(mesh)[mesh.faces[faces]]
     used, numbered = np.unique(chosen, return_inverse=True)
     turned = numbered.reshape(-1, 3)[:, ::-1]

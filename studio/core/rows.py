@@ -33,9 +33,7 @@ class Row:
     pitch: float
 
     def places(self, count: int, pitch: float) -> FloatArray:
-        """Return the positions of lights with another count and pitch about the same middle,
-        (count, 3) mm.
-        """
+        """Return positions (count, 3), mm, of a row with another count and pitch, same middle."""
         shifts = (np.arange(count) - (count - 1) / 2) * pitch
         return self.middle + shifts[:, None] * self.along
 

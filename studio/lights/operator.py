@@ -228,9 +228,7 @@ def _middle(scene: bpy.types.Scene) -> Vector:
 
 
 def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) -> np.ndarray:
-    """Return the mean normal of a surface, weighted by area; for a closed surface, the direction to
-    `target`.
-    """
+    """Return the area-weighted mean normal of a surface; of a closed one, the way to `target`."""
     faces = reference.data.polygons
     total = sum((face.normal * face.area for face in faces), Vector())
     if total.length > SOLID * sum(face.area for face in faces):

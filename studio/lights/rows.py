@@ -1,6 +1,4 @@
-"""Operations on a whole row of lights: pitch, count and length; visibility; light of one group
-alone.
-"""
+"""Operations on a row of lights: pitch, count and length; visibility; light of one group."""
 
 from __future__ import annotations
 

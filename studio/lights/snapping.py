@@ -1,6 +1,4 @@
-"""Snapping of lights to the edges of parts: a row is put onto the nearest edge, and moves snap to
-edges.
-"""
+"""Snapping of lights to edges of parts: a row is put onto the nearest edge, and moves snap."""
 
 from __future__ import annotations
 

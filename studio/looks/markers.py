@@ -52,9 +52,7 @@ def is_on(scene: bpy.types.Scene | None) -> bool:
 
 
 def wanted() -> None:
-    """Schedule a request for the markers at the next poll of the engine: something that they depend
-    on changed.
-    """
+    """Schedule a request for the markers at the next poll: something they depend on changed."""
     _request.want()
     if not is_on(bpy.context.scene):
         _shown.clear()

@@ -91,9 +91,7 @@ def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector] | None:
 
 
 def plane(scene: bpy.types.Scene) -> tuple[float, float, float, float] | None:
-    """Return the section plane as (a, b, c, d): points with a x + b y + c z + d > 0 are shown; None
-    without one.
-    """
+    """Return the plane (a, b, c, d) of the section; a x + b y + c z + d > 0 is shown."""
     looks = scene.optisense_looks
     found = bounds(scene) if looks.cut else None
     if found is None:

@@ -18,9 +18,7 @@ _prepared: int | None = None
 
 
 def prepare() -> None:
-    """Let a running engine load the renderer and compile its code while no sensor is open; once for
-    each engine.
-    """
+    """Let a new engine load the renderer and compile its code while no sensor is open."""
     global _open, _prepared
     engine = session.running()
     if bpy.app.background or engine is None or engine.pid == _prepared:

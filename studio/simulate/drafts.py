@@ -55,9 +55,7 @@ def wanted() -> None:
 
 
 def _soon() -> None:
-    """Run `_ask` at once, not at the next poll of the engine up to a twentieth of a second
-    later.
-    """
+    """Run `_ask` now, not at the next poll of the engine up to a twentieth of a second later."""
     _ask()
 
 

@@ -27,9 +27,7 @@ def resolution(scene: bpy.types.Scene) -> list[int] | None:
 
 
 def shown_size(scene: bpy.types.Scene) -> tuple[int, int] | None:
-    """Return width and height of full pictures, at which drafts are shown; None without a
-    camera.
-    """
+    """Return width and height of full pictures, the size of drafts; None without a camera."""
     cameras = objects_of(scene, "CAMERA")
     if not cameras:
         return None

@@ -40,9 +40,7 @@ class LensShading(KindModel):
 
     @abstractmethod
     def transmission(self, places: FilmPlaces) -> FloatingArray:
-        """Return the share of the light of R, G and B that reaches the sensor, (h, w, 3), above
-        0.
-        """
+        """Return the share (h, w, 3) of the light of R, G, B that reaches the sensor, above 0."""
 
     def correction(self, transmission: FloatingArray) -> FloatingArray:
         """Return the gain (h, w, 3) by which the processor undoes a transmission."""

@@ -211,9 +211,7 @@ class Dielectric(Material):
         return red, green, blue
 
     def absorption_coefficient(self) -> RGB:
-        """Return the absorption coefficient at R, G, B, 1/mm: the share exp(-coefficient d) is left
-        after d mm.
-        """
+        """Return the absorption at R, G, B, 1/mm: exp(-absorption d) is left after d mm."""
         found = np.zeros(3)
         if self.absorption is not None:
             found = np.array(self.absorption)
@@ -260,7 +258,5 @@ class Dielectric(Material):
 
 
 def critical_angle(ior: float) -> float | None:
-    """Return the angle from the normal beyond which light inside is totally reflected, degrees;
-    None for air.
-    """
+    """Return the angle of incidence, degrees, from which light inside stays there; None in air."""
     return float(np.degrees(np.arcsin(1.0 / ior))) if ior > 1.0 else None

@@ -73,9 +73,7 @@ class CameraResponse(KindModel):
         return np.round(255.0 * self.curve(linear)).astype(np.uint8)
 
     def auto_exposure(self, radiance: FloatingArray) -> float:
-        """Return the exposure, a factor on radiance, that gives a well exposed picture of radiance
-        (h, w, 3).
-        """
+        """Return the exposure, a factor on radiance (h, w, 3), for a well exposed picture."""
         light = brightest(np.asarray(radiance))
         seen = light[light > 0]
         level = float(np.percentile(seen, 95)) if seen.size else 0.0

@@ -215,9 +215,7 @@ class PictureChain:
         return np.maximum(level, self._balanced(level, transmission))
 
     def auto_exposure(self, radiance: FloatingArray) -> float:
-        """Return the exposure, a factor on radiance, that gives a well exposed picture of radiance
-        (h, w, 3).
-        """
+        """Return the exposure, a factor on radiance (h, w, 3), for a well exposed picture."""
         return self.response.auto_exposure(self.metered(radiance))
 
     def full_level(self) -> float:

@@ -39,9 +39,7 @@ def hexagon(x: FloatArray, y: FloatArray, across_flats: float) -> FloatArray:
 
 
 def strokes(x: FloatArray, y: FloatArray, lines: list[list[tuple[float, float]]]) -> FloatArray:
-    """Return the distance (...), mm, to the nearest of several polylines, each a list of points
-    (mm); it is never negative.
-    """
+    """Return the distance (...), mm, to the nearest of several polylines (lists of points, mm)."""
     nearest = np.full(x.shape, np.inf)
     for line in lines:
         for start, end in itertools.pairwise(line):

@@ -79,9 +79,7 @@ def _even(offset: FloatArray, number: int) -> FloatArray:
 def _camera_rays(
     pixels: NDArray[np.intp], size: int, within: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return starts and unit directions of a ray through each pixel, (n, 3) each; `within` is the
-    position in the pixel.
-    """
+    """Return starts and unit directions of a ray through each pixel, (n, 3) each, at `within`."""
     start = np.array([0.0, -6.0, 1.6])
     forward = -start / np.linalg.norm(start)
     right = np.array([1.0, 0.0, 0.0])

@@ -72,9 +72,7 @@ SAME_PRESSES = {"rgb2normal", "normdiff", "depth"}
 
 
 class Evaluator(Protocol):
-    """Interface of the function that workers call. It is made once per worker, so it must pickle,
-    and scores many points.
-    """
+    """Interface of the function that workers call; it pickles, and scores many points."""
 
     def __call__(self, vector: FloatArray, seed: int) -> Outcome:
         """Score the point `vector`, (n,), of the space.

@@ -58,9 +58,7 @@ class RelitEvaluator(DesignEvaluator):
         )
 
     def _names_to_watch(self) -> tuple[str, ...]:
-        """Return no names if thousands of trials follow: a further score would take longer than
-        all others of a trial.
-        """
+        """Return no names if thousands of trials follow, as further scores would take longest."""
         return () if self.brief else super()._names_to_watch()
 
     def objective_scores(

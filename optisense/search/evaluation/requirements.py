@@ -84,9 +84,7 @@ class Requirement:
         return missed if missed > ROUNDING else 0.0
 
     def margin(self, value: float) -> float:
-        """Return the distance of a value from the limit, positive on the allowed side, in the unit
-        of the quantity.
-        """
+        """Return the distance of a value from the limit, in its unit, positive if it is allowed."""
         return value - self.limit if self.at_least else self.limit - value
 
     def objective(self) -> Objective:

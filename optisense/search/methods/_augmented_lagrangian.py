@@ -113,9 +113,7 @@ class AugmentedLagrangian:
         )
 
     def _signs(self) -> FloatArray:
-        """Return the derivative of g by the quantity, (m,): 1 / limit, with a minus sign for a
-        lower limit.
-        """
+        """Return the derivative of g by the quantity, (m,): 1 / limit, negative for a lower one."""
         return np.array(
             [
                 (-1.0 if each.at_least else 1.0) / (abs(each.limit) or 1.0)

@@ -1,6 +1,4 @@
-"""Base of methods over combinations of a few levels: enumeration without repeats, and hill
-climbing.
-"""
+"""Base of methods over combinations of a few levels: enumeration, and hill climbing."""
 
 from __future__ import annotations
 

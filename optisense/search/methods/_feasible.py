@@ -157,9 +157,7 @@ class FeasibleRegion:
         return FeasiblePoint(allowed + low * way, normals)
 
     def _planes(self, unit: FloatArray, allowed: FloatArray) -> _Planes | None:
-        """Return the inequalities that move parts out of each other, or None if another constraint
-        forbids the point.
-        """
+        """Return the inequalities that move parts apart, or None if another constraint fails."""
         design, before = self._design(unit), self._design(allowed)
         for rule in self._apart:
             found = rule.meeting(design)
@@ -207,18 +205,14 @@ class FeasibleRegion:
         return _Planes(normals, normals @ unit - (depth[chosen] + GAP)[known] / length[known])
 
     def _slopes(self, part: str) -> FloatArray:
-        """Return the derivative of the vertices of a part by each coordinate, (n, v, 3), mm per
-        unit of the coordinate.
-        """
+        """Return the derivative of a part's vertices by each coordinate, (n, v, 3), mm per unit."""
         if self._moves is None:
             self._moves = jacobian(self._space, self._space.start, self._parts)
         return self._moves.parts[part]
 
 
 def _nearest(wanted: FloatArray, planes: _Planes) -> FloatArray | None:
-    """Return the point within 0 to 1 and below all planes that is nearest to a point (n,), or None
-    if there is none.
-    """
+    """Return the point within 0 to 1 and below all planes nearest to a point (n,), or None."""
     from scipy.optimize import LinearConstraint, minimize
 
     found = minimize(

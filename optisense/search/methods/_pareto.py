@@ -103,9 +103,7 @@ class Pareto(Method):
         return self._mutated(children)
 
     def _winners(self, rank: NDArray[np.int64], room: FloatArray) -> NDArray[np.int64]:
-        """Return the winners of binary tournaments, (population / 2,): the better one of two drawn
-        at random.
-        """
+        """Return the winners of binary tournaments, (population / 2,): the better of two drawn."""
         pairs = self._random.integers(len(rank), size=(self.population // 2, 2))
         one, other = pairs.T
         first = (rank[one] < rank[other]) | (

@@ -1,6 +1,4 @@
-"""Search by points spread evenly: a baseline, and a way to see how a score depends on all
-parameters.
-"""
+"""Search by points spread evenly: a baseline that shows how a score depends on all parameters."""
 
 from __future__ import annotations
 

@@ -330,9 +330,7 @@ class Gradient(Method):
         }
 
     def notes(self) -> list[str]:
-        """Return notes on where gradients are differences of scores, where the score has no
-        gradient, and why.
-        """
+        """Return notes on where gradients are differences, where scores have none, and why."""
         facts = self.describe()
         notes = []
         if facts["by_differences"]:

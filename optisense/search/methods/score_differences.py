@@ -75,9 +75,7 @@ class ScoreDifferences:
 
 
 def _room(space: BoundSpace, vector: FloatArray, way: FloatArray, most: float) -> float:
-    """Return the largest multiple of `way` (n,), at most `most`, that fits between a point (n,) and
-    the bounds.
-    """
+    """Return the largest multiple of `way` (n,), up to `most`, from a point within the bounds."""
     ahead = np.where(way > 0, space.upper - vector, vector - space.lower)
     moving = way != 0
     return float(np.min(ahead[moving] / np.abs(way[moving]), initial=most).clip(0.0))

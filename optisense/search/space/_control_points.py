@@ -126,9 +126,7 @@ def _check_symmetric(
 
 
 def shares_of(cage: Cage) -> np.ndarray:
-    """Return the present blend share of each coordinate between c_min and c_max, (N, 3); 0 where
-    both are equal.
-    """
+    """Return each coordinate's blend between c_min and c_max, (N, 3); 0 where they agree."""
     if isinstance(cage.blend, list):
         return as_array(cage.blend)
     if cage.blend is not None:

@@ -202,9 +202,7 @@ class BoundManufacturingErrors:
         return self.space.apply(self.points(errors))
 
     def points(self, errors: FloatArray) -> FloatArray:
-        """Return points (..., d) of the space for errors (..., d), clipped to the limits of the
-        design.
-        """
+        """Return points (..., d) of the space for errors (..., d), clipped to the limits."""
         return np.clip(self.space.now + errors, self.space.lower, self.space.upper)
 
 

@@ -86,9 +86,7 @@ def _may_be_as_good(trial: Trial, leader: Trial) -> bool:
 
 
 def _promising(promoted: Sequence[Trial], batch: Sequence[Trial]) -> list[Trial]:
-    """Return the trials of a batch that may be better than the promoted ones; all as long as none
-    of these leads.
-    """
+    """Return the trials of a batch that may beat the promoted ones; all while none leads."""
     leader = _leader(promoted)
     if leader is None:
         return list(batch)

@@ -87,9 +87,7 @@ class Tally:
         )
 
     def nearest_note(self) -> str:
-        """Return the conditions that the trial nearest to feasibility breaks, or "" if a trial is
-        feasible.
-        """
+        """Return the conditions that the trial nearest to feasibility breaks; "" if feasible."""
         if self._nearest is None or self._nearest.is_feasible:
             return ""
         return ", ".join(unmet(self._nearest.conditions))

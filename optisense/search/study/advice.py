@@ -89,9 +89,7 @@ def moved_start_note(space: BoundSpace) -> str | None:
 
 
 def _listed(texts: list[str]) -> str:
-    """Return one to three texts joined by commas and "and"; for more, the first two and the number
-    of the others.
-    """
+    """Return up to three texts joined by commas and "and"; of more, two and a count."""
     if len(texts) > 3:
         texts = [*texts[:2], f"{len(texts) - 2} more"]
     return " and ".join(filter(None, [", ".join(texts[:-1]), texts[-1]]))

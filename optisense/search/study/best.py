@@ -34,9 +34,7 @@ def distance(trial: Trial) -> float:
 
 
 def ranked(trials: Iterable[Trial]) -> list[Trial]:
-    """Return the trials with a score by the study's own seed that break no condition, the best
-    first, by the rule above.
-    """
+    """Return the trials scored by the study's seed that break no condition, the best first."""
     fine = [trial for trial in trials if math.isfinite(trial.score) and trial.is_feasible]
     return sorted(fine, key=lambda trial: (-trial.score, distance(trial), trial.number))
 

@@ -253,9 +253,7 @@ class StudyRun:
     def _score_fresh(
         self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int, later: float
     ) -> list[Outcome]:
-        """Score trials with other seeds; `more` such scores may follow for these trials, and
-        `later` for others.
-        """
+        """Score trials with other seeds; `more` may follow for these trials, `later` for others."""
         found: dict[int, Outcome] = {}
         self._fresh_count = self._fresh_done + len(jobs) + more
         self._expect_fresh_scores(self._fresh_count + later)

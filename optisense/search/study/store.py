@@ -343,9 +343,7 @@ class Store:
 
     @contextmanager
     def _readable(self, what: str) -> Iterator[None]:
-        """Turn errors from values that this class does not write into an error that names their
-        place.
-        """
+        """Turn errors by values that this class does not write into one that names the place."""
         try:
             yield
         except (ValueError, TypeError, RecursionError, MemoryError, OverflowError) as error:

@@ -27,9 +27,7 @@ def file_of(reference: str) -> Path | None:
 
 
 def not_trusted(references: Iterable[str]) -> list[str]:
-    """Return the references to Python files that the user has not named yet, or not in their
-    present content.
-    """
+    """Return the references to Python files not named by the user in their present content."""
     try:
         known = set(_notes().read_text(encoding="utf-8").splitlines())
     except (OSError, ValueError):

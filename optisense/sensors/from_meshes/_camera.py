@@ -109,9 +109,7 @@ def standard_resolution(model: CameraModel) -> tuple[int, int]:
 
 
 def upward(choice: CameraChoice, look: FloatArray) -> FloatArray:
-    """Return the direction to the top of the picture: as chosen, else +y, or +z if +y is near the
-    viewing direction.
-    """
+    """Return the direction to the picture's top: as chosen, else +y, or +z when looking along y."""
     if choice.up is not None:
         return vector(choice.up)
     y, z = np.eye(3)[1], np.eye(3)[2]

@@ -150,9 +150,7 @@ def from_table(choice: FromTable, table: dict[str, BoardPart]) -> list[Light]:
 
 
 def _frame(choice: FromTable, table: dict[str, BoardPart]) -> tuple[FloatArray, FloatArray]:
-    """Return the directions of the board's x, y and top as rows (3, 3), and the position of its
-    origin (3,), mm.
-    """
+    """Return the board's x, y and top as rows (3, 3), and the position of its origin (3,), mm."""
     if choice.points is None:
         normal = vector(choice.normal or "+z")
         right = vector(choice.right or "+x")

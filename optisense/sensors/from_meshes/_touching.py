@@ -1,6 +1,4 @@
-"""Contacts between parts: small gaps are closed, overlaps ranked, the sensing surface laid on the
-gel.
-"""
+"""Contacts between parts: gaps closed, overlaps ranked, the sensing surface laid on the gel."""
 
 from __future__ import annotations
 

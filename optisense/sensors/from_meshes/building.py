@@ -1,6 +1,4 @@
-"""Builder of the design of a recipe: it reads the files, closes contacts, and places lights and
-camera.
-"""
+"""Builder of the design of a recipe: files are read, contacts closed, lights and camera placed."""
 
 from __future__ import annotations
 
