@@ -15,9 +15,7 @@ BOOT_FILE = Path("/proc/sys/kernel/random/boot_id")
 """File that identifies the running kernel on Linux; absent elsewhere."""
 
 MOST_TEXT = 1_000_000
-"""Largest number of bytes of a lock file that are read; the files of a design of 1000 parts take
-40,000.
-"""
+"""Largest number of bytes read of a lock file; those of designs of 1000 parts take 40,000."""
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,7 @@ SCORE_PHOTONS = PHOTONS["fine"]
 """Default number of photons of an evaluation, whose scores are compared with one another."""
 
 SAMPLE_PHOTONS = PHOTONS["fine"]
-"""Default number of photons of results made of many pictures: datasets, perception tasks,
-calibrations.
-"""
+"""Default number of photons of results of many pictures: datasets, tasks, calibrations."""
 
 FIT_PHOTONS = 3_000_000
 """Default number of photons of the last round of a fit to photographs; the noise of the light is

@@ -18,9 +18,7 @@ from optisense.near import suggestion
 T = TypeVar("T")
 
 MOST_SUGGESTED = 20
-"""Number of names that an error lists when none is similar to a misspelt one: about two lines of a
-terminal.
-"""
+"""Number of names that an error lists if none is similar: about two lines of a terminal."""
 
 
 class Registry(Generic[T]):

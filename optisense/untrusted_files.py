@@ -54,14 +54,10 @@ MOST_TABLE = 512 * MEBIBYTE
 """Largest size of a CSV table, bytes: a dataset of a million samples has 300 MiB."""
 
 MOST_PICTURE = 512 * MEBIBYTE
-"""Largest size of a PNG file, bytes: a picture of 100 million pixels, the largest that is made, has
-less.
-"""
+"""Largest size of a PNG file, bytes: one of 100 million pixels, the largest made, has less."""
 
 MOST_STORE = 1024 * MEBIBYTE
-"""Largest size of a study's store, bytes: a trial has some 2 KiB, so this is half a million of
-them.
-"""
+"""Largest size of a study's store, bytes: a trial has some 2 KiB, this is half a million."""
 
 LARGEST_INTEGER = 2**63 - 1
 """Largest integer that is accepted in JSON: NumPy and SQLite hold no larger one."""

@@ -47,14 +47,10 @@ GelSight360 (2,989 mm2) and GelBelt (3,581 mm2) take 2.9 to 3.3 times as long as
 """
 
 USUAL_GROUPS = 3
-"""Number of light groups of GelSight Mini; the time to shade a picture grows with the number beyond
-that.
-"""
+"""Number of light groups of GelSight Mini; more lengthen the time to shade a picture."""
 
 MOST_THREADS = 8
-"""Largest number of processors that shorten the work in proportion; more are idle between short
-kernels.
-"""
+"""Largest number of processors that shorten the work; more are idle between short kernels."""
 
 SHARED_POWER = 1.4
 """Exponent of the slowdown by other processes: if work of one thread takes k times as long, that of

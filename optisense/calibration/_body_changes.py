@@ -19,9 +19,7 @@ from optisense.errors import CalibrationError
 from optisense.geometry import TriangleMesh
 
 FLAT = 0.2
-"""Largest deviation of a flat gel's skin from its plane, mm: the skin of a real GelSight Mini sags
-by as much.
-"""
+"""Largest deviation of a flat gel's skin from its plane, mm, as a real GelSight Mini sags."""
 
 STRAIGHT = 1e-3
 """Largest distance of a light from the line of its row, as a share of the row's length: far above
@@ -37,8 +35,7 @@ EDGE = "edge-"
 """Beginning of the names of faces that are edges."""
 
 WIDEST_ANGLE = 89.0
-"""Largest angle from its axis to which a spot is widened, degrees: at 90 it would be a
-half-space."""
+"""Largest angle from its axis to which a spot is widened, degrees: 90 would be a half-space."""
 
 
 def with_lights_moved(design: SensorDesign, group: str, along: float) -> SensorDesign:

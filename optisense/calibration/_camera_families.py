@@ -28,9 +28,7 @@ published camera tunings are 0.06 and less.
 """
 
 FALLOFF_START, FALLOFF_RANGE = 0.2, 0.3
-"""Share of the light that the lens loses in the picture's corners: initial value and plausible
-range.
-"""
+"""Share of the light that the lens loses in the corners: initial value and plausible range."""
 
 SHADING_POWER, SHADING_RANGE = 2.0, 0.4
 """Power of the distance with which the loss grows, initial value, and the plausible range of its
@@ -38,22 +36,16 @@ logarithm: lenses alone lose with the square or faster, and light guides add to 
 """
 
 FIELD_RANGE = 0.08
-"""Plausible range of the logarithm of the field of view: views of one type of sensor differ by a
-tenth.
-"""
+"""Plausible range of the logarithm of the field of view: those of one type differ by 1/10."""
 
 PLACE_RANGE = 0.8
 """Plausible range of the camera's position across its axis, mm; it is glued in by hand."""
 
 TURN_RANGE = 1.5
-"""Plausible range of a turn of the camera about each of its axes, degrees; it is glued in by
-hand.
-"""
+"""Plausible range of a turn of the camera about each axis, degrees; it is glued in by hand."""
 
 AHEAD_RANGE = 0.5
-"""Plausible range of the camera's position along its axis, mm: lenses are focused by moving
-them.
-"""
+"""Plausible range of the camera's position along its axis, mm: lenses are moved to be focused."""
 
 DISTORTION_RANGE = 0.1
 """Plausible range of the coefficient of radial distortion; that of wide lenses is -0.3 to 0.1."""

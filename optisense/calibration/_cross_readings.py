@@ -44,9 +44,7 @@ FLATTEST = 100.0
 sees no curvature reads it."""
 
 FEWEST = 3
-"""Smallest number of presses from which a reader can be calibrated; fewer do not represent other
-places.
-"""
+"""Smallest number of presses to calibrate a reader from; fewer do not represent other places."""
 
 FEWEST_ALONE = 7
 """Smallest number of presses of which each is read by a reader that is calibrated on the others.
@@ -64,8 +62,7 @@ coefficients of channels without light finite: with 0.1 and 100 errors are withi
 """
 
 NOISE_SEED = 0
-"""Seed of the noise that is added to the model's pictures, so that the same pictures give the same
-figures."""
+"""Seed of the noise that is added to the model's pictures, so that figures repeat."""
 
 
 @dataclass(frozen=True)

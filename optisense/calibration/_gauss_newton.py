@@ -38,9 +38,7 @@ from optisense.calibration.realism import distances
 from optisense.calibration.seen_contacts import SeenContact
 
 NEAR = 2.2
-"""Radius within which the response of a press counts, in radii of its contact; beyond, there is
-noise.
-"""
+"""Radius within which the response of a press counts, in its radii; beyond, there is noise."""
 
 LEVELS = 12.0, 253.0
 """Smallest and largest level that is compared. Above, pictures are clipped. Below, a usual tone
@@ -73,9 +71,7 @@ MOST_DESCENTS = 4
 """Largest number of descents, each with the scales of the residuals that the one before leaves."""
 
 SMALL_GAIN = 0.02
-"""Decrease of the sum of squares below which a descent ends. A number that is off by its
-uncertainty adds 1.
-"""
+"""Decrease of the sum of squares that ends a descent. A number off by its uncertainty adds 1."""
 
 LARGEST_STEP = 1.0
 """Largest change of a number in one step, in plausible ranges; the model is nearly linear there."""

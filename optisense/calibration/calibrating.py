@@ -28,8 +28,7 @@ from optisense.design import Provenance, SensorDesign, Status, set_value
 from optisense.errors import CalibrationError
 
 LEAST_PRESSES = 2
-"""Smallest number of presses of a fit: the response of a single ball could be explained by its
-position alone."""
+"""Smallest number of presses of a fit: one ball's response could be due to its place alone."""
 
 FEW_PRESSES = 6
 """Recommended number of presses: a third of them are held out, and four are fitted."""

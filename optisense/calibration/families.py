@@ -19,13 +19,10 @@ two, and their drive currents are not published.
 """
 
 LED_RANGE = 0.3
-"""Plausible range of the logarithm of a single light's power: LEDs of one reel differ by a third.
-"""
+"""Plausible range of the logarithm of a single light's power: LEDs of one reel differ by 1/3."""
 
 LIGHT_PLACE_RANGE = 0.7
-"""Plausible range of a light group's position along the camera's axis, mm: half an LED's
-package.
-"""
+"""Plausible range of a light group's place along the camera's axis, mm: half an LED's package."""
 
 LIGHT_TILT_RANGE = 8.0
 """Plausible range of the tilt of a light group, degrees; it may not be soldered flat."""
@@ -41,9 +38,7 @@ past the parts that they shine into.
 """
 
 WIDTH_RANGE = 0.3
-"""Plausible range of the logarithm of the width of the emission: windows of one package differ by a
-third.
-"""
+"""Plausible range of the logarithm of the emission's width: windows of a package differ by 1/3."""
 
 THICKNESS_RANGE = 0.05
 """Plausible range of the logarithm of a gel's thickness; GelSight states 5 % for its Mini."""
@@ -60,9 +55,7 @@ lie between 0.1 and 0.6.
 """
 
 REFLECTANCE_RANGE = 0.3
-"""Plausible range of the logarithm of a coating's reflectance: paints of one grey differ by a
-third.
-"""
+"""Plausible range of the logarithm of a coating's reflectance: paints of a grey differ by 1/3."""
 
 ROUGH_START, ROUGH_RANGE = 0.1, 0.2
 """GGX alpha of edges that are polished by flame or cut by laser, initial value and plausible range;
@@ -70,9 +63,7 @@ ground edges have about 0.4.
 """
 
 INDEX_RANGE = 0.015
-"""Plausible range of a refractive index; values in the literature of one silicone differ by up to
-0.04.
-"""
+"""Plausible range of a refractive index; literature on one silicone differs by up to 0.04."""
 
 
 @dataclass(frozen=True)

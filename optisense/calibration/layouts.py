@@ -42,9 +42,7 @@ MOST_PRESSES = 1000
 """Largest number of photographs that are read; six determine a sensor, so more are an error."""
 
 MIDDLE = 0.5
-"""Offset from indices of pixels, by which other tools label contacts, to positions from the
-picture's edge.
-"""
+"""Offset from other tools' indices of pixels to positions from the picture's edge."""
 
 Reader = Callable[[Path, float | None], Photographs]
 

@@ -24,9 +24,7 @@ LEAST_SIDE = 32
 """Smallest shorter side of a photograph, in pixels: in smaller ones, contacts have a few pixels."""
 
 FULL_LEVEL, FULL_SHARE = 255, 0.005
-"""Level of a saturated channel, and the share of saturated pixels above which a picture counts as
-overexposed.
-"""
+"""Level of a saturated channel, and the share of such pixels in an overexposed picture."""
 
 DARK_LEVEL = 16.0
 """Level that a twentieth of the pixels of the brightest channel should exceed; a picture whose

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from optisense.design import SensorDesign
 
 MOST_WARNINGS = 40
-"""Largest number of lines about problems of a design; the others are counted, so that the end stays
-in sight.
-"""
+"""Largest number of lines about problems of a design, to see the end; others are counted."""
 
 
 @handles_errors

@@ -26,9 +26,7 @@ LEAST_SHOWN = 5e-5
 """Smallest share of a group's light that the table shows: smaller ones round to 0.00 %."""
 
 LEAST_EXIT = 0.005
-"""Smallest share of a group's light for which a face through which it escapes is listed, half a per
-cent.
-"""
+"""Smallest share of a group's light that a listed face lets escape, half a per cent."""
 
 
 @handles_errors

@@ -25,9 +25,7 @@ REFRESHES = 4
 """Redraws of the live progress line per second; more would not be seen and take processor time."""
 
 MOST_BAR, LEAST_BAR = 30, 8
-"""Largest and smallest width of the bar, in columns; it is omitted if there is less room than the
-smallest.
-"""
+"""Largest and smallest width of the bar, columns; with less room than that it is omitted."""
 
 
 class ProgressLine:

@@ -14,9 +14,7 @@ if TYPE_CHECKING:
     from optisense.search import Study
 
 POLL_INTERVAL = 1.0
-"""Interval between checks of the study's files, s; trials that end within one are shown
-together.
-"""
+"""Interval between checks of the study's files, s; trials that end in one are shown together."""
 
 
 def watch(study: Path, port: int, pictures: bool) -> None:

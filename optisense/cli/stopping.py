@@ -30,9 +30,7 @@ EXIT_TERMINATED = 143
 """Exit code after SIGTERM: 128 and the number of the signal, as shells count."""
 
 SILENCE = 1.0
-"""Time after Ctrl-C in which a command may end without printing what it waits for, s; most end
-sooner.
-"""
+"""Time after Ctrl-C to end without printing what the command waits for, s; most end sooner."""
 
 GRACE = 1.5
 """Time after a second signal in which the command may still end by itself, s: enough to remove

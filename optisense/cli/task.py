@@ -60,23 +60,17 @@ PICTURES = "pictures"
 """Name of the progress step of reconstructions."""
 
 SAMPLE_WORK, PICTURE_WORK = 0.23, 0.25
-"""Processor time of a sample of the tasks, and of a picture of a reconstruction, s; measured on
-GelSight Mini.
-"""
+"""Processor time of a task's sample, and of a reconstruction's picture, s; on GelSight Mini."""
 
 LIBRARIES_TIME = 1.0
-"""Time to load scikit-learn and the other libraries of the tasks, s, for the estimate of the time
-left.
-"""
+"""Time to load scikit-learn and other libraries of the tasks, s, for the time left."""
 
 USUAL_OBJECTS = 3
 """Number of objects that a reconstruction task presses by default, those of
 `optisense.tasks._reconstruction.unseen_objects`, which loads slowly."""
 
 READING_TIME, FITTING_TIME = 1.0, 3.0
-"""Time after the samples of the tasks to read them, and after the pictures of a reconstruction to
-fit them, s.
-"""
+"""Time to read the samples of the tasks, and to fit the pictures of a reconstruction, s."""
 
 
 @task_app.command()

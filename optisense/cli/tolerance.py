@@ -31,9 +31,7 @@ if TYPE_CHECKING:
     from optisense.search.tolerance.sensitivity import Estimate
 
 LOADING, FIRST, SENSORS = "loading", "the nominal design", "sensors"
-"""Steps of the progress; the last two are those of `optisense.search.tolerance.analysis`, which
-loads slowly.
-"""
+"""Steps of the progress; the last two are those of `tolerance.analysis`, which loads slowly."""
 
 JSON_FILE = "tolerance.json"
 REPORT_FILE = "tolerance.html"

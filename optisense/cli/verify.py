@@ -34,9 +34,7 @@ PICTURE_WORK = 0.4
 """Processor time of a picture with an object and of reading it, s; measured on GelSight Mini."""
 
 LIBRARIES_TIME = 1.0
-"""Time to load scikit-learn and the other libraries of the tasks, s, for the estimate of the time
-left.
-"""
+"""Time to load scikit-learn and other libraries of the tasks, s, for the time left."""
 
 FITTING_TIME = 5.0
 """Time of the fits of a sensor's three readers, s, for the estimate of the time left."""

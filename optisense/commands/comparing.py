@@ -11,9 +11,7 @@ from optisense.commands.options import CommandOptions, OptionNotation, Photons, 
 from optisense.quality import FIT_PHOTONS, PICTURE_PHOTONS
 
 LARGEST_BALL = 1000.0
-"""Largest diameter of a ball, mm; sensors are far smaller, so a larger value is an error of the
-unit.
-"""
+"""Largest diameter of a ball, mm; sensors are far smaller, so larger values have a wrong unit."""
 
 
 def _family(name: str) -> str:

@@ -24,9 +24,7 @@ MOST_ITEMS = 10_000_000
 """Largest number of samples, trials or sensors that may be asked for; more would take years."""
 
 EXPOSURES = (1e-9, 1e9)
-"""Smallest and largest factor on the radiance; those of the built-in sensors are from 10 to
-1000.
-"""
+"""Smallest and largest factor on the radiance; built-in sensors have factors of 10 to 1000."""
 
 MOST_SEED = 2**32 - 1
 """Largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""

@@ -159,19 +159,13 @@ class ReconstructionOptions(PictureOptions):
 
 
 ALL_OBJECTS = 12
-"""Number of objects in `optisense.geometry.objects`, which is not imported here because it is
-slow.
-"""
+"""Number of objects in `optisense.geometry.objects`, which is too slow to be imported here."""
 
 QUICK_OBJECTS = ("screw-head", "coin", "cable", "wedge", "nut", "bean")
-"""Objects of a quick verification: the fewest by which a difference can be detected, with different
-shapes.
-"""
+"""Objects of a quick verification: the fewest that show a difference, of different shapes."""
 
 QUICK_WIDTH = 160
-"""Width of the pictures of a quick verification, in pixels; objects of 5 mm then cover 1000 or
-more.
-"""
+"""Width of the pictures of a quick verification, pixels; objects of 5 mm cover 1000 or more."""
 
 PLACES, QUICK_PLACES = 3, 2
 """Presses of each object, usual and quick: the fewest whose spread is informative, and the fewest

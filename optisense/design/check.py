@@ -29,9 +29,7 @@ __all__ = ["check_design", "inside"]
 OPAQUE_ROLES = frozenset({Role.BLOCKER, Role.MIRROR, Role.INDENTER})
 
 PROBE = 0.05
-"""Distance from the sensing surface at which its medium is looked up, mm; less than the thickness
-of any gel.
-"""
+"""Distance from the sensing surface to look up its medium, mm; less than any gel's thickness."""
 
 PROBES = 64
 """Number of faces, spread over the sensing surface, beside which its medium is looked up; all faces

@@ -13,9 +13,7 @@ from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 
 MOST_OF_A_GAS = 1.002
-"""Largest refractive index of a gas: air has 1.0003, and at atmospheric pressure no gas has more
-than 1.002.
-"""
+"""Largest refractive index of a gas: at atmospheric pressure none has more; air has 1.0003."""
 
 LEAST_OF_A_SOLID = 1.29
 """Smallest refractive index of a clear solid, that of the fluoropolymer Teflon AF 2400 (assumed:

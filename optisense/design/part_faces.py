@@ -16,9 +16,7 @@ from optisense.geometry.patches import angle_to_nearest, faces_towards
 from optisense.near import suggestion
 
 BOX_TOLERANCE = 1e-6
-"""Distance by which faces may protrude from a box that selects them, mm; it covers rounding of
-coordinates.
-"""
+"""Distance by which faces may protrude from a box that selects them, mm, for rounding."""
 
 
 def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> None:

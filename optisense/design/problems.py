@@ -16,9 +16,7 @@ from optisense.near import near_match, suggestion
 from optisense.text import brief
 
 MAX_SHOWN = 8
-"""Number of problems that one message lists; the others are counted, so that a message fits a
-terminal.
-"""
+"""Number of problems that a message lists, to fit a terminal; the others are counted."""
 
 MAX_EXAMINED = 100
 """Largest number of problems of one file that are put into words; a damaged file may have hundreds

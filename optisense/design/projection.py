@@ -16,9 +16,7 @@ folding; the borders and the corners, where lenses fold first, are among them.
 """
 
 FOLD_STEPS = 24
-"""Number of steps from the optical axis to each of the positions at which a lens is tested for
-folding.
-"""
+"""Number of steps from the axis to each of the positions where a lens is tested for folding."""
 
 UNDISTORTED_TO = 1e-9
 """Largest error on the image plane of a position that is undistorted and distorted again; a lens

@@ -17,9 +17,7 @@ if TYPE_CHECKING:
     from optisense.design.sensor_design import SensorDesign
 
 OFF_VERTICES = 1e-7
-"""Height, mm, above the plane that is assumed for vertices in the plane, so that no vertex is on
-it.
-"""
+"""Height, mm, over the plane that is assumed for vertices in it, so that no vertex is on it."""
 
 
 class Outline(NamedTuple):

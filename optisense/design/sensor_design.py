@@ -25,9 +25,7 @@ from optisense.near import suggestion
 from optisense.text import to_html
 
 SCHEMA_VERSION = 1
-"""Version of the design file's format; it is increased when files of an older version have to be
-converted.
-"""
+"""Version of the design file's format; it grows when older files have to be converted."""
 
 MOST_OF_A_KIND = 1000
 """Largest number of materials, parts, light groups or cages of one design; the built-in sensors
@@ -36,9 +34,7 @@ square.
 """
 
 MOST_NOTES = 20_000
-"""Largest number of values of one design with a recorded source, each in three lines of the
-file.
-"""
+"""Largest number of values of one design with a source, each in three lines of the file."""
 
 MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Role.MIRROR})
 

@@ -25,9 +25,7 @@ from optisense.writing import inside, written_together
 
 DESIGN_FILE = "design.yaml"
 MOST_TRIANGLES = 3_000_000
-"""Largest number of triangles of all parts of a design together; the largest built-in sensor has
-53,000.
-"""
+"""Largest number of triangles of a design's parts; the largest built-in sensor has 53,000."""
 
 HEAD = "Sensor design. Lengths in mm, angles in degrees, powers in mW."
 

@@ -19,8 +19,7 @@ from optisense.text import brief
 from optisense.untrusted_files import COPY_AGAIN, MOST_TEXT, read_text
 
 MAX_DEPTH = 50
-"""Largest depth of nested lists and mappings in a YAML file; a deeper file would exhaust Python's
-stack."""
+"""Largest depth of nesting in a YAML file; a deeper file would exhaust Python's stack."""
 
 MAX_VALUES = 300_000
 """Largest number of values in a YAML file, which take two seconds to read; a design with cages of

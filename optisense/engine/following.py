@@ -24,8 +24,7 @@ POLL_INTERVAL = 0.25
 reading takes long."""
 
 LOOKING_SHARE = 0.05
-"""Largest share of the time that readings of a study may take, so that they do not slow the search
-noticeably."""
+"""Largest share of the time for readings of a study, so that they hardly slow the search."""
 
 MOST_AT_ONCE = 20
 """Largest number of trials that a reading reports one by one, as many as a list in a front end

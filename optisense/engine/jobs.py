@@ -13,8 +13,7 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.protocol import RequestId
 
 EVENTS_EVERY = 0.1
-"""Shortest interval between two progress events of a request, s: about as fast as a person can
-follow them."""
+"""Shortest interval between two progress events of a request, s: as fast as people follow."""
 
 LONGEST_WAIT = 3.0
 """Longest time that a render waits for short work at each of its safe points, s: that of an import

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage
 
 DRAFT_WIDTH = 160
-"""Width of a draft, in pixels; it has a quarter of the pixels of an image that is 320 pixels wide.
-"""
+"""Width of a draft, in pixels; it has a quarter of the pixels of an image 320 pixels wide."""
 
 NUDGE = 1e-3
 """Distance (mm) by which a light is moved to prepare drafts of moved lights. Any distance above 0

@@ -21,8 +21,7 @@ from optisense.errors import OptiSenseError
 from optisense.geometry.step import BODIES_FILE, ERROR_FILE, bodies_of
 
 LONGEST = 600
-"""Largest processor time (s) for one file; the largest STEP files of sensors take about a
-minute."""
+"""Largest processor time (s) for one file; the largest STEP files of sensors take a minute."""
 
 MOST_MEMORY = 16 * 2**30
 """Largest address space (bytes) for one file; 64 MiB of STEP take some 4 GiB."""

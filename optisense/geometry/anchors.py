@@ -18,8 +18,7 @@ _NEAREST, _LARGEST = 64, 256
 of all, whose centres may be far from points on them. A vertex of a mesh has six faces on average,
 and parts have few large faces."""
 _SLACK = 1e-4
-"""Barycentric weight by which a point may lie outside a face: 1e-4 of the face's size, for
-rounding."""
+"""Barycentric weight by which a point may be outside a face: 1e-4 of its size, for rounding."""
 
 
 @dataclass(frozen=True)

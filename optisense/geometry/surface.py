@@ -25,8 +25,7 @@ WALL_ANGLE = 60.0
 It is well above the 40 degrees of a spherical pad, and below the 90 degrees of a finger's wall."""
 
 WALL_SHARE = 0.5
-"""Smallest share of a fingertip's area that belongs to its wall. The sides of a flat pad have a
-smaller share."""
+"""Smallest share of a fingertip's area that belongs to its wall; flat pads have less."""
 
 WALL_SECTORS = 8
 """Number of sectors of azimuth that must all contain a wall. A cylindrical skin has walls in two

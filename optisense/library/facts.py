@@ -21,8 +21,7 @@ UNITS = {
     "pixel_size": "micrometres",
     "focal_length": "mm",
 }
-"""Units of the fields of an entry beside its value, and of a camera; those of a kind are in its
-class."""
+"""Units of the fields of an entry beside its value, and of a camera; kinds have theirs."""
 
 LONGEST_TABLE = 4
 """Largest number of rows of a table that is shown number by number: a colour matrix has three, and

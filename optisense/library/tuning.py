@@ -31,15 +31,13 @@ room lighting. Tactile sensors have no white light of their own to balance by.
 """
 
 LARGEST_FILE = 4_000_000
-"""Largest size of a tuning file, bytes: forty times that of the largest of libcamera's own, some
-100,000."""
+"""Largest size of a tuning file, bytes: forty times that of libcamera's largest, 100,000."""
 
 ROUNDING = 5
 """Number of decimals that are kept of computed values, as many as the files have at most."""
 
 LEAST_DETERMINANT = 1e-3
-"""Smallest determinant of a colour matrix that can be inverted; those of real cameras have some 2
-to 10."""
+"""Smallest determinant of a colour matrix that can be inverted; real ones have some 2 to 10."""
 
 NO_TUNING = "Name a tuning file of libcamera for the Raspberry Pi, such as imx219.json"
 

@@ -40,8 +40,7 @@ COARSE_STEP = 16
 """Step in which the number of points of the coarse grid along a side grows, so that contacts of
 similar sizes share its kernels."""
 MAX_COARSE = 400
-"""Largest number of points of the coarse grid along a side, which bounds the time of its
-transform."""
+"""Largest number of points of the coarse grid along a side, which bounds its transform's time."""
 
 
 class Nearby(NamedTuple):

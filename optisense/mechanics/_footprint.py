@@ -27,8 +27,7 @@ squares of the grid are not visible at rims of wide contacts."""
 MAX_POINTS = 480
 """Largest number of grid points along a side; an iteration then takes about 40 ms."""
 NO_OVERLAP = -1e3
-"""Value of the overlap (mm) where there is no skin or no indenter: a gap that no displacement
-closes."""
+"""Value of the overlap (mm) without skin or indenter: a gap that no displacement closes."""
 DOES_NOT_REACH = "an indenter does not reach the sensing surface"
 """Message of the error for a contact without overlap."""
 PITCHES_PER_OCTAVE = 8

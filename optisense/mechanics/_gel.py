@@ -43,8 +43,7 @@ FORCE_TOLERANCE = 2e-4
 """Relative error of the depth at which a wanted force counts as found: 0.03 % of the force."""
 
 KEPT_DEPTHS = 256
-"""Number of contacts for which a gel keeps the depth found for their force; an entry is a few
-numbers."""
+"""Number of contacts whose depth by force a gel keeps; an entry is a few numbers."""
 
 USUAL_THICKNESS = 4.0
 """Thickness (mm) of the gel in designs without an elastomer, about that of a GelSight Mini."""

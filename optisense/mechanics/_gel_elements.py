@@ -13,8 +13,7 @@ from optisense.mechanics._gel_columns import LAYERS, GelColumns
 from optisense.mechanics._hexahedra import face_points, stiffnesses
 
 AT_ONCE = 128
-"""Number of elements whose matrices are computed together: at 4.6 kB each, they fit in a
-processor's cache."""
+"""Number of elements whose matrices are computed at once: 4.6 kB each, for the cache."""
 SIDES = ((0, 1, 1.0), (2, 3, -1.0), (0, 2, -1.0), (1, 3, 1.0))
 """Corners of each side of a cell along its run, and the sign that makes run x up point outward."""
 OPPOSITE = ((2, 3), (0, 1), (1, 3), (0, 2))

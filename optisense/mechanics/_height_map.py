@@ -12,8 +12,7 @@ LEAST_UPRIGHT = 0.05
 """Smallest z of unit shading normals with which the heights of a triangle are curved. Steeper
 triangles (87 degrees and more) are flat, as their tangent planes have no reliable height."""
 PIXELS_AT_ONCE = 4_000_000
-"""Number of pairs of a triangle and a grid point that are processed together; they take about 200
-MB."""
+"""Number of pairs of a triangle and a grid point that are processed at once, about 200 MB."""
 
 SLACK = 1e-6
 """Distance from an edge, as a share of its height and of the pitch, within which grid points are

@@ -7,8 +7,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 
 CORNERS = np.array([(x, y, z) for z in (-1, 1) for y in (-1, 1) for x in (-1, 1)], dtype=np.float64)
-"""Corners (8, 3) of the reference cell, in the order of an element's nodes: x runs first, then y,
-then z."""
+"""Corners (8, 3) of the reference cell, in the order of an element's nodes: x first, z last."""
 GAUSS = CORNERS / np.sqrt(3.0)
 """Points (8, 3) of the Gauss rule of order 2 in each direction; all weights are 1."""
 FACE_GAUSS = np.array([(x, y) for y in (-1, 1) for x in (-1, 1)]) / np.sqrt(3.0)

@@ -14,8 +14,7 @@ TOLERANCE = 2e-4
 """Ratio of the largest remaining gap or overlap inside the contact to the largest initial overlap
 at which the iteration ends: 0.16 micrometres for a press of 0.8 mm."""
 MAX_ITERATIONS = 400
-"""Number of iterations after which the solver fails; smooth contacts take 10 to 30, rough ones
-100."""
+"""Number of iterations after which the solver fails; smooth contacts take 30, rough ones 100."""
 
 
 class NormalContact(NamedTuple):

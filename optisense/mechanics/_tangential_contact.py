@@ -14,8 +14,7 @@ TOLERANCE = 1e-4
 """Relative change of the shear (root of the sum of squares) in a step at which the iteration ends,
 far below the accuracy of friction coefficients."""
 MAX_ITERATIONS = 1000
-"""Number of iterations after which the solver fails; contacts of 64 points across take 50 to
-150."""
+"""Number of iterations after which the solver fails; contacts 64 points wide take 50 to 150."""
 
 
 class Drag(NamedTuple):

@@ -18,13 +18,11 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 COVERAGE_WEIGHT = 0.01
-"""Weight k1 of the paper. Coverage hardly affects the value at this weight, so that it is reported
-beside it."""
+"""Weight k1 of the paper, with which coverage, reported beside the value, hardly counts."""
 
 
 LEAST_PIXELS = 100
-"""Smallest number of pixels that must see the surface, as a mean over fewer says little about a
-camera."""
+"""Smallest number of pixels that must see the surface; a mean over fewer says little."""
 
 
 def bounds(*, coverage_weight: float) -> tuple[float, float]:
@@ -33,8 +31,7 @@ def bounds(*, coverage_weight: float) -> tuple[float, float]:
 
 
 USUAL = (0.24, 1.0)
-"""Values of the poorest and the best built-in sensor: GelSight Svelte, and the spherical
-GelSight Mini."""
+"""Values of the poorest and best built-in sensor: GelSight Svelte, spherical GelSight Mini."""
 
 
 @objective(

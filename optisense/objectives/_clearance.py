@@ -29,8 +29,7 @@ starts, as the nearest pair may lead to a local minimum.
 """
 
 SAMPLED = 1500
-"""Number of places of each part among which these pairs are found; all distances between them take
-10 ms."""
+"""Number of places of each part among which these pairs are found, which takes 10 ms."""
 
 STEPS = 6
 """Number of steps of alternating projections between two parts: each step shortens the distance,

@@ -29,8 +29,7 @@ MOST_ANISOTROPY = 1e3
 long footprint; single-precision points resolve ratios up to about this one."""
 
 LEAST_FOOTPRINTS = 100
-"""Number of footprints that must lie on the surface: a mean over fewer says little about a
-camera."""
+"""Number of footprints that must lie on the surface: a mean over fewer says little."""
 
 HIGH_SHARE = 95.0
 """Percentile of the anisotropy reported beside its mean: one footprint in twenty is longer."""

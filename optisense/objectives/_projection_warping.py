@@ -23,15 +23,13 @@ edge crosses a fold or a gap. On a smooth surface neighbouring edges differ by a
 2.4, which occurs where the surface is seen edge-on."""
 
 BAND = 24
-"""Number of rows of an image that are processed at once, so that they fit into the processor's
-cache."""
+"""Number of rows of an image that are processed at once, which the processor's cache holds."""
 
 MOST_EVEN = 1e-6
 """Relative deviation below which differences are rounding of single-precision points."""
 
 LEAST_TRIANGLES = 100
-"""Smallest number of triangles between pixels on the surface, as the deviation of fewer is due to
-chance."""
+"""Smallest number of triangles between pixels on the surface; fewer deviate by chance."""
 
 MOST_JUMP = 1000.0
 """Largest value of the setting ``jump``; no edge is so many times as long as its neighbours, so

@@ -30,8 +30,7 @@ if TYPE_CHECKING:
 CAMERA_NOISE = MEASURED_NOISE
 
 MOST_NOISE = 128.0
-"""Upper bound on the camera noise (levels of 255), half of the range, above which a picture is
-unusable."""
+"""Upper bound on the camera noise (levels of 255): half of the range makes pictures useless."""
 
 PIXELS_A_PRESS = 600
 """Approximate number of pixels of a contact that are read: every second one along rows and columns

@@ -35,8 +35,7 @@ if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel, RenderProgress, TactileImage
 
 ProgressCallback = Callable[[float, str], None]
-"""A function that is called with the finished fraction (0 to 1) of the work and the name of the
-current step."""
+"""A function called with the finished fraction (0 to 1) of the work and the step's name."""
 
 Reads = Callable[[Press], NDArray[np.float64]]
 """A function that returns for an unexposed press the importance (h, w) of each pixel to objectives:

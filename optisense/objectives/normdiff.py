@@ -53,12 +53,10 @@ CELL = 3.0
 below the confusion of the built-in sensors (34 degrees and more)."""
 
 RING = 10_000
-"""Multiplier of the number of a ring in the number of a normal, larger than the number of normals
-on any ring."""
+"""Multiplier of a ring's number in a normal's number, above the number of normals on a ring."""
 
 LEAST_PIXELS = 50
-"""Number of indented pixels below which a press has no score, as fewer distinguish normals by
-chance."""
+"""Number of indented pixels below which a press has no score, as few differ by chance."""
 
 MOST_WEIGHT = 100.0
 """Largest weight of a range in the sum; at this weight the other range hardly counts."""

@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 DIRECTIONS = 8
-"""Number of lines through the middle of a ball: the OptiSense paper takes the cardinal and ordinal
-directions."""
+"""Number of lines through a ball's middle: cardinal and ordinal, as in the OptiSense paper."""
 
 COLOURS = "picture"
 """Kind of colours (see `Press.colours`) that the score reads: those of the stored picture."""

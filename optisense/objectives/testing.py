@@ -26,8 +26,7 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 PIXELS = (160, 120)
-"""Resolution of the images that the contract tests score, which keeps a test of an objective to a
-few seconds."""
+"""Resolution of the images that contract tests score, which then take a few seconds."""
 PHOTONS = 300_000
 """Number of photons of these images, small enough for a test of a few seconds."""
 

@@ -19,8 +19,7 @@ FAINTEST = 0.3
 """Darkness from which on pixels belong to a dot, over the greatest darkness near it; shading by
 lights is fainter than ink."""
 LEAST_DARKNESS = 10.0
-"""Smallest difference (levels of 255) between a dot and its surroundings, several times the noise
-of a camera."""
+"""Smallest difference (levels of 255) of a dot from its surroundings, above camera noise."""
 
 
 def dots_in_picture(picture: NDArray[np.uint8], at_rest: FloatArray) -> FloatArray:

@@ -13,14 +13,10 @@ from optisense.array_types import FloatArray
 from optisense.objectives.frames import nearest_press
 
 LEAST_PIXELS = 12
-"""Smallest number of pixels that a visible ball covers (about 4 x 3); smaller ones can't be made
-out.
-"""
+"""Smallest number of pixels of a visible ball (about 4 x 3); smaller ones can't be made out."""
 
 LEAST_PIECE = 6
-"""Smallest number of pixels of a separate piece of a ball, as a mirror's edge cuts it, that gets an
-outline.
-"""
+"""Smallest number of pixels of a piece of a ball, cut by a mirror's edge, with an outline."""
 
 
 LETTERS = 10.0

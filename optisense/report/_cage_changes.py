@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 STILL = 1e-6
-"""Largest displacement of a control point that counts as unmoved, mm; rounding of a blend stays
-below.
-"""
+"""Largest displacement of a control point that is unmoved, mm; a blend's rounding is below."""
 
 MOST_LAYERS = 4
 """Largest number of panels of a figure: the layers of the lattice whose points moved farthest."""

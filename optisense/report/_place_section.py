@@ -21,14 +21,10 @@ WAY_COLOURS = ("#0f7a41", "#6fc07a", "#4b3f8f", "#bf7a4a", "#f2c27b")
 """Colours of the light's paths, in the order of `optisense.optics.place_light.WAY_WORDS`."""
 
 LEAST_LABELLED = 0.12
-"""Smallest share of a bar that has room for its number, such as 12 %, beside the drawing of
-directions.
-"""
+"""Smallest share of a bar with room for its number, such as 12 %, beside the directions."""
 
 SKY_RADIUS = 90.0
-"""Radius of the drawing from the normal of the skin, in the middle, to its horizon: one unit per
-degree.
-"""
+"""Radius of the drawing from the skin's normal, in the middle, to its horizon: 1 per degree."""
 
 
 def places_values(places: Sequence[PlaceLight], design: SensorDesign) -> list[dict[str, Any]]:

@@ -23,14 +23,10 @@ if TYPE_CHECKING:
     from optisense.report._trial_marks import Marks
 
 MOST_PANELS = 12
-"""Largest number of parameters that are drawn: those with the strongest association with the
-score.
-"""
+"""Largest number of parameters drawn: those with the strongest association with the score."""
 
 COLUMNS = 4
-"""Number of panels beside one another in a figure; their labels stay readable at the page's
-width.
-"""
+"""Number of panels side by side in a figure; their labels stay readable at the page's width."""
 MOST_NUMBERED = 8
 """Largest number of trials of a front that are labelled with their number."""
 

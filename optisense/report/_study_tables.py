@@ -21,14 +21,10 @@ MOST_TRIALS = 200
 """Largest number of trials in the table, the best ones; a page with thousands would load slowly."""
 
 MOST_CHANGES = 40
-"""Largest number of parameters in the list of changes, the largest change first; a longer list is
-not read.
-"""
+"""Largest number of parameters in the list of changes, largest first, for readability."""
 
 MOST_CAUSES = 10
-"""Largest number of causes of failure in the table, the most frequent ones; the others are counted
-together.
-"""
+"""Largest number of causes of failure in the table, by frequency; the others are counted."""
 
 WORSE = 0.02
 """Relative change of a ray measure below which it does not count as worse; smaller changes may come

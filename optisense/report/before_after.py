@@ -21,8 +21,7 @@ if TYPE_CHECKING:
     from optisense.optics import OpticalModel
 
 ACROSS = 320
-"""Width of each of the two pictures that are compared, in pixels: both fit beside each other on a
-page."""
+"""Width of each of the two pictures compared, pixels: both fit side by side on a page."""
 
 STRETCHED = 90.0
 """Percentile of the pixels' stretching that represents the worst tenth."""

@@ -34,9 +34,7 @@ ends at 1.6 radii.
 """
 
 LEAST_CUT = 24
-"""Smallest half of the side of the pictures of a press, in pixels; a smaller picture shows no
-detail.
-"""
+"""Smallest half of the side of the pictures of a press, pixels; smaller ones show no detail."""
 
 COLOURS = {"R": "#c0392b", "G": "#2e8b57", "B": "#1f6fb2"}
 """Colours of the curves of the channels."""

@@ -19,9 +19,7 @@ USUAL_RADIUS = 0.1
 about that of usual contacts, so that it needs little change."""
 
 DOT = 0.006
-"""Radius of the dot in a contact's middle, as a share of the picture's width; the handle has twice
-the size.
-"""
+"""Radius of the dot in a contact's middle, in widths of the picture; the handle's is twice that."""
 
 
 def write_contacts(

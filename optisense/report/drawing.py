@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 DOTS_PER_INCH = 110
-"""Resolution of figures, in dots per inch, at which they are as wide as the page's text on a usual
-screen.
-"""
+"""Resolution of figures, dots per inch, which makes them as wide as the page's text."""
 
 BLUE, RED, GREY, PALE, AMBER = "#1f6fb2", "#c0392b", "#7b8794", "#c6d4e1", "#d98c1f"
 """Colours of trials, the best trial, the start, backgrounds, and failures."""

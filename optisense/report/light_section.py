@@ -30,22 +30,16 @@ of a render.
 """
 
 PHOTONS_PER_LIGHT = 100
-"""Smallest number of photons per light of a ledger, so that no light goes unnoticed beside many
-others.
-"""
+"""Smallest number of photons per light of a ledger, so that none goes unnoticed among many."""
 
 LEAST_DRAWN = 0.005
-"""Smallest share of a group's light for which a place is drawn on its own; smaller ones are drawn
-together.
-"""
+"""Smallest share of a group's light whose place is drawn alone; smaller ones share a drawing."""
 
 LEAST_TOLD = 0.0005
 """Smallest share that the table shows as a number: 0.1 % when rounded."""
 
 LEAST_LABELLED = 0.09
-"""Smallest share of a bar that has room for its number, also on a telephone's screen of 390
-pixels.
-"""
+"""Smallest share of a bar that has room for its number, also on a screen of 390 pixels."""
 
 OTHER = "other places"
 OTHER_COLOUR = "#9aa5b1"

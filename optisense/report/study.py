@@ -37,9 +37,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_COLUMNS = 8
-"""Largest number of parameters in the table of trials: those with the strongest association with
-the score.
-"""
+"""Largest number of parameters in the table of trials: those most associated with the score."""
 
 FEW_CHANGES = 8
 """Number of rows of a table of changes that are shown at first; the others are folded away."""

@@ -20,9 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 WORST_ANGLE = 30.0
-"""Angle at the end of the colour scale for a normal's error, degrees; few normals are off by
-more.
-"""
+"""Angle at the end of the colour scale for a normal's error, degrees; few are off by more."""
 
 BESIDE = 1.0
 """Margin around a contact in pictures, as a share of the contact's size."""

@@ -24,9 +24,7 @@ LEAST_PIECE = 0.1
 object touches before its neighbours."""
 
 MOST_CUTS = 4
-"""Number of times that a gel is halved, into at most 16 slices. Each is one more body for the
-physics engine.
-"""
+"""Number of times that a gel is halved, into 16 bodies at most for the physics engine."""
 
 
 def depth_in(points: FloatArray, hull: ConvexHull) -> FloatArray:

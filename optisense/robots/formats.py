@@ -44,9 +44,7 @@ ROBOT_FORMATS: Registry[RobotFormat] = Registry(
     {"mujoco": "optisense.robots.formats:MJCF", "urdf": "optisense.robots.formats:URDF"},
     must_be(RobotFormat, OutputError, "robot format"),
 )
-"""Registry of all formats; other packages add theirs under the entry-point group
-`optisense.robot_formats`.
-"""
+"""Registry of all formats; other packages add entry points `optisense.robot_formats`."""
 
 
 def export_robot(

@@ -75,8 +75,7 @@ TAPE_INDEX = 1.49
 """Refractive index of the clear tape; its provenance is in `_gelbelt_sources`."""
 
 ROLLER_CLEARANCE = 1.0
-"""Distance in mm between the window and the small roller; its provenance is in
-`_gelbelt_sources`."""
+"""Distance between the window and the small roller, mm; `_gelbelt_sources` has its provenance."""
 WHEEL_GAP = 0.02
 """Smallest air gap between belt and wheels, mm, so that they are not in optical contact."""
 BESIDE_WINDOW = 0.5
@@ -86,9 +85,7 @@ BEHIND_ROLLER = 2.0
 """Distance from the roller to the target of green light in light design 3, mm, an assumption: the
 light is aimed just past the roller."""
 GREEN_LEAD = 3.0
-"""Ratio of green's power to that of red and blue, because green has a longer path from one end
-only.
-"""
+"""Ratio of green's power to that of red and blue, as it has a longer path from one end only."""
 WRAP = 90.0
 """Angle by which the belt is turned at the end of the modelled part, degrees: light that gets past
 a quarter turn does not come back (`_gelbelt_sources`)."""

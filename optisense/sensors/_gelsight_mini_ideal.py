@@ -47,9 +47,7 @@ PAPERS_RISE = {"cylindrical": 6.0, "spherical": 9.0}
 """Distance by which the OptiSense paper moves the control points of each variant along z, mm."""
 
 WIDEST_FIELD = 150.0
-"""Largest field of view that may be derived from `view_width`, degrees; a larger one comes from an
-error.
-"""
+"""Largest field of view that may follow from `view_width`, degrees; a larger one is an error."""
 
 
 class GelSightMiniDimensions(Dimensions):

@@ -59,9 +59,7 @@ PALM_OUTLINE = (
     (25.6, 22.0), (22.6, 32.6), (20.3, 41.7), (18.4, 49.3), (17.5, 54.6), (17.4, 59.2),
     (18.1, 67.6), (19.2, 76.6), (20.3, 84.6), (19.2, 89.5), (15.3, 92.4),
 )  # fmt: skip
-"""Outline of the palm as (x, z) in mm, from its base to its tip; its provenance is in
-`_svelte_sources`.
-"""
+"""Outline of the palm as (x, z), mm, from base to tip; `_svelte_sources` has its provenance."""
 
 BACK_OUTLINE = (
     (-9.0, -7.7), (-9.0, 5.0), (-1.7, 10.2), (-2.9, 14.4), (-4.8, 26.5), (-5.7, 35.6),

@@ -19,15 +19,13 @@ BOARDS = 4
 
 LED_MODEL = "smd-0805"
 LED = (1.25, 2.0)
-"""Width (along the radius) and length of an LED's emitting window, mm: the size of the
-package 0805."""
+"""Width (along the radius) and length of an LED's emitting window, mm: those of package 0805."""
 WINDOW_GAP = 0.01
 """Distance between an LED's body and its window, mm: wide enough not to count as contact."""
 WALL_MARGIN = 0.15
 """Thickness of the wall that remains on both sides of a board, mm, an assumption."""
 RING_HEIGHT = 0.3
-"""z of the windows of a ring of LEDs at the foot of the wall, mm, an assumption: just inside
-the wall."""
+"""z of the windows of a ring of LEDs at the foot of the wall, mm, assumed: just inside it."""
 
 
 def led_height() -> float:

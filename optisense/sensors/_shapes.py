@@ -21,9 +21,7 @@ from optisense.geometry.mesh import grid_faces
 Vector = tuple[float, float, float]
 
 ON_AXIS = 1e-12
-"""Largest distance from the axis of a profile point that counts as a pole, mm; a margin for
-rounding.
-"""
+"""Largest distance from the axis of a profile point that is a pole, mm; a margin for rounding."""
 
 TWIST = 0.31
 """Angle by which turned shapes are rotated, in segments. No vertex then lies exactly on a plane of
@@ -31,9 +29,7 @@ symmetry, where rays of regular grids would meet edges.
 """
 
 ASIDE = 0.01
-"""Distance by which a pole is moved off the axis, as a share of the radius of the ring next to
-it.
-"""
+"""Distance by which a pole is moved off the axis, as a share of the next ring's radius."""
 
 
 def revolve(profile: ArrayLike, segments: int) -> TriangleMesh:

@@ -19,9 +19,7 @@ from optisense.errors import DesignError
 Points = Sequence[tuple[float, float]]
 
 SAGITTA_STEP = 0.1
-"""Step of the sagitta in the search for the largest one that is clear of the skin, mm; bisection
-follows.
-"""
+"""Step of the sagitta in the search for the largest one clear of the skin, mm; then bisection."""
 
 PROFILE_SAMPLES = 200
 """Number of points along the mirror's profile, which keep the polygon within 1 um of the curve."""

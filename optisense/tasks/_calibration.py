@@ -43,9 +43,7 @@ ATTEMPTS = 50
 """
 
 LEAST_PIXELS = 20
-"""Smallest number of pixels of a contact that counts as seen; fewer contribute little to the fit of
-a reader.
-"""
+"""Smallest number of pixels of a seen contact; fewer contribute little to the fit of a reader."""
 
 QUIET = 3.0
 """Difference from the untouched picture (levels of 255, in each channel) below which the tilt is

@@ -24,8 +24,7 @@ PRESSED = 1.0
 about as deep as gels are pressed."""
 
 MOST_POINTS = 3000
-"""Largest number of pixels that a pinhole is fitted to, spread over the picture; it has 12
-parameters."""
+"""Largest number of pixels that a pinhole is fitted to; it has 12 parameters."""
 
 WIDEST = 150.0
 """Field of view (degrees) across the picture above which no pinhole is fitted, as a flat picture

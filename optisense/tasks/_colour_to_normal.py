@@ -40,8 +40,7 @@ balls in pictures of GelSight Mini of 160 pixels give 4,500 samples, and the err
 is 6.6 degrees after 30 passes and 5.7 degrees after 200."""
 
 MOST_EPOCHS = 200
-"""Largest number of passes over few samples; more have no effect with 20 balls, and overfit with
-10."""
+"""Largest number of passes over few samples; more do nothing with 20 balls, overfit with 10."""
 
 WEIGHT_PENALTY = 0.03
 """Weight of the squared weights in the loss of the network (scikit-learn's `alpha`), which also

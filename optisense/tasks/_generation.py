@@ -53,9 +53,7 @@ random rotation keeps clear of a GelSight Mini's edge in one draw of six, so tha
 10,000 fails; a rejected draw takes chief rays but no rendering."""
 
 LEAST_PIXELS = 4
-"""Number of pixels below which a contact counts as unseen: two by two show whether it has a
-slope.
-"""
+"""Number of pixels below which a contact counts as unseen: two by two show if it slopes."""
 
 _CONTACT, _CAMERA, _SENSOR = 1, 2, 8
 """Numbers that are hashed with the seed, one for each kind of random draw, so that the draws are

@@ -12,8 +12,7 @@ from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 
 TREES = 100
-"""Number of trees of a forest, which is scikit-learn's default; the OptiSense paper does not state
-its own."""
+"""Number of trees of a forest: scikit-learn's default, as the OptiSense paper states none."""
 FOLDS = 5
 """Number of folds of the cross-validation, which is scikit-learn's default."""
 

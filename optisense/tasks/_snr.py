@@ -17,8 +17,7 @@ from sklearn.neighbors import NearestNeighbors
 from optisense.errors import TaskError
 
 NEIGHBOURS = 5
-"""Number k of nearest neighbours, which is scikit-learn's default; the OptiSense paper does not
-state its own."""
+"""Number k of nearest neighbours: scikit-learn's default, as the OptiSense paper states none."""
 
 
 def signal_to_noise(features: ArrayLike, targets: ArrayLike, neighbours: int = NEIGHBOURS) -> float:

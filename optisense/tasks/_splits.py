@@ -10,8 +10,7 @@ TRAIN, VALIDATION, TEST = "train", "validation", "test"
 SPLITS = (TRAIN, VALIDATION, TEST)
 
 SHARES = (0.8, 0.1, 0.1)
-"""Shares of all cells in the training, validation and test split, usual for data of some thousand
-samples."""
+"""Shares of all cells in the training, validation and test split, usual for some 1000 samples."""
 
 CELLS = 8
 """Number of square cells across the picture; on a GelSight Mini they are 2.3 mm wide, and presses

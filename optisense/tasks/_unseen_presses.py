@@ -35,8 +35,7 @@ ATTEMPTS = 8
 """Number of places tried for a press before its depth is reduced, as some lie over an edge."""
 
 ONE_SKIN = 0.1
-"""Largest distance (mm) between two sensing surfaces that count as one, far less than the depth of
-presses."""
+"""Largest distance (mm) between two sensing surfaces that are one, far below press depths."""
 
 SAMPLED = 200
 """Number of vertices of a sensing surface whose distance from the other surface is computed, spread

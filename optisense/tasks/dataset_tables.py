@@ -14,8 +14,7 @@ from optisense.text import brief
 from optisense.untrusted_files import COPY_AGAIN, MOST_TABLE, first_problem, read_text
 
 SCHEMA_VERSION = 1
-"""Version of the format of a dataset's folder; it is raised when an older program cannot read
-it."""
+"""Version of the format of a dataset's folder; it is raised when older programs cannot read it."""
 
 INFO = "dataset.json"
 LABELS = "metadata.csv"

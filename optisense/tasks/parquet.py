@@ -30,8 +30,7 @@ from optisense.writing import inside
 FOLDER = "parquet"
 
 SAMPLES_OF_A_FILE = 256
-"""Number of samples in a file; at 320 x 240 pixels it has some 500 MB, the size that dataset hubs
-recommend."""
+"""Number of samples in a file; at 320 x 240 pixels it has 500 MB, as dataset hubs recommend."""
 
 SAMPLES_AT_ONCE = 16
 """Number of samples that are in memory at once, some 60 MB at 320 x 240 pixels; they are a row

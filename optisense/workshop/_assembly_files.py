@@ -27,8 +27,7 @@ MARGIN = 1.0
 """Width of the board around the bodies of its LEDs in the outline, mm; an assumption."""
 
 USUAL_BODY = 3.5
-"""Side of an LED's body that the library does not know, mm: the longer side of the
-common SMD 3528."""
+"""Side of an LED's body that the library lacks, mm: the longer side of the common SMD 3528."""
 
 
 def assembly_files(design: SensorDesign, placed: Sequence[Placement]) -> dict[str, str]:

@@ -68,6 +68,4 @@ FORMATS: Registry[ShapeFormat] = Registry(
     },
     must_be(ShapeFormat, OutputError, "file format"),
 )
-"""Registry of all formats; other packages add theirs under the entry-point group
-`optisense.formats`.
-"""
+"""Registry of all formats; other packages add theirs as entry points `optisense.formats`."""

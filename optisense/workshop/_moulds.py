@@ -35,9 +35,7 @@ SPRUE, FUNNEL, VENT = 4.0, 8.0, 2.0
 """
 
 FROM_EDGE = 0.5
-"""Distance between sprue or vent and the edge of the gel's back, mm, so that its edge stays
-whole.
-"""
+"""Distance of sprue or vent from the edge of the gel's back, mm, so that the edge stays whole."""
 
 LEVELS = 64
 """Number of sections in the search for the widest one; between two of them a gel hardly changes."""
@@ -46,9 +44,7 @@ AT_THE_BACK = 0.05
 """Height, as a share of the gel's, up to which the widest section is taken to be its back."""
 
 LEAST_DRAFT = 1.0
-"""Smallest draft angle, degrees: steeper faces stick to a rigid mould; moulders of silicone ask for
-1 to 2.
-"""
+"""Smallest draft angle, degrees: steeper faces stick to a rigid mould; silicone needs 1 to 2."""
 
 UNDERCUT = 0.5
 """Smallest overhang of a face that counts as an undercut, degrees; less is rounding of the mesh."""

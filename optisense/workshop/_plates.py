@@ -25,9 +25,7 @@ CAST_OR_PAINTED = frozenset({Role.ELASTOMER, Role.SENSING_SURFACE})
 """Roles of parts that are cast or sprayed and not cut."""
 
 ROUND = 12
-"""Smallest number of corners on one circle for an outline that is meant to be round; octagons stay
-octagons.
-"""
+"""Smallest number of corners on a circle of a round outline; octagons stay octagons."""
 
 SAME_RADIUS = 1e-4
 """Largest difference of the corners' distances from the middle of a round outline, mm; it covers

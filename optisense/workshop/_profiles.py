@@ -14,9 +14,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 
 EXACT = 2e-6
-"""Largest deviation of corners from the line or circle that they come from, mm; it covers rounding
-in files.
-"""
+"""Largest deviation of corners from their line or circle, mm; it covers rounding in files."""
 
 ARC_CORNERS = 5
 """Smallest number of corners on one circle that make an arc; three always lie on a circle."""

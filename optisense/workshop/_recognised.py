@@ -19,9 +19,7 @@ SAME = 1e-6
 """Largest difference of coordinates that count as equal, mm; files keep seven digits."""
 
 FEWEST_CORNERS = 12
-"""Smallest number of corners of a full turn; a body with fewer around an axis is meant to have flat
-sides.
-"""
+"""Smallest number of corners of a full turn; a body with fewer has flat sides on purpose."""
 
 NEAR_AXIS = 0.05
 """Largest distance from the axis of a single vertex that counts as a pole, as a share of the

@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 ROOM = 0.86
-"""Share of the free part of a view that the sensor fills; the margin leaves room for the header and
-gizmos.
-"""
+"""Share of the free part of a view that the sensor fills, with room for header and gizmos."""
 
 ROUNDS = 12
 """Number of iterations of the fit. Near points grow faster than far ones, so one step is not

@@ -16,9 +16,7 @@ from .numbers import kept_list, short
 FloatArray = NDArray[np.float64]
 
 SAME_DIRECTION = 3e-6
-"""Distance below which unit vectors count as the same: the rounding error of a rotation in single
-precision.
-"""
+"""Distance below which unit vectors are the same: the rounding of single-precision rotations."""
 
 
 def matrix_of(position: ArrayLike, direction: ArrayLike, up: ArrayLike | None) -> FloatArray:

@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from .schema import Row
 
 TRIAL, BEST = (0.55, 0.75, 0.95, 1.0), (0.95, 0.55, 0.15, 1.0)
-"""Colours (red, green, blue, opacity) of the curve: dots of the trials, and line of the best so
-far.
-"""
+"""Colours (red, green, blue, opacity) of the curve: dots of trials, line of the best so far."""
 
 FEW = 60
 """Number of trials up to which their dots in the curve are drawn large."""

@@ -15,9 +15,7 @@ HEAT = (
     (0.75, 0.98, 0.62, 0.12),
     (1.00, 1.00, 0.98, 0.80),
 )
-"""Colour map for brightness, rows of value, red, green, blue in 0..1; its lightness grows
-monotonically.
-"""
+"""Colour map for brightness, rows of value, red, green, blue in 0..1; lightness only grows."""
 
 DIVERGING = (
     (0.00, 0.10, 0.30, 0.85),

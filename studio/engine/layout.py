@@ -20,9 +20,7 @@ _told: set[str] = set()
 """Titles of the jobs whose outcome is shown beside the button that started them."""
 
 EDGES, ICON, BOX = 56.0, 21.0, 14.0
-"""Widths in pixels that are not available to a line of text: tabs and edges of the sidebar, an
-icon, a box.
-"""
+"""Widths in pixels that a line of text lacks: tabs and edges of the sidebar, an icon, a box."""
 
 
 class SidebarPanel:

@@ -17,9 +17,7 @@ from ..simulate import editors
 from . import figures, rays
 
 ABOUT = ("unit", "lower_is_better")
-"""Entries of a score that describe its objective; the catalogue lacks those of the user's own
-objectives.
-"""
+"""Entries of a score that describe its objective; the catalogue lacks the user's own ones."""
 
 RAYS = (16, 12)
 """Columns and rows of the grid of chief rays; more rays would hide the sensor."""

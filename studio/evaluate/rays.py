@@ -20,8 +20,7 @@ COLOURS = {
     "total_reflection": ("orange", (0.9, 0.5, 0.0, 1.0)),
     "depth_limit": ("purple", (0.5, 0.1, 0.7, 1.0)),
 }
-"""Name and RGBA colour (0 to 1) of the lines of each outcome of a chief ray; each has a hue
-of its own."""
+"""Name and RGBA colour (0 to 1) of the lines of each outcome of a chief ray, in its own hue."""
 OTHER = ("grey", (0.5, 0.5, 0.5, 1.0))
 """Name and RGBA colour (0 to 1) of outcomes that this version of the studio does not know."""
 

@@ -22,9 +22,7 @@ ARROWS = {"better": "TRIA_UP", "worse": "TRIA_DOWN"}
 """Icon of each change: up is better, even if a lower value is better."""
 
 FIGURE = 10.5
-"""Width of a figure in the panel, in widths of an icon; its button opens it in full in an
-editor.
-"""
+"""Width of a figure in the panel, in widths of an icon; a button opens it in full in an editor."""
 
 
 class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):

@@ -31,9 +31,7 @@ WINDOW_OPACITY = 0.8
 """Opacity of a lit window of a lamp: parts behind it stay visible."""
 
 MOST_FACES = 200_000
-"""Number of faces above which a part is drawn without outlines: they would take longer than a
-frame.
-"""
+"""Number of faces above which a part has no outlines: they would take longer than a frame."""
 
 _edges: dict[str, tuple[tuple[int, int, int], NDArray[np.int64]]] = {}
 """Numbers of vertices, edges and faces of each present part, and the edges of its outline."""

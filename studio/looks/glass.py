@@ -41,9 +41,7 @@ is the same all over.
 """
 
 KEY = (-0.4, 0.7, 0.6)
-"""Direction to the light that makes the highlights: components to the right, up and towards the
-viewer.
-"""
+"""Direction to the light that makes the highlights: to the right, up and towards the viewer."""
 
 VERTEX = """
 void main() {
@@ -77,9 +75,7 @@ void main() {
 
 _shader: Any = None
 _batches: dict[str, tuple[tuple[Any, ...], Any]] = {}
-"""State of each present part's mesh, and its triangles on the graphics card, by the name of the
-part.
-"""
+"""State of each present part's mesh, and its triangles on the graphics card, by part."""
 
 
 def draw(scene: bpy.types.Scene) -> None:

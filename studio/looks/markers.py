@@ -27,9 +27,7 @@ SIDES = 20
 """Number of corners of a drawn dot: it looks round."""
 
 LIFT = 0.03
-"""Distance from the skin in mm at which dots are drawn, on both sides, so that the skin does not
-hide them.
-"""
+"""Distance from the skin (mm) at which dots are drawn on both sides, to be seen."""
 
 _shown: dict[str, Any] = {}
 _request = LatestRequest()

@@ -21,9 +21,7 @@ NOWHERE = (0.0, 0.0, 0.0, 1.0)
 """Clipping plane of Blender that cuts nothing off: its normal is zero, and its offset positive."""
 
 MARGIN = 1e-3
-"""Distance in mm of the plane from the sensor at the ends of the slider, where it cuts nothing or
-all off.
-"""
+"""Distance (mm) of the plane from the sensor at the slider's ends: it cuts nothing or all off."""
 
 
 when_markers_asked: list[Callable[[], None]] = []

@@ -17,9 +17,7 @@ from .opening import open_source, picture_is_old
 from .warming import warm_up
 
 SOON = 0.5
-"""Delay in seconds after Blender's start before the extension begins its work; then the window
-exists.
-"""
+"""Delay (s) after Blender's start before the extension begins its work, for the window to exist."""
 ENVIRONMENT = "OPTISENSE_OPEN"
 """Environment variable with the design that `optisense studio DESIGN` was asked to open."""
 

@@ -19,9 +19,7 @@ NONE = "No draft: "
 KINDS = ("PART", "LIGHT", "CAMERA", "CAGE", "CONTACT")
 
 MOST_OPEN = 3
-"""Largest number of open drafts: one in progress, one waiting, and one that was replaced and not
-yet answered.
-"""
+"""Largest number of open drafts: one in progress, one waiting, one replaced but unanswered."""
 RENEWED = 0.05
 """Time after which a waiting draft is replaced by a newer one, s."""
 LEAD = 0.05

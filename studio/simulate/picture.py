@@ -15,8 +15,7 @@ from ..core.viewing import resized
 IMAGE = "OptiSense picture"
 
 PAUSE = 0.5
-"""Time (s) between a change of an image and its packing, which takes 8 ms, so that drafts do not
-wait for it."""
+"""Time (s) from a change of an image to its packing, which takes 8 ms, for drafts not to wait."""
 
 _unpacked: set[str] = set()
 """Names of images that changed since they were packed."""

@@ -29,14 +29,10 @@ DARK = 1e-6
 """Smallest share of the peak intensity that counts as light, far below the noise of any picture."""
 
 POLAR_ANGLES = 1025
-"""Number of polar angles of a table over the beam; a beam of 90 degrees gets one every 0.09
-degrees.
-"""
+"""Number of polar angles of a table over the beam; over 90 degrees they are 0.09 degrees apart."""
 
 AZIMUTHS = 145
-"""Number of azimuths of a table of a lamp that is not symmetric: one every 2.5 degrees, with both 0
-and 360.
-"""
+"""Number of azimuths of an unsymmetric lamp's table: every 2.5 degrees, with 0 and 360."""
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,7 @@ from optisense.design.lenses.film import FilmPlaces
 from optisense.design.lenses.shading import LensShading
 
 TABLE_ROWS, TABLE_COLUMNS = 12, 16
-"""Size of the shading tables in libcamera's tuning files for the Raspberry Pi (rpi.alsc on the VC4
-processor).
-"""
+"""Size of shading tables in libcamera's tuning files for Raspberry Pi (rpi.alsc on VC4)."""
 
 Gain = Annotated[Number, Field(ge=0.1, le=1000.0)]
 

@@ -20,9 +20,7 @@ REACH = 4.0
 """Radius at which a blur is cut off, in standard deviations (SciPy's default)."""
 
 LEAST_WIDTH = 0.05
-"""Smallest standard deviation that is applied, in pixels; smaller blurs change a picture by less
-than 1e-5.
-"""
+"""Smallest standard deviation applied, pixels; smaller blurs change levels by below 1e-5."""
 
 STEPS = 6
 """Number of widths from which a blur that varies over the picture is interpolated. Between two of
@@ -31,9 +29,7 @@ interpolated.
 """
 
 LARGEST = 0.25
-"""Largest standard deviation of a blur, as a share of the picture's width; with it no detail is
-left.
-"""
+"""Largest standard deviation of a blur, as a share of the picture's width; it leaves no detail."""
 
 
 class LensView(Protocol):

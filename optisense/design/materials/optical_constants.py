@@ -15,9 +15,7 @@ common red, green and blue LEDs. Metals of the library are given at the same one
 """
 
 SODIUM_LINE = 589.3
-"""Wavelength of the yellow line of sodium, nm, at which a refractive index is stated by
-convention.
-"""
+"""Wavelength of the yellow sodium line, nm, at which refractive indices are stated."""
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from optisense.array_types import FloatArray
 
 STEEP = 5.67
-"""Slope of walls, mm of height per mm: the tangent of 80 degrees, as the walls of moulded parts
-have a draft."""
+"""Slope of walls, mm of height per mm: the tangent of 80 degrees, the draft of moulded parts."""
 
 
 def disc(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:

@@ -95,8 +95,7 @@ class RelitEvaluator(DesignEvaluator):
 
 
 RELIGHTABLE = frozenset({"rgb2normal", "normdiff", "reading", "depth"})
-"""Objectives by pictures that need no image besides those of the presses, so that layers suffice.
-"""
+"""Objectives by pictures that need no image besides those of presses, so that layers suffice."""
 
 LIGHT_INDEPENDENT = frozenset({"aoap", "2to3pw", "coverage", "distortion", "power"})
 """Objectives that need no light."""

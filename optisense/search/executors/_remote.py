@@ -17,13 +17,9 @@ from optisense.search.executors._remote_worker import score_trial
 from optisense.search.executors.base import Runner, pickled
 
 CONNECT_SECONDS = 10.0
-"""Longest wait for the answer of a Dask scheduler, s; one in the same network answers within a
-second.
-"""
+"""Longest wait for the answer of a Dask scheduler, s; one nearby answers within a second."""
 WORKER_SECONDS = 60.0
-"""Longest wait for the first worker of a cluster, s; enough for a cluster that starts its workers
-on demand.
-"""
+"""Longest wait for the first worker of a cluster, s; enough to start workers on demand."""
 
 SUBMITTED_AHEAD = 1000
 """Number of trials that are submitted ahead to an executor, since its number of workers is not

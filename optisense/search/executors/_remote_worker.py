@@ -21,9 +21,7 @@ MOST_EVALUATORS = 64
 whose process was killed does not.
 """
 _one_at_a_time = threading.Lock()
-"""Lock that serves one trial at a time, since an evaluator keeps one model, whatever threads a
-worker has.
-"""
+"""Lock that serves one trial at a time, since an evaluator keeps one model for all threads."""
 
 
 def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed: int) -> Outcome:

@@ -23,14 +23,10 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import Method, Problem, values_to_maximise
 
 MOST_POPULATION = 100_000
-"""Largest population; a generation of so many trials takes days, so a larger number is a typing
-error.
-"""
+"""Largest population; a generation of so many trials takes days, so more is a typing error."""
 
 LEAST_DIMENSIONS = 2
-"""Smallest number of dimensions that pycma supports; a search over fewer parameters adds idle
-ones.
-"""
+"""Smallest number of dimensions that pycma supports; smaller searches add idle ones."""
 
 
 class CmaEs(Method):

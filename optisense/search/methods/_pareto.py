@@ -27,9 +27,7 @@ CROSSOVER_SPREAD = 15.0
 """
 
 MUTATION_SPREAD = 20.0
-"""Distribution index of the mutation; 20 is the value of Deb et al. (2002), and the default of
-pymoo.
-"""
+"""Distribution index of the mutation; 20 is that of Deb et al. (2002), and pymoo's default."""
 
 CROSSOVER_CHANCE = 0.9
 """Probability that two parents are crossed, as Deb et al. (2002) use it for NSGA-II."""

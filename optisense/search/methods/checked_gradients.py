@@ -57,9 +57,7 @@ SMOOTHED = "smoothed"
 """Key of the smoothed score in an outcome's parts."""
 
 LIMITED = "smoothed_limited"
-"""Key of the smoothed values of the limited quantities, in the order of the conditions, in an
-outcome's parts.
-"""
+"""Key of the smoothed limited quantities, in the order of conditions, in an outcome's parts."""
 
 GRADIENT_BY = "gradient_by"
 """Key of the source of the gradient in an outcome's parts: `RAYS` or `DIFFERENCES`."""

@@ -27,9 +27,7 @@ rounding at curved faces and displacements as small as manufacturing errors.
 """
 
 SEAT_POINTS = 400
-"""Number of points on each of two parts that are tested for contact; four of them are a
-hundredth.
-"""
+"""Number of points on each of two parts that are tested for contact; four are a hundredth."""
 
 LEAST_CONTACT_POINTS = 16
 """Smallest number of touching points that count as a contact area; fewer are an edge or a corner,

@@ -21,9 +21,7 @@ from optisense.geometry.crossings import crossings
 from optisense.search.space.pickling import PickledWithoutCaches
 
 Constraint = Callable[[SensorDesign], bool | str | None]
-"""Function that forbids designs: it returns False, or a text with the reason, for a forbidden
-design.
-"""
+"""Function that forbids designs: it returns False, or a text with the reason, for such a one."""
 
 
 class CrossingParts(NamedTuple):

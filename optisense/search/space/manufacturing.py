@@ -27,9 +27,7 @@ and enough for the tenth percentile, which lies between the two worst of eight.
 """
 
 ALL_LIGHTS = {"position": "shift", "angle": "turn"}
-"""Fields of each single light that `lights.position` and `lights.angle`, and those of a group,
-stand for.
-"""
+"""Fields of each light that `lights.position` and `lights.angle`, also of a group, stand for."""
 
 
 @dataclass(frozen=True)

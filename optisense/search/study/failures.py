@@ -10,9 +10,7 @@ _PLACE = re.compile(r" at \([-+\d., e]+\)(?: mm)?")
 """Pattern of coordinates in a message, such as `` at (3.76, 11.51, 86.87) mm``."""
 
 _NUMBER = re.compile(r"(?<![\w.'])[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?(?![\w'])")
-"""Pattern of a number that stands alone. Digits within a name (``M1``) or in quotes (``'2'``)
-belong to names.
-"""
+"""Pattern of a number alone; digits in a name (``M1``) or in quotes (``'2'``) are no numbers."""
 
 
 @dataclass

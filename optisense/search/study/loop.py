@@ -48,9 +48,7 @@ releases of libraries differ in rounding.
 """
 
 TICK = 0.2
-"""Interval between checks of the clock while trials are scored, s; short enough for a smooth
-display.
-"""
+"""Interval between checks of the clock while trials are scored, s; short for a smooth display."""
 
 FRESH_SHARE = 0.8
 """Smallest duration of the first score with a fresh seed, as a share of the first trial's duration.

@@ -26,9 +26,7 @@ from optisense.search.study.settings import StudySettings
 from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 
 ONLY_HERE = "function:"
-"""Prefix of the name of a goal or rule that is a function of the caller's program and in no
-file.
-"""
+"""Prefix of the name of a goal or rule that is a function of the calling program, in no file."""
 
 RAYS_ACROSS = 320
 """Number of chief rays across the image unless `ray_resolution` is given: a quarter of the rays

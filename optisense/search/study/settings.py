@@ -26,9 +26,7 @@ LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")
 """Packages on which the numbers of a study depend."""
 
 MOST_NAMES = 100
-"""Largest number of objectives, or of rules, of a study; a search by more than a few finds no
-useful front.
-"""
+"""Largest number of a study's objectives, or rules; with more, no useful front is found."""
 
 LATER = ("requirements", "coarse_first")
 """Settings that studies of earlier releases do not have. They count as their defaults, and are left

@@ -43,9 +43,7 @@ is one sensor, and one more for each source of error.
 """
 
 NOISE_SEEDS = 3
-"""Number of seeds with which the nominal design is scored again, to separate noise from
-tolerance.
-"""
+"""Number of seeds with which the nominal design is scored, to separate noise from tolerance."""
 
 OWN_SCORES = 1 + NOISE_SEEDS
 """Number of scores of the nominal design, which come before those of manufactured sensors."""
@@ -60,9 +58,7 @@ glued in, a printed mould, silicone and resin of another batch.
 """
 
 FIRST, SENSORS_STEP = "the nominal design", "sensors"
-"""Stages for estimates of the time left: the first score, which includes compiling, and all
-others.
-"""
+"""Stages for estimates of the time left: the first score, with compiling, and all others."""
 
 ToleranceCallback = Callable[[int, int, float, str], None]
 """Function that is called with the number of finished scores, the number of all, the seconds left

@@ -30,9 +30,7 @@ INTERVAL = (0.05, 0.95)
 """Ends of a 90 % interval, as quantiles of the bootstrap distribution."""
 
 LEAST_PAIRS = 4
-"""Smallest number of pairs of sensors for an estimate of a share of variance; fewer give no
-interval.
-"""
+"""Smallest number of pairs of sensors for an estimate of a share of variance, with an interval."""
 
 
 @dataclass(frozen=True)

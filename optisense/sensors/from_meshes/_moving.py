@@ -13,9 +13,7 @@ from optisense.sensors.from_meshes.directions import axis_of
 from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
 
 IN_PLANE = 1e-3
-"""Largest distance of vertices from the outermost plane of a part that count as on its flat face,
-mm.
-"""
+"""Largest distance of vertices from a part's outermost plane that count as on its face, mm."""
 
 
 def posed(mesh: TriangleMesh, shape: ShapeReference) -> TriangleMesh:

@@ -33,8 +33,7 @@ LONGEST_LINE = 10_000
 of tables refuses cells of more than 131,072."""
 
 LARGEST = 10_000.0
-"""Largest coordinate of a part, mm, and largest rotation, degrees: a panel of boards is smaller
-than a metre."""
+"""Largest coordinate of a part, mm, and rotation, degrees: panels are smaller than a metre."""
 
 _UNIT = re.compile(r"\b(mm|mils?|inch(?:es)?|in|thou)\b", re.IGNORECASE)
 _NUMBER = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*(mm|mils?|inch|in)?$", re.IGNORECASE)

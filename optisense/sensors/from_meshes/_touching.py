@@ -23,9 +23,7 @@ MUCH = 0.2
 """Smallest area of a gap that is reported, as a share of the smaller part's area."""
 
 MOSTLY = 0.95
-"""Share of a sensing surface's area that must lie on an elastomer for the surface to count as on
-it.
-"""
+"""Share of a sensing surface's area on an elastomer for the surface to count as on it."""
 
 
 @dataclass

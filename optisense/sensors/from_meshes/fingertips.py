@@ -24,8 +24,7 @@ FISHEYE = "imx219-fisheye-160"
 """Camera of the library for the inside of a dome: a common module that sees 128 degrees across."""
 
 LIGHT_HEIGHT = 0.5
-"""Height (mm) of the lights above the camera's pupil, from which they are then outside of its
-field of view."""
+"""Height (mm) of the lights above the camera's pupil, which puts them outside of its view."""
 
 RING_CLEARANCE = 2.5
 """Distance (mm) of the middle of a light from the wall of the cavity: half the diagonal of a 3528

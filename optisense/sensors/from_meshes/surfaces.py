@@ -17,9 +17,7 @@ from optisense.sensors.from_meshes.directions import direction_text, vector
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 
 WITHIN = 30.0
-"""Largest angle between a face's normal and the given direction if the recipe gives none,
-degrees.
-"""
+"""Largest angle of a face's normal to the direction if the recipe gives none, degrees."""
 
 
 def pick(mesh: TriangleMesh, shape: ShapeReference, where: str) -> list[Faces]:
