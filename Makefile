@@ -63,9 +63,8 @@ demo: setup
 
 # Each of these runs whatever becomes of the others, two at a time; a summary at the end says what
 # failed. Those that take longest begin first.
-LOTS := optics search sensors calibration cli tasks objectives
-CHECKS := pytest-rest pytest-optics studio-tests pytest-docs pytest-search pytest-sensors \
-    pytest-calibration pytest-cli pytest-tasks types pytest-objectives docs bare-pytest lint import-rules
+CHECKS := pytest-rest pytest-tasks pytest-optics pytest-docs pytest-search studio-tests \
+    pytest-sensors types docs bare-pytest lint import-rules
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
@@ -93,15 +92,22 @@ docs-as-typed: setup
 pytest: setup
 	$(BIN)/python -m pytest
 
-# The same in lots, which `make test` runs two at a time.
+# The same in lots, which `make test` runs two at a time. A lot is one process: its folders share
+# imports, and the first renderings, which load the kernels.
+LOTS := optics search sensors tasks
+LOT_optics := optics
+LOT_search := search
+LOT_sensors := sensors objectives
+LOT_tasks := tasks calibration cli
+
 pytest-docs: setup
 	$(BIN)/python -m pytest tests/docs
 
 pytest-rest: setup
-	$(BIN)/python -m pytest $(LOTS:%=--ignore=tests/%) --ignore=tests/docs
+	$(BIN)/python -m pytest --ignore=tests/docs $(foreach lot,$(LOTS),$(LOT_$(lot):%=--ignore=tests/%))
 
 $(LOTS:%=pytest-%): pytest-%: setup
-	$(BIN)/python -m pytest tests/$*
+	$(BIN)/python -m pytest $(LOT_$*:%=tests/%)
 
 # What guards most for its time: shapes and design files, light against closed forms, a render from
 # start to end, finding objectives, search spaces, and the talk with the engine.
@@ -109,12 +115,14 @@ QUICK := tests/test_environment.py tests/test_package.py tests/test_errors.py te
     tests/geometry tests/design tests/sensors/test_every_sensor.py tests/optics/test_llvm.py \
     tests/optics/test_closed_forms.py tests/objectives/test_registry.py tests/search/test_space.py \
     tests/search/test_methods.py tests/cli/test_render.py tests/engine/test_conversation.py
-# Without the optional dependencies, as for a user who installed no extra.
+# Without the optional dependencies, as for a user who installed no extra. Other processes have them
+# again: what is tested in such ones is left out.
 BARE := tests/test_package.py tests/geometry/test_step.py tests/workshop/test_shapes.py \
     tests/workshop/test_moulds.py tests/sensors/from_meshes/test_building.py \
     tests/search/test_executors.py tests/cli/test_export.py tests/cli/test_commands.py
 bare-pytest: setup
-	PYTHONPATH=tests/helpers $(BIN)/python -m pytest -p without_optional $(BARE)
+	PYTHONPATH=tests/helpers $(BIN)/python -m pytest -p without_optional \
+	    -k "not TestPool and not loads_only" $(BARE)
 
 quick-pytest: setup
 	$(BIN)/python -m pytest -m "not slow" $(QUICK)

@@ -64,6 +64,11 @@ def test_every_promised_file_is_there_and_nothing_else(folder: Path) -> None:
     assert written(folder) == FILES
 
 
+def test_the_report_tells_where_the_light_goes(folder: Path) -> None:
+    report = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Where the light goes" in report and "escaped from tray" in report
+
+
 def test_the_files_have_the_wanted_size(folder: Path) -> None:
     assert Image.open(folder / "image.png").size == (40, 30)
     assert np.load(folder / "normals.npy").shape == (30, 40, 3)

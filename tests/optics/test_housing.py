@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -94,11 +96,16 @@ def test_a_housing_without_a_material_absorbs_all_light() -> None:
     assert landed(OpticalModel(sphere(None))) == 0.0
 
 
+@cache
+def model_of_sphere(wall: float, coating: float) -> OpticalModel:
+    return OpticalModel(sphere(wall, coating))
+
+
 @pytest.mark.parametrize("estimator", ["radiance-cache", "sppm"])
 def test_the_skin_in_a_white_sphere_is_evenly_bright(estimator: str) -> None:
     """Irradiance F r / (A (1 - r (1 - f) - c f)) for a coating of reflectance c."""
     wall, coating = 0.8, 0.5
-    image = OpticalModel(sphere(wall, coating)).render(
+    image = model_of_sphere(wall, coating).render(
         resolution=(64, 48), photons=300_000, estimator=estimator
     )
     area = 4 * np.pi * RADIUS**2

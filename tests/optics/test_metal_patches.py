@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from scipy import ndimage
 from benchmarks.light_tracing import light_traced
 from benchmarks.patches import RESOLUTION, PatchCase, Patches, means
 from benchmarks.reference import box_around, window_camera
-from optisense import OpticalModel
+from optisense import Contact, OpticalModel
+from optisense.optics import TactileImage
 
 PATH = json.loads((Path(__file__).parents[1] / "assets" / "metal-patches.json").read_text())
 PHOTONS = 1_000_000
@@ -35,18 +37,23 @@ BESIDE = 0.2
 of it are missing if the flanks that the skin mirrors get no light from the skin below them.
 """
 
-PILOT = 100_000
-"""Photons of an image of which only the contact mask is used."""
 TRACED = {"contact": 0.03, "rim": 0.12}
 """Relative error of the mean of each channel by light tracing with two million photons, three times
 the noise. With 32 million photons it is given in benchmarks/patches.md."""
 
 
-@pytest.mark.parametrize("specularity", CONTACT)
-def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> None:
+@cache
+def pressed_mini(specularity: float) -> tuple[OpticalModel, Contact, TactileImage]:
+    """The model of a GelSight Mini, what is pressed into it, and its image."""
     case = PatchCase("gelsight-mini-ideal", specularity)
     model = OpticalModel(case.design(), "llvm")
-    image = model.render([case.contact(model)], RESOLUTION, PHOTONS, seed=1, skin="conforming")
+    contact = case.contact(model)
+    return model, contact, model.render([contact], RESOLUTION, PHOTONS, seed=1, skin="conforming")
+
+
+@pytest.mark.parametrize("specularity", CONTACT)
+def test_metal_in_a_contact_is_as_bright_as_path_traced(specularity: float) -> None:
+    image = pressed_mini(specularity)[2]
     patches = Patches.of(image)
     for where, limits in (("contact", CONTACT), ("rim", RIM)):
         truth = np.array(PATH[where][f"{specularity:g}"])
@@ -71,10 +78,7 @@ def test_skin_mirrors_the_flanks_that_face_low_lamps() -> None:
 
 
 def test_light_tracing_finds_the_light_of_the_path_tracer() -> None:
-    case = PatchCase("gelsight-mini-ideal", 0.6)
-    model = OpticalModel(case.design(), "llvm")
-    contact = case.contact(model)
-    image = model.render([contact], RESOLUTION, PILOT, seed=1, skin="conforming")
+    model, contact, image = pressed_mini(0.6)
     patches = Patches.of(image)
     window = box_around(image.contact_mask, margin=2)
     camera = window_camera(model.camera(RESOLUTION), window)
