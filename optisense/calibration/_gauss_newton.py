@@ -12,9 +12,9 @@ scratches.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +95,17 @@ class RoughFit:
 
     pixels: float
     blur: float = 0.0
+
+
+LinearEquations = tuple[list[int], FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]
+
+
+class _Point(NamedTuple):
+    """Steps of the numbers, changes of the contacts, and their pictures by `LayeredFit`."""
+
+    steps: FloatArray
+    contacts: FloatArray
+    pictures: list[FloatArray]
 
 
 class LayeredFit:
@@ -206,54 +217,50 @@ class LayeredFit:
             found = gaussian_filter(found, (self._blur, self._blur, 0.0))
         return np.asarray(found)
 
-    def solve(
-        self,
-        steps: FloatArray,
-        contacts: FloatArray,
-        progress: Callable[[], None] = lambda: None,
-    ) -> Solution:
+    def solve(self, steps: FloatArray, contacts: FloatArray) -> Solution:
         """Run damped Gauss-Newton steps until the sum of squares stops falling.
 
         Args:
             steps, contacts: start of the descent, as in `pictures`.
-            progress: function that is called before each step.
         """
+        point = self._point(steps, contacts)
         for _ in range(MOST_DESCENTS):
-            steps, contacts, pictures, scales = self._descend(steps, contacts, progress)
+            scales = self._scales(point)
+            point = self._descend(point, scales)
             # The errors are smaller now, and so are the scales of the residuals.
-            if self._scales(pictures, steps, contacts).like(scales):
+            if self._scales(point).like(scales):
                 break
-        spread = self._covariance(pictures, steps, contacts, scales)
+        spread = self._covariance(point, scales)
         return Solution(
-            steps,
-            contacts,
+            point.steps,
+            point.contacts,
             spread[: self.count, : self.count],
-            self._errors(pictures),
-            self._press_errors(pictures),
+            self._errors(point.pictures),
+            self._press_errors(point.pictures),
         )
 
-    def _descend(
-        self, steps: FloatArray, contacts: FloatArray, progress: Callable[[], None]
-    ) -> tuple[FloatArray, FloatArray, list[FloatArray], Scales]:
-        """Return steps, contacts, their pictures and the residuals' scales at the least cost."""
-        pictures = self.pictures(steps, contacts)
-        scales = self._scales(pictures, steps, contacts)
-        cost = self._cost(pictures, steps, contacts, scales)
+    def _point(self, steps: FloatArray, contacts: FloatArray) -> _Point:
+        return _Point(steps, contacts, self.pictures(steps, contacts))
+
+    def _descend(self, point: _Point, scales: Scales) -> _Point:
+        """Return the point of the least cost that is found from another one."""
+        cost = self._cost(point, scales)
         damping = 1e-3
         for _ in range(MOST_STEPS):
-            progress()
-            matrix, gradient = self._normal(pictures, steps, contacts, scales)
+            matrix, gradient = self._normal(point, scales)
             fell = False
-            free = self._free(steps, gradient)
+            free = self._free(point.steps, gradient)
             for _ in range(6):
                 damped = (matrix + damping * np.diag(np.diag(matrix)))[np.ix_(free, free)]
                 move = np.zeros(len(gradient))
                 move[free] = -np.linalg.solve(damped, gradient[free])
                 move *= min(1.0, LARGEST_STEP / max(float(np.abs(move).max()), 1e-12))
-                new_steps = np.clip(steps + move[: self.count], self._low, self._high)
-                new_contacts = contacts + move[self.count :].reshape(-1, 3) * self._contact_spread
-                shown = self.pictures(new_steps, new_contacts)
-                new_cost = self._cost(shown, new_steps, new_contacts, scales)
+                moves = move[self.count :].reshape(-1, 3)
+                new = self._point(
+                    np.clip(point.steps + move[: self.count], self._low, self._high),
+                    point.contacts + moves * self._contact_spread,
+                )
+                new_cost = self._cost(new, scales)
                 if new_cost < cost:
                     fell = True
                     damping = max(0.3 * damping, 1e-9)
@@ -262,10 +269,10 @@ class LayeredFit:
             if not fell:
                 break
             gain = cost - new_cost
-            steps, contacts, pictures, cost = new_steps, new_contacts, shown, new_cost
+            point, cost = new, new_cost
             if gain < SMALL_GAIN:
                 break
-        return steps, contacts, pictures, scales
+        return point
 
     def _free(self, steps: FloatArray, gradient: FloatArray) -> NDArray[np.bool_]:
         """Return which unknowns may move: all but those that are kept, and numbers at a limit that
@@ -291,23 +298,19 @@ class LayeredFit:
             ]
         )
 
-    def _scales(
-        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
-    ) -> Scales:
+    def _scales(self, point: _Point) -> Scales:
         """Return the sizes of the errors, unaffected by dust."""
-        expected = expected_errors(
-            pictures[0], self._noise_of(pictures, steps, contacts), self._outline
-        )
+        pictures = point.pictures
+        expected = expected_errors(pictures[0], self._noise_of(point), self._outline)
         errors = [pictures[0] - self._real] + [
             shown - pictures[0] - real
             for shown, real in zip(pictures[1:], self._responses, strict=True)
         ]
         return Scales.of_errors(errors, expected, self._masks, self._pixels)
 
-    def _noise_of(
-        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray
-    ) -> list[FloatArray]:
+    def _noise_of(self, point: _Point) -> list[FloatArray]:
         """Return a sample of the light's noise, levels (h, w, 3), in background and responses."""
+        steps, contacts, pictures = point
         if self._noise is None:
             return [np.zeros_like(shown) for shown in pictures]
         ground = self._shown(-1, steps, None, self._noise) - pictures[0]
@@ -325,53 +328,37 @@ class LayeredFit:
         mask = self._masks[index]
         return np.asarray(error[mask] / size[mask])
 
-    def _cost(
-        self,
-        pictures: list[FloatArray],
-        steps: FloatArray,
-        contacts: FloatArray,
-        scales: Scales,
-    ) -> float:
-        total = float((steps**2).sum() + ((contacts / self._contact_spread) ** 2).sum())
+    def _cost(self, point: _Point, scales: Scales) -> float:
+        total = float((self._prior(point) ** 2).sum())
         for index in range(-1, len(self._masks)):
-            size = np.abs(self._residuals(pictures, index, scales))
+            size = np.abs(self._residuals(point.pictures, index, scales))
             loss = np.where(size < HUBER, size**2, HUBER * (2.0 * size - HUBER))
             total += float(loss.sum()) / scales.of(index).pixels
         return total
 
-    def _normal(
-        self,
-        pictures: list[FloatArray],
-        steps: FloatArray,
-        contacts: FloatArray,
-        scales: Scales,
-    ) -> tuple[FloatArray, FloatArray]:
+    def _normal(self, point: _Point, scales: Scales) -> tuple[FloatArray, FloatArray]:
         """Return matrix and gradient of the normal equations."""
         size = self.count + 3 * len(self._masks)
         matrix, gradient = np.zeros((size, size)), np.zeros(size)
-        for unknowns, jacobian, weight, residual, _ in self._linear(
-            pictures, steps, contacts, scales
-        ):
+        for unknowns, jacobian, weight, residual, _ in self._linear(point, scales):
             flat = jacobian.reshape(-1, len(unknowns))
             weighted = flat * weight.reshape(-1, 1)
             matrix[np.ix_(unknowns, unknowns)] += weighted.T @ flat
             gradient[unknowns] += weighted.T @ residual.ravel()
-        prior = np.concatenate([steps, (contacts / self._contact_spread).ravel()])
-        return matrix + np.eye(size), gradient + prior
+        return matrix + np.eye(size), gradient + self._prior(point)
 
-    def _linear(
-        self,
-        pictures: list[FloatArray],
-        steps: FloatArray,
-        contacts: FloatArray,
-        scales: Scales,
-    ) -> Iterator[tuple[list[int], FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]]:
+    def _prior(self, point: _Point) -> FloatArray:
+        """Return all unknowns (n,) in plausible ranges, which are their residuals of the prior."""
+        return np.concatenate([point.steps, (point.contacts / self._contact_spread).ravel()])
+
+    def _linear(self, point: _Point, scales: Scales) -> Iterator[LinearEquations]:
         """Yield the linear equations of the background and of each press.
 
         They are: the indices of the n unknowns on which they depend, the derivatives (k, 3, n) of
         the residuals, their weights (k, 3), the residuals (k, 3), and the mask (h, w) of the k
         pixels.
         """
+        steps, contacts, pictures = point
         n = self.count
         masks = [np.ones(self._real.shape[:2], dtype=bool), *self._masks]
         moved = [self._moved(steps, contacts, k) for k in range(n)]
@@ -385,28 +372,20 @@ class LayeredFit:
                 unknowns += range(n + 3 * index, n + 3 * index + 3)
                 slopes += [
                     (self._residuals(m, index, scales) - residual) / STEP
-                    for m in self._contact_moved(pictures, steps, contacts, index)
+                    for m in self._contact_moved(point, index)
                 ]
             weight = np.minimum(1.0, HUBER / np.maximum(np.abs(residual), 1e-12))
             weight /= scales.of(index).pixels
             yield unknowns, np.stack(slopes, axis=-1), weight, residual, masks[index + 1]
 
-    def _covariance(
-        self,
-        pictures: list[FloatArray],
-        steps: FloatArray,
-        contacts: FloatArray,
-        scales: Scales,
-    ) -> FloatArray:
+    def _covariance(self, point: _Point, scales: Scales) -> FloatArray:
         """Return the covariance of the unknowns, from the errors of blocks of the pictures."""
         height, width = self._real.shape[:2]
         rows, columns = (BLOCKS * np.mgrid[:height, :width] / width).astype(np.int64)
         blocks = BLOCKS * rows + columns
         count, size = int(blocks.max()) + 1, self.count + 3 * len(self._masks)
         matrices, scores = np.zeros((count, size, size)), np.zeros((count, size))
-        for unknowns, jacobian, weight, residual, mask in self._linear(
-            pictures, steps, contacts, scales
-        ):
+        for unknowns, jacobian, weight, residual, mask in self._linear(point, scales):
             for block in np.unique(blocks[mask]):
                 own = blocks[mask] == block
                 flat = jacobian[own].reshape(-1, len(unknowns))
@@ -424,9 +403,8 @@ class LayeredFit:
         other[number] += by
         return by, self.pictures(other, contacts)
 
-    def _contact_moved(
-        self, pictures: list[FloatArray], steps: FloatArray, contacts: FloatArray, index: int
-    ) -> list[list[FloatArray]]:
+    def _contact_moved(self, point: _Point, index: int) -> list[list[FloatArray]]:
+        steps, contacts, pictures = point
         found = []
         for axis in range(3):
             other = contacts[index].copy()
