@@ -81,7 +81,6 @@ def design_view(
     *,
     pictures: bool = True,
     photons: int = PICTURE_PHOTONS,
-    seed: int = 0,
 ) -> DesignView:
     """Trace a design's chief rays, and render it with the balls that its objectives press into it.
 
@@ -106,7 +105,7 @@ def design_view(
         if pictures:
             contacts = model.nine_contacts(Sphere(shared.radius), shared.depth)
             found["pressed"] = shared.radius, shared.depth
-            found["picture"], found["balls"] = _picture(model, contacts, photons, seed, shared.skin)
+            found["picture"], found["balls"] = _picture(model, contacts, photons, shared.skin)
     except SetupError:
         raise
     except OptiSenseError as error:
@@ -140,10 +139,10 @@ def ray_figures(evaluation: Evaluation) -> RayFigures:
 
 
 def _picture(
-    model: OpticalModel, contacts: list[Contact], photons: int, seed: int, skin: str
+    model: OpticalModel, contacts: list[Contact], photons: int, skin: str
 ) -> tuple[NDArray[np.uint8], tuple[Ball, ...]]:
     size = model.design.camera.size_at(ACROSS)
-    image = model.render(contacts, resolution=size, photons=photons, seed=seed, skin=skin)
+    image = model.render(contacts, resolution=size, photons=photons, skin=skin)
     if image.interrupted:
         raise KeyboardInterrupt
     places = np.array([contact.point for contact in contacts], dtype=np.float64)

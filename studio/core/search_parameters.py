@@ -171,23 +171,20 @@ def _one_of(label: str, path: str, now: str, names: Sequence[str]) -> list[Sugge
     return [Suggestion(label, f"{path}={','.join(choices)}")] if len(choices) > 1 else []
 
 
-def for_cage(
-    key: str, chosen: Sequence[int], *, blended: bool, reach: float = REACH
-) -> list[Suggestion]:
+def for_cage(key: str, chosen: Sequence[int], *, blended: bool) -> list[Suggestion]:
     """Return suggestions for a cage: its blend, or its control points.
 
     Args:
         chosen: indices of the selected control points; empty means all.
         blended: whether the cage's shape is a blend of C_min and C_max.
-        reach: range of the control points, mm to either side.
     """
     if blended:
         return [Suggestion(f"{key}: A", f"cages.{key}.blend=0:1")]
     some = f"/points={','.join(str(each) for each in chosen)}" if chosen else ""
     what = f"{len(chosen)} points" if chosen else "all points"
     return [
-        Suggestion(f"{key}: {what} in z", f"cages.{key}.points=+-{reach:g}/axes=z{some}"),
-        Suggestion(f"{key}: {what}", f"cages.{key}.points=+-{reach:g}{some}"),
+        Suggestion(f"{key}: {what} in z", f"cages.{key}.points=+-{REACH:g}/axes=z{some}"),
+        Suggestion(f"{key}: {what}", f"cages.{key}.points=+-{REACH:g}{some}"),
     ]
 
 
