@@ -55,6 +55,7 @@ OutOption = Annotated[
     ),
 ]
 JsonOption = Annotated[bool, json_option("Print JSON instead of a table.")]
+BallOption = Annotated[float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball, mm.")]
 
 PICTURES = "pictures"
 """Name of the progress step of reconstructions."""
@@ -102,11 +103,8 @@ def misalignment(
     variant: VariantOption = "auto",
 ) -> None:
     """Estimate the angle between the sensor and a plane, from the mean colour in the middle."""
-
-    def task() -> PerceptionTask:
-        return tasks.Misalignment(range=angle, depth=depth, crop=crop)
-
-    _perceive(design, {"misalignment": task}, options, out, as_json, variant)
+    wanted = {"misalignment": lambda: tasks.Misalignment(range=angle, depth=depth, crop=crop)}
+    _perceive(design, wanted, options, out, as_json, variant)
 
 
 @task_app.command("cylinder-radius")
@@ -124,20 +122,15 @@ def cylinder_radius(
 ) -> None:
     """Estimate the radius of a cylinder, from the standard deviation of colours in the contact."""
     least, most = options.radius
-
-    def task() -> PerceptionTask:
-        return tasks.CylinderRadius(least=least, most=most, depth=depth)
-
-    _perceive(design, {"cylinder-radius": task}, options, out, as_json, variant)
+    wanted = {"cylinder-radius": lambda: tasks.CylinderRadius(least=least, most=most, depth=depth)}
+    _perceive(design, wanted, options, out, as_json, variant)
 
 
 @task_app.command()
 @handles_errors
 def force(
     design: DesignArgument,
-    ball: Annotated[
-        float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball, mm.")
-    ] = 3.0,
+    ball: BallOption = 3.0,
     depth: Annotated[
         float,
         typer.Option(
@@ -151,20 +144,15 @@ def force(
     variant: VariantOption = "auto",
 ) -> None:
     """Estimate the force on a pressed ball, from the standard deviation of the colours."""
-
-    def task() -> PerceptionTask:
-        return tasks.BallForce(radius=ball, most=depth)
-
-    _perceive(design, {"force": task}, options, out, as_json, variant)
+    wanted = {"force": lambda: tasks.BallForce(radius=ball, most=depth)}
+    _perceive(design, wanted, options, out, as_json, variant)
 
 
 @task_app.command()
 @handles_errors
 def shear(
     design: DesignArgument,
-    ball: Annotated[
-        float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball, mm.")
-    ] = 3.0,
+    ball: BallOption = 3.0,
     depth: Annotated[
         float,
         typer.Option(
@@ -184,11 +172,8 @@ def shear(
     variant: VariantOption = "auto",
 ) -> None:
     """Estimate the shear force on a dragged ball, from the motion of the markers in the picture."""
-
-    def task() -> PerceptionTask:
-        return tasks.BallShear(radius=ball, most=depth, farthest=drag)
-
-    _perceive(design, {"shear": task}, options, out, as_json, variant)
+    wanted = {"shear": lambda: tasks.BallShear(radius=ball, most=depth, farthest=drag)}
+    _perceive(design, wanted, options, out, as_json, variant)
 
 
 @task_app.command()
