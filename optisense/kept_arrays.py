@@ -35,8 +35,7 @@ class KeptArrays:
         """Set the folder; None stores nothing.
 
         Args:
-            folder: folder of the arrays alone, made when it is needed, in a folder whose lock is
-                held.
+            folder: folder of the arrays alone, made when needed, in a folder whose lock is held.
         """
         self._folder = folder
 

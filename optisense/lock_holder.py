@@ -28,8 +28,7 @@ class Holder:
         boot: boot identifier of its machine; empty if there is none.
         began: local time of its start, ISO 8601.
         command: command line of the process.
-        making: files that it was about to make, relative to the folder; empty once they are
-            complete.
+        making: files that it was about to make, relative to the folder; empty once complete.
         folders: folders that it was about to create for them.
     """
 

@@ -49,8 +49,7 @@ def photons_of(quality: int | float | str) -> int:
     """Return the number of photons of a level, or a number as it is.
 
     Args:
-        quality: level, or a whole number from 1 to `MOST_PHOTONS`, also as text or as a float such
-            as 2e6.
+        quality: level, or a whole number from 1 to `MOST_PHOTONS`, also as text or as a float.
 
     Raises:
         ValueError: the argument is neither.

@@ -45,8 +45,7 @@ class Registry(Generic[T]):
             noun: word for one of the objects, such as "search method".
             group: group of the entry points.
             error: class of errors about these objects.
-            built_in: place of definition of each object of this package ("module:attribute"), by
-                name.
+            built_in: place of definition of each object of this package ("module:attribute").
             check: function that is called with name and object, and raises `error` if the object
                 does not fit.
             adapt: function that is called with name and object of an entry point, and returns the
@@ -62,8 +61,7 @@ class Registry(Generic[T]):
         """Add an object; the same one again (from a file that is run once more) replaces itself.
 
         Raises:
-            OptiSenseError: the name is malformed or taken by another object, or the object does not
-                fit.
+            OptiSenseError: the name is malformed or taken, or the object does not fit.
         """
         if name != name.strip().lower() or not name or set(name) & set(":,@/"):
             raise self._error(

@@ -198,8 +198,7 @@ def read_table(path: Path, error: Error, padded: bool = False) -> list[dict[str,
             written by hand; the others are empty.
 
     Raises:
-        error: the file can't be read, as in `read_text`, or is no such table; the message names the
-            line.
+        error: the file can't be read, as in `read_text`, or is no such table; it names the line.
     """
     text = read_text(path, MOST_TABLE, error, "the table")
     reader = csv.DictReader(io.StringIO(text, newline=""), restval="" if padded else None)

@@ -173,8 +173,7 @@ class LayeredFit:
 
         Args:
             steps: (n,) steps of the quantities, in plausible ranges from their starts.
-            contacts: (presses, 3) changes of column and row, pixels, and of the logarithm of the
-                radius.
+            contacts: (presses, 3) changes of column, row (pixels) and the logarithm of the radius.
         """
         return [self._shown(-1, steps, None)] + [
             self._shown(index, steps, contacts[index]) for index in range(len(self._masks))

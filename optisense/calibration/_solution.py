@@ -18,8 +18,7 @@ class Solution:
 
     Attributes:
         steps: steps (n,) of the quantities, in plausible ranges from their starts.
-        contacts: changes (presses, 3) of column and row, pixels, and of the logarithm of the
-            radius.
+        contacts: changes (presses, 3) of column, row (pixels) and the logarithm of the radius.
         covariance: covariance (n, n) of the steps: that of the posterior, plus that of the
             jackknife over blocks of the pictures, plus that of the changes since an earlier
             solution.

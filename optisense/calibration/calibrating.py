@@ -54,8 +54,7 @@ def calibrate(
         photographs: photographs of the sensor.
         settings: settings of the fit; the defaults if None.
         variant: variant of the renderer.
-        kept: store of renderings: those of an interrupted run are reused, and those of this one are
-            kept.
+        kept: store of renderings: those of an interrupted run are reused, this one's are kept.
         progress: function that is called before each rendering and each step of the fit.
 
     Raises:

@@ -55,8 +55,7 @@ def read_photographs(folder: str | Path, diameter: float | None = None) -> Photo
         diameter: diameter of the ball, mm, if the folder does not state it.
 
     Raises:
-        CalibrationError: no layout fits, a file is missing or damaged, or the pictures have
-            different sizes.
+        CalibrationError: no layout fits, a file is missing or damaged, or picture sizes differ.
     """
     place = Path(folder)
     if place.name == DATA_PACK and is_file(place):

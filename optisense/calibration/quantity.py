@@ -19,8 +19,7 @@ class FitQuantity:
     """Single number that is fitted.
 
     Attributes:
-        path: path in the design, or a name of the same form if several of its values follow from
-            the number.
+        path: path in the design, or a name of that form if several values follow from the number.
         words: description of the number.
         unit: unit of the number; empty if it has none.
         start: value before the fit.

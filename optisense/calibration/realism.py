@@ -73,8 +73,7 @@ class PressRealism:
         name: name of the photograph.
         unexplained: ratio of the energy of the error to that of the real response, in the patch of
             1.35 radii.
-        contact: ratio of the root mean square of the error to that of the real response, in the
-            contact.
+        contact: ratio of the root mean square of the error to that of the response, in the contact.
         ring: the same ratio in the ring.
         strength: root mean square of the real response in the contact, levels.
         far: root mean square of the error beyond three radii, levels.
@@ -87,8 +86,7 @@ class PressRealism:
         similarity: structural similarity (SSIM) of the responses, mean over the patch.
         turn: angles between the directions in which the model and the sensor brighten over the
             contact, for R, G and B, degrees.
-        gain: ratio of the model's brightening along the sensor's direction to the sensor's, for R,
-            G and B.
+        gain: ratio of the model's brightening along the sensor's way to the sensor's, R, G, B.
         noise: figures of a model without errors.
     """
 

@@ -24,8 +24,7 @@ class Calibration:
         design: fitted design.
         exposure: exposure at which its pictures are as bright as the photographs.
         numbers: fitted numbers.
-        alike: pairs of numbers, in words, that the photographs can't distinguish, and their
-            correlation.
+        alike: pairs of numbers, in words, that photographs can't distinguish, and correlations.
         before, after: comparisons of the original and the fitted design with all photographs.
         held_out: names of the presses that the fit did not use.
         notes: doubtful findings, one sentence each.

@@ -163,8 +163,7 @@ def progress_line(
     to time.
 
     Args:
-        waits: function that says what Ctrl-C waits for, if it does not act at once; see
-            `stopping.waiting`.
+        waits: function that says what Ctrl-C waits for, if it does; see `stopping.waiting`.
     """
     line = ProgressLine(steps, time.monotonic)
     with stopping.waiting(None if waits is None else lambda: waits(line)):

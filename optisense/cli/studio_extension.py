@@ -134,8 +134,7 @@ def find_blender(named: Path | None = None) -> tuple[Path, str]:
     """Return the Blender to use and its version.
 
     Args:
-        named: path given by the user; without it, the search path and the usual places are
-            searched.
+        named: path given by the user; without it, the search path and usual places are searched.
 
     Raises:
         SetupError: there is none, it does not start, or it is too old.

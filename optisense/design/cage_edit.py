@@ -180,8 +180,7 @@ def set_range(
         design: design, which is not changed.
         name: name of the cage.
         c_min, c_max: control points (N, 3) of the ends, mm; None takes the present shape.
-        blend: share of c_max in the shape, for all points; None keeps the points of the present
-            shape.
+        blend: share of c_max in the shape, for all points; None keeps the present points.
 
     Raises:
         DesignError: there is no such cage, or the numbers do not fit.

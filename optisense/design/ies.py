@@ -32,11 +32,9 @@ class IesProfile:
     Attributes:
         vertical_angles: angles (nv,) from the axis, degrees, ascending, within 0..180. Outside
             their range the lamp is dark.
-        horizontal_angles: angles (nh,) around the axis, degrees, ascending, from 0 to 360
-            inclusive.
+        horizontal_angles: angles (nh,) around the axis, degrees, ascending, from 0 to 360.
         candela: intensity (nh, nv), with multiplier and ballast factor applied.
-        rated_lumens: lumens that the header states for its bare lamps, or None (absolute
-            photometry).
+        rated_lumens: lumens that the header states for bare lamps, or None (absolute photometry).
     """
 
     vertical_angles: FloatArray

@@ -23,8 +23,7 @@ def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> 
     """Refuse finishes of parts that can't have them, and paints that are no opaque materials.
 
     Raises:
-        InconsistentValueError: the part is no transparent solid, or a paint is unknown or
-            transparent.
+        InconsistentValueError: the part is no transparent solid, or a paint unknown or transparent.
     """
     for label, finish in (part.faces or {}).items():
         path: tuple[str | int, ...] = ("parts", name, "faces", label)
@@ -72,8 +71,7 @@ def finished_faces(
         where: file and line, for messages.
 
     Raises:
-        DesignError: the finish selects no face; the message gives the direction of the nearest
-            ones.
+        DesignError: the finish selects no face; the message has the direction of the nearest.
     """
     chosen = np.flatnonzero(mesh.face_areas > 0.0)
     hint = None

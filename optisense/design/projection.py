@@ -140,8 +140,7 @@ def _first_fold(camera: Camera, shown: FloatArray) -> float:
     """Return the smallest angle off the axis, degrees, at which the lens folds.
 
     Args:
-        shown: positions (2, k) on the image plane, towards the farthest of which the fold is
-            searched.
+        shown: positions (2, k) on the image plane, up to the farthest of which folds are searched.
     """
     lens = camera.distortion
     assert lens is not None

@@ -31,8 +31,7 @@ def fresnel_metal(cosine: ArrayLike, eta: ArrayLike, k: ArrayLike) -> FloatArray
 
     Args:
         cosine: cosine of the angle of incidence, of any shape.
-        eta: real part (c,) of the metal's index divided by the index in front of it, for each
-            channel.
+        eta: real part (c,) of the metal's index divided by the index before it, by channel.
         k: imaginary part (c,), divided likewise.
 
     Returns:

@@ -26,8 +26,7 @@ class Outline(NamedTuple):
     Attributes:
         name: name of the part.
         role: role of the part.
-        lines: polylines (n, 2), mm; those of a solid are closed, with the first point repeated at
-            the end.
+        lines: polylines (n, 2), mm; those of a solid are closed: the first point is repeated.
     """
 
     name: str

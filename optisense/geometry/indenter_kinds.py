@@ -152,8 +152,7 @@ class IndenterKind(ABC):
         """Read the text after the colon: the numbers in their order.
 
         Raises:
-            ContactError: there are too few or too many numbers, or one is not a number or outside
-                its limits.
+            ContactError: there are too few or too many numbers, or one is outside its limits.
         """
         fields = dataclasses.fields(cls)
         needed = sum(each.default is MISSING for each in fields)

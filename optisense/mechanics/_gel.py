@@ -139,8 +139,7 @@ class Gel:
             skin: its mesh, with all its triangles.
             elastomers: the gels under it; without any the gel is `USUAL_THICKNESS` thick.
             elasticity: elastic constants of the gel.
-            place: function that returns the placed mesh of a contact's indenter in the design's
-                frame (mm).
+            place: function that returns a contact's placed indenter in the design's frame (mm).
             check: function that is called before the first press and raises if the gel cannot be
                 pressed at all.
             coarse: whether contacts are solved on coarser grids, and in a flat layer as thick as

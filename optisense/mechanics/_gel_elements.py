@@ -32,8 +32,7 @@ class GelElements:
         fixed: (f, 3) nodes that are fixed, mm.
         points: (faces, 4, 3) Gauss points of the skin and of the free sides, mm.
         normals: (faces, 4, 3) outward normals there, times each point's share of the area.
-        supports: (s, 4, 3) Gauss points of the base and of the sides beyond which the gel
-            continues, mm.
+        supports: (s, 4, 3) Gauss points of the base and of sides beyond which the gel goes on, mm.
         support_normals: (s, 4, 3) outward normals there, times each point's share of the area.
         size: number of free displacements.
     """

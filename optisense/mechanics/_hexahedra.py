@@ -84,8 +84,7 @@ def face_points(corners: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray
     """Return the Gauss points of faces, at which loads are evaluated.
 
     Args:
-        corners: (m, 4, 3) corners of each face (mm), x running first; the normal is that of x cross
-            y.
+        corners: (m, 4, 3) corners of each face (mm), x first; the normal is x cross y.
 
     Returns:
         The points (m, 4, 3), mm; normals (m, 4, 3) times each point's share of the area; and the

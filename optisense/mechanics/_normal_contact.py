@@ -46,8 +46,7 @@ def solve_normal_contact(
         overlap: (rows, columns) depth (mm) of the undeformed skin inside the indenter; negative
             where there is a gap.
         start: initial pressure, MPa.
-        tolerance: tolerance at which the iteration ends; larger than `TOLERANCE` for intermediate
-            results.
+        tolerance: tolerance at which the iteration ends; above `TOLERANCE` for interim results.
 
     Raises:
         ContactError: the iteration does not converge.

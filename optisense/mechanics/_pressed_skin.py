@@ -60,8 +60,7 @@ class Pressed:
         place: its grid and overlap.
         pressure: (rows, columns) pressure (MPa) on this grid.
         field: the displacement that it causes.
-        shear: (2, rows, columns) shear (MPa) along x and y of the grid, if the indenter was
-            dragged.
+        shear: (2, rows, columns) shear (MPa) along x and y, if the indenter was dragged.
         beyond: (rows, columns) normal displacement (mm) of the gel in addition to that of a flat
             layer, on the grid of the gel's patch, if it has one.
         warning: a sentence about the error of the force, if it is large.
@@ -228,8 +227,7 @@ def press(
     Args:
         places: the footprint of each indenter on the undeformed skin.
         patches: the gel's shape around each place; None where it is a flat layer.
-        drags: the motion of each indenter along the skin after it was pressed in; None where there
-            is none.
+        drags: the motion of each indenter along the skin after its press; None without one.
 
     Raises:
         ContactError: a pressure or a shear does not converge; the error tells the residual.

@@ -64,8 +64,7 @@ def aoap(
     not arrive), plus k1 times the share of the surface's triangles that are seen.
 
     Args:
-        coverage_weight: weight k1, from 0 to 1; with 1, full coverage counts as much as
-            perpendicular rays.
+        coverage_weight: weight k1, 0 to 1; with 1, coverage counts as much as perpendicular rays.
     """
     refuse_outside("coverage_weight", coverage_weight, 0.0, 1.0)
     rays = evaluation.checked_rays

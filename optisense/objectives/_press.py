@@ -48,8 +48,7 @@ class Press:
         camera: picture chain that turns the response into the stored picture.
         window: the part of the picture that the images show; all of it if None.
         respond_untouched: function that computes `untouched`.
-        geometry: values that objectives have derived from everything but the response (see
-            `derived`).
+        geometry: values that objectives derived from everything but the response (see `derived`).
     """
 
     number: int

@@ -167,8 +167,7 @@ class _KnownPress:
     Attributes:
         grid, mask, seen, true_normals: as in `ReadPress`.
         order: (n,) order of the pixels seen in which the m pixels of the contact come first.
-        frames: (n, 3, 3) frame of each pixel: two unit tangents of the untouched surface, and its
-            normal.
+        frames: (n, 3, 3) frame of each pixel: unit tangents of the untouched surface, and normal.
         tilts: (m, 2) true tilts, degrees (see `optisense.reading.lookup.tilt_grid`).
     """
 

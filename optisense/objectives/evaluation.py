@@ -131,8 +131,7 @@ class Evaluation(CachedValues):
         """The chief rays, after a check that the camera sees enough for a score.
 
         Raises:
-            ObjectiveError: the camera sees less than `Settings.least_skin` or
-                `Settings.least_picture`.
+            ObjectiveError: the camera sees less than `least_skin` or `least_picture` of `Settings`.
         """
         self.view.refuse_less(self.settings)
         return self.chief_rays

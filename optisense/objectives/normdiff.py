@@ -138,8 +138,7 @@ def normdiff(
         theta_weight, phi_weight: weights of the two ranges in the sum.
         nearest_only: whether the confusion at a normal is that of the one pixel nearest to it,
             instead of the mean over all pixels that it is nearest to.
-        colours: kind of colours that the noise is added to, "response" or "picture" (see
-            `Press.colours`).
+        colours: kind of colours with the noise, "response" or "picture" (see `Press.colours`).
         least_pixels: smallest number of indented pixels of a press.
     """
     refuse_outside("noise", noise, 0.0, 1.0)

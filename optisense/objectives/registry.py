@@ -277,8 +277,7 @@ def find(name: str) -> Objective:
     """Return an objective by its name, or by ``file.py:function``.
 
     Raises:
-        ObjectiveError: there is no such objective (the message names a near match), or it cannot be
-            loaded.
+        ObjectiveError: no such objective (the message names a near match), or it can't be loaded.
     """
     file, separator, function = name.rpartition(":")
     if separator and file.endswith(".py"):
@@ -292,8 +291,7 @@ def from_file(path: Path, function: str | None = None) -> Objective:
     """Load a user's objective from a Python file, which is run.
 
     Args:
-        function: name of the function in the file; optional if the file registers a single
-            objective.
+        function: name of the function in the file; optional if it registers one objective.
 
     Raises:
         ObjectiveError: the file is missing, fails, or has no such function.

@@ -37,12 +37,9 @@ class _Seen:
         press: the unexposed press at full size.
         small: the unexposed press, cropped to the box of its contact.
         box: rows and columns of that box.
-        around: rows and columns of the box, extended by the pixels whose overexposure can spread
-            into it.
-        touched: (h', w') mask, within `around`, of the pixels that contacts touch in the press's
-            image.
-        own: (n,) mask of those of these pixels that belong to the press (its image may show other
-            presses).
+        around: rows and columns of the box, extended by pixels whose overexposure spreads into it.
+        touched: (h', w') mask, within `around`, of the pixels that contacts touch in the image.
+        own: (n,) mask of those of these pixels that belong to the press (and not to others).
         layers: (groups, 3, n) radiance of these pixels for lights of 1 mW per channel.
     """
 

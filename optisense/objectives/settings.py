@@ -44,8 +44,7 @@ class Settings:
     """Images and rays that objectives share. Lengths in mm.
 
     Attributes:
-        resolution: (width, height) of the images, pixels; if None, 640 wide with the camera's
-            aspect ratio.
+        resolution: (width, height) of images, pixels; if None, 640 wide as the camera's are.
         ray_resolution: (width, height) of the chief rays; the same default.
         photons: number of photons for the light, or a level of `optisense.quality`; fine if None.
         seed: seed of the photons and camera samples.
@@ -58,8 +57,7 @@ class Settings:
         least_skin: smallest share, 0 to 1, of the sensing surface's area that the camera must see
             for a score.
         least_picture: smallest share, 0 to 1, of the pixels that must see the sensing surface.
-        skin: "conforming", as in the definitions of the OptiSense paper, or "elastic"; see
-            docs/mechanics.md.
+        skin: "conforming", as in the OptiSense paper, or "elastic"; see docs/mechanics.md.
     """
 
     resolution: tuple[int, int] | None = None

@@ -25,10 +25,8 @@ class Rays(Protocol):
     """Chief rays of a picture.
 
     Attributes:
-        codes: (h, w) path codes: 0 where a ray does not arrive; neighbours of equal code take the
-            same path.
-        cosine: (k,) cosine of the angle between ray and normal for the k rays that arrive, row
-            after row.
+        codes: (h, w) path codes: 0 where no ray arrives; neighbours of equal code go the same way.
+        cosine: (k,) cosine of the angle between ray and normal for the k arriving rays, by row.
         weight: (k,) area of the picture that each ray stands for, pixels.
         points: (k, 3) end points, mm.
         density: (k,) share of the surface's triangles per area (1/mm²) at each end point.

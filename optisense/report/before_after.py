@@ -85,8 +85,7 @@ def design_view(
     """Trace a design's chief rays, and render it with the balls that its objectives press into it.
 
     Args:
-        settings: settings of the objectives, of which ball, depth and resolution of the rays are
-            used.
+        settings: settings of the objectives, of which ball, depth and ray resolution are used.
         pictures: whether to render; the rays alone take a tenth of a second.
         photons: number of photons for the picture.
 

@@ -56,8 +56,7 @@ class RealComparison:
         own_spread: root mean square deviation of the real picture's pixels from their mean, for
             comparison, levels.
         shares: shares (2, 3) of the real and of the model's light in red, green and blue.
-        evenness: ratio (2, 3) of the linear brightness of the background's dark to its bright
-            parts.
+        evenness: ratio (2, 3) of the linear brightness of the background's dark to bright parts.
         shading: correlation (3,) of both pictures' linear brightness over the ball.
     """
 

@@ -105,8 +105,7 @@ class GelBeltDimensions(Dimensions):
         tape_thickness: thickness of the clear tape on the inner face of the belt, mm.
         film_thickness: air gap between tape and acrylic, and between tape and wheels, mm; with 0
             the tape is in optical contact with the acrylic.
-        coat_thickness: thickness of the belt's black coat for manufacturing, mm; light meets its
-            inner face.
+        coat_thickness: thickness of the belt's black coat as made, mm; light meets its inner face.
         wheel_radius: radius of the wheels, mm.
         wheel_distance: distance between the wheels' axes in light designs 1 and 2, mm.
         roller_radius: radius of the small roller of light design 3, mm.

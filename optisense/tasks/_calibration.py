@@ -71,12 +71,10 @@ class ReconstructionSettings:
         method: "network" or "table" (see `colour_to_normal`).
         presses: number of balls that the reader is fitted to.
         radius: radius of these balls, mm.
-        depth: smallest and largest depth (mm); the largest determines the steepest slope that is
-            learned.
+        depth: smallest and largest depth (mm); the largest sets the steepest slope learned.
         seed: seed of places, depths, noise and network.
         camera_noise: standard deviation of the noise of all pictures, levels of 255.
-        resolution: (width, height) pixels; if None, `width` pixels wide with the camera's aspect
-            ratio.
+        resolution: (width, height) pixels; if None, `width` wide in the camera's proportions.
         width: width (pixels) if no resolution is given.
         photons: number of photons of the light that all pictures share.
         skin: "elastic" or "conforming"; see docs/mechanics.md.

@@ -112,8 +112,7 @@ class ContactDraw:
         indenters: texts of `parse_indenter`, drawn with equal probability.
         depth: smallest and largest depth, mm.
         rotation: smallest and largest rotation (degrees) about the outward normal.
-        tilt: largest rotation (degrees) about each of two axes in the surface, drawn from -tilt to
-            tilt.
+        tilt: largest rotation (degrees) about each of two axes in the surface, of either sign.
         margin: margin between a contact and the picture's edge as a share of the picture's width,
             from 0 to less than a half; with 0 the edge may cut contacts.
     """

@@ -89,8 +89,7 @@ def generate(
         FolderInUseError: another process is writing to the folder.
         ContactError, MeshError: an indenter cannot be read.
         OutputError: the folder holds something else, or a file cannot be written.
-        KeyboardInterrupt: Ctrl-C was pressed; finished samples are kept, and a further call
-            continues.
+        KeyboardInterrupt: Ctrl-C was pressed; finished samples are kept for a further call.
     """
     if count < 1:
         raise TaskError(f"{count} samples are asked for", hint="Ask for 1 or more")

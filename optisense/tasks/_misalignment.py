@@ -69,8 +69,7 @@ class Misalignment:
     Attributes:
         range: bound (degrees) of both angles, drawn uniformly from -range to range.
         depth: depth (mm), with which the crop lies within the contact at all angles.
-        crop: share of the picture's width and height over which the mean is taken, where it shows
-            the plane.
+        crop: share of the picture's width and height with the mean, where it shows the plane.
     """
 
     range: float = 10.0
@@ -151,8 +150,7 @@ def plane_contact(model: OpticalModel, angle_x: float, angle_y: float, depth: fl
     """Return a plane over the camera's whole view.
 
     Args:
-        angle_x, angle_y: rotation (degrees) about the u axis and then about the axis perpendicular
-            to it.
+        angle_x, angle_y: rotation (degrees) about the u axis, then the perpendicular one.
         depth: depth (mm) of the plane below the middle of the surface.
 
     Raises:

@@ -94,8 +94,7 @@ class PerceptionTask(Protocol):
         """Return the features of a picture (h, w, 3) that the camera stored.
 
         Raises:
-            TaskError: the features cannot be computed, for instance because the contact is not
-                seen.
+            TaskError: the features cannot be computed, for instance as the contact is not seen.
         """
         ...
 
@@ -108,8 +107,7 @@ class SampleSettings:
         count: number of samples.
         seed: seed of all random numbers; sample i depends on it and on i only.
         camera_noise: standard deviation in levels of 255 (see `camera_noise`).
-        resolution: (width, height) pixels; if None, the task's width with the camera's aspect
-            ratio.
+        resolution: (width, height) pixels; if None, the task's width in the camera's proportions.
         photons: number of photons of the light that all samples share.
         estimator: estimator of the light, "radiance-cache" or "sppm".
         skin: "elastic" or "conforming"; see docs/mechanics.md.
@@ -188,10 +186,8 @@ def perceive(
         model: the sensor.
         settings: settings of the samples; the defaults if None.
         neighbours: number k of neighbours of the signal-to-noise ratio.
-        folder: folder that stores the samples, so that interrupted work continues; None keeps them
-            in memory.
-        progress: function that is called with the number of finished samples and their total
-            number.
+        folder: folder that stores the samples, so that work continues; None: only in memory.
+        progress: function that is called with the number of finished samples and of all.
 
     Raises:
         TaskError: a contact is not seen, there are too few samples, or the folder holds samples

@@ -62,8 +62,7 @@ class Reconstruction:
 
     Attributes:
         picture: (h, w, 3) uint8.
-        normals, true_normals, untouched_normals: (h, w, 3) unit normals into the gel, in the
-            design's frame.
+        normals, true_normals, untouched_normals: (h, w, 3) unit normals into the gel.
         depth, true_depth: (h, w) depth along the inward normal, mm.
         mask: (h, w) mask of the contact, where its skin is also seen untouched; errors are means
             over its pixels.

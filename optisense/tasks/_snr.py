@@ -38,8 +38,7 @@ def signal_to_noise(features: ArrayLike, targets: ArrayLike, neighbours: int = N
         The ratio; infinite if neighbours agree exactly.
 
     Raises:
-        TaskError: there are too few samples for k, the numbers of samples differ, or a number is
-            not finite.
+        TaskError: too few samples for k, numbers of samples that differ, or a not finite number.
     """
     x, y = _columns(features), _columns(targets)
     if len(x) != len(y):

@@ -104,8 +104,7 @@ class Dataset:
         """Open a dataset, finished or not.
 
         Raises:
-            TaskError: the folder holds no dataset, or one of another release, or its tables cannot
-                be read.
+            TaskError: the folder holds no dataset of this release, or its tables cannot be read.
         """
         folder = Path(folder)
         if not is_file(folder / INFO):
@@ -123,8 +122,7 @@ class Dataset:
         """Read a sample.
 
         Raises:
-            TaskError: one of its files is missing or damaged; the message names the sample and the
-                file.
+            TaskError: one of its files is missing or damaged; the message names sample and file.
         """
         labels = self.labels[number]
         try:
@@ -184,8 +182,7 @@ class Dataset:
             name: "train", "validation" or "test".
 
         Raises:
-            TaskError: there is no such split, or the dataset is of release 0.1, which has no
-                splits.
+            TaskError: there is no such split, or the dataset is of release 0.1, without splits.
         """
         if name not in SPLITS:
             raise TaskError(f"there is no split '{name}'", hint="Name one: " + ", ".join(SPLITS))

@@ -97,8 +97,7 @@ def read_info(folder: Path) -> dict[str, Any]:
     """Return the content of `dataset.json`.
 
     Raises:
-        TaskError: the file is missing, damaged, or of another release; the message names the
-            defect.
+        TaskError: the file is missing, damaged, or of another release; the message says which.
     """
     path = folder / INFO
     info = read_object(path)

@@ -70,8 +70,7 @@ def error_change(before: FloatArray, after: FloatArray, seed: int = 0) -> ErrorC
     drawn separately for each sensor, as they are independent.
 
     Args:
-        before, after: (objects, places, readers) errors of both sensors on the same presses; higher
-            is worse.
+        before, after: (objects, places, readers) errors of both sensors on the same presses.
     """
     if before.shape[:2] != after.shape[:2]:
         raise ValueError(f"errors of other presses: {before.shape} and {after.shape}")

@@ -122,8 +122,7 @@ class Verification:
         same_places: whether both were pressed at the same places; otherwise their skins differ.
         normals: (objects, places, readers) errors of the normals of each sensor, degrees.
         depths: (objects, places, readers) errors of the depth of each sensor, mm.
-        flat: errors (degrees and mm) of a reader that always reads a flat surface, means over all
-            presses.
+        flat: mean errors (degrees and mm) of a reader that always reads a flat surface.
         views: measures of the view of each sensor.
         pictures: pictures of each sensor at the first place of each object.
         contacts: contacts of each object with the first sensor.
@@ -255,8 +254,7 @@ def verify(
         kept: store of what is read from each press.
 
     Raises:
-        TaskError: a camera sees nothing, there is no place for an object, or a sensor cannot be
-            calibrated.
+        TaskError: a camera sees nothing, an object has no place, or a sensor can't be calibrated.
     """
     settings = settings or VerificationSettings()
     for name, model in zip(names, models, strict=True):

@@ -23,8 +23,7 @@ class ShapeFormat:
         write: function that writes a file, called with its path, the name of the design and the
             shapes. It may return a list of notes.
         holds_all: whether one file holds all shapes; otherwise each shape has a file of its own.
-        require: function that is called before any work; raises `SetupError` if a package is not
-            installed.
+        require: function called before any work; raises `SetupError` if a package is missing.
         note: note for the user before a long export; empty if there is none.
     """
 

@@ -104,8 +104,7 @@ def moulds(made: list[Shape]) -> list[Mould]:
     """Return the moulds of all gels of a design.
 
     Raises:
-        DesignError: a gel is no solid, or the skin points in all directions; the message says
-            which.
+        DesignError: a gel is no solid, or the skin points in all directions, as the message says.
     """
     pull = _outward([shape.mesh for shape in made if shape.role is Role.SENSING_SURFACE])
     return [mould_of(shape, pull) for shape in made if shape.role is Role.ELASTOMER]

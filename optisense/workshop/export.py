@@ -47,8 +47,7 @@ def export(
         The paths of the files, in the order of the parts.
 
     Raises:
-        DesignError: a part has no mesh, or lies outside of the cage that deforms it; or a gel has
-            no mould.
+        DesignError: a part has no mesh, or lies outside of its cage; or a gel has no mould.
         SetupError: a format needs a package that is not installed.
         OutputError: there is no such format, or the folder can't be written.
     """

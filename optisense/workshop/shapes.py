@@ -24,8 +24,7 @@ class Shape:
         mesh: mesh in the frame of the design, mm; coincident corners are one vertex.
         rest: mesh before its cage deformed it, None if it has no cage.
         cage: cage that deforms it.
-        thickness: thickness of a sheet for manufacturing, mm; None if it is no sheet or has no
-            thickness.
+        thickness: thickness of a sheet for manufacturing, mm; None for others or if unknown.
         sheet: shape of such a sheet without its thickness.
     """
 

@@ -50,8 +50,7 @@ def viewed(
         compare: `WIPE` shows the pinned picture left of `wipe`, `DIFFERENCE` shows the difference,
             grey where both are alike, `NONE` shows the picture alone.
         wipe: position of the line between both pictures, 0 to 1 of the width.
-        gain: factor by which differences are multiplied; with 1 the full range goes from black to
-            white.
+        gain: factor on the differences; with 1 the full range goes from black to white.
 
     Returns:
         (h, w, 4) float32, opaque.

@@ -46,8 +46,7 @@ class SoftFocus:
     """Blur of a lens over the picture.
 
     Attributes:
-        deviation: standard deviation as a share of the picture's width, (h, w) of any size, or
-            (1, 1).
+        deviation: standard deviation as a share of the picture's width, (h, w) or (1, 1).
     """
 
     deviation: FloatingArray

@@ -91,8 +91,7 @@ def lobes(surface: Reflection, angle: FloatArray) -> tuple[FloatArray, FloatArra
 
     Args:
         surface: reflection in the medium before the surface.
-        angle: angles (n,) from the normal, degrees, positive on the side away from the incident
-            light.
+        angle: angles (n,) from the normal, degrees, positive away from the incident light.
 
     Returns:
         The diffuse part and the metallic part, (n, 3) each, for R, G, B.

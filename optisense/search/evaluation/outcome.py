@@ -32,8 +32,7 @@ class Outcome:
             the value of the limited quantity of each condition of the search, by the condition's
             text.
         seconds: wall time of the trial, s.
-        gradient: gradient (n,) of the first objective by the coordinates, where a method asks for
-            it.
+        gradient: gradient (n,) of the first objective by the coordinates, if a method asks for it.
         worker: name of the process that scored the trial.
     """
 

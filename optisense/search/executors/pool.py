@@ -83,8 +83,7 @@ class ProcessPool(Runner):
 
         Args:
             workers: number of processes.
-            threads: threads of each worker's renderer; the worker's share of the processors if
-                None.
+            threads: threads of each worker's renderer; the worker's share of processors if None.
 
         Raises:
             SearchError: `workers` is below 1, or the evaluator can't be pickled.

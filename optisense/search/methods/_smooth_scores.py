@@ -40,8 +40,7 @@ class SmoothScore:
         these.
 
         Args:
-            settings: settings of the objectives; those that a smooth form does not know are
-                ignored.
+            settings: settings of the objectives; those that a smooth form lacks are ignored.
         """
         found: dict[ScoreTerm, Slopes] = {}
         for each in self.expression.quantities:

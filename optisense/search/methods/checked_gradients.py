@@ -129,8 +129,7 @@ class GradientEvaluator(PickledWithoutCaches):
             resolution: number of rays across the image.
             seed: seed of the search. Trials that are scored again with another seed need no
                 gradients, and get none.
-            layers: True if `usual` relights layers, so that all gradients are differences of its
-                scores.
+            layers: True if `usual` relights layers, so that all gradients are differences.
         """
         self.usual = usual
         self.parts = parts

@@ -61,8 +61,7 @@ def find_variables(design: SensorDesign, path: str) -> list[DesignVariable]:
     """Return the variables that a path names: none for an ordinary path, three for a whole vector.
 
     Raises:
-        SearchError, DesignError: the path has the form of a variable but names nothing in the
-            design.
+        SearchError, DesignError: the path has a variable's form but names nothing in the design.
     """
     move = re.fullmatch(
         r"(?:(lights|parts)\.([^.\[\]]+)|(camera))\.(shift|turn|aim)(?:\.([^.]+))?", path

@@ -102,8 +102,7 @@ class BoundSpace:
     Attributes:
         space: the unbound space.
         design: design that it was bound to.
-        prepared: the same design in the form in which parameters are set (a cage with a blend, for
-            example).
+        prepared: the same design in the form to set parameters in (a cage with a blend, say).
         parameters: parameter of each coordinate.
         lower, upper: bounds (n,), included.
         start: the design as a point (n,), or the point nearest to it.

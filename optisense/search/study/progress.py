@@ -30,8 +30,7 @@ class SearchProgress:
         best: best score so far of trials that meet all conditions; NaN before there is one.
         start: score of the start.
         trials_per_hour: rate of the last trials; 0 before it is known.
-        seconds_left: time until the end, s, including the scoring with fresh seeds; NaN before it
-            is known.
+        seconds_left: time until the end, s, with the scoring by fresh seeds; NaN if not known yet.
         facts: facts that the method reports about its state.
         doing: stage of the current trial, if it is scored in this process.
     """

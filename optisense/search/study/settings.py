@@ -57,8 +57,7 @@ class StudySettings:
             on which they rest.
         rules: constraints as FILE.py:FUNCTION, or "function:NAME".
         files: SHA-256 of each user's file with objectives or rules, by path.
-        errors: manufacturing errors, as from `ManufacturingErrors.to_plain`, if P10 is searched;
-            else None.
+        errors: manufacturing errors, as from `ManufacturingErrors.to_plain`, for P10; else None.
         samples: number of manufactured sensors per trial.
         requirements: conditions that the best trial must meet.
         coarse_first: whether trials have coarse scores, and only the promising ones full scores.
@@ -127,8 +126,7 @@ class StudySettings:
         """Read study.json.
 
         Raises:
-            SearchError: there is no study, its settings can't be read, or a newer release wrote
-                them.
+            SearchError: there is no study, its settings can't be read, or are of a newer release.
         """
         path = folder / STUDY_FILE
         if not is_file(path):

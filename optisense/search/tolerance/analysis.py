@@ -72,8 +72,7 @@ class ScoreDistribution:
 
     Attributes:
         nominal: score of the nominal design.
-        noise: standard deviation of the nominal design's score over seeds; 0 if seeds do not
-            matter.
+        noise: standard deviation of the nominal design's score over seeds; 0 if they don't matter.
         scores: scores (rows, k) of the sensors, NaN where one failed.
         percentiles: percentiles by name ("p10", ...).
         shares: share of each source of error in the variance, the largest first; None if too many

@@ -45,8 +45,7 @@ def make_camera(
 
     Args:
         skin: sensing surface with inward normals, mm.
-        place: position of the pupil, (3,) mm; None puts it behind the skin, which then fills the
-            picture.
+        place: position of the pupil, (3,) mm; None puts it where the skin fills the picture.
         target: point that it looks at, (3,) mm, unless the choice has a direction.
         parts: parts; an automatically placed camera is outside of these.
 
