@@ -11,7 +11,7 @@ import numpy as np
 from optisense.array_types import FloatingArray
 from optisense.design.responses.chain import PictureChain
 from optisense.design.responses.full_well import MAX_EXCESS, FullWellResponse
-from optisense.report.pictures import data_uri
+from optisense.report._pictures import data_uri
 
 CODES = 4096
 """Number of levels of a layer: 16 for each grey level of a picture, so that twice the sum of eight

@@ -10,8 +10,8 @@ import numpy as np
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.report._files import as_json, page, script
+from optisense.report._pictures import data_uri
 from optisense.report.comparison import CONTRAST, GREY, shown
-from optisense.report.pictures import data_uri
 from optisense.writing import write_text
 
 USUAL_RADIUS = 0.1

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 from optisense.picture_files import png
-from optisense.report.pictures import data_uri, mask_overlay, normal_colours
+from optisense.report._pictures import data_uri, mask_overlay, normal_colours
 
 AXES = np.array([[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
 """Image right, image up and viewing direction of a camera that looks along +z."""
