@@ -160,12 +160,12 @@ def test_a_model_is_its_own_likeness(likeness: Comparison) -> None:
     assert min(found.realism.background.correlation) > 0.99
 
 
-def test_a_turned_sensor_is_told(mini: OpticalModel, photographs: Photographs) -> None:
+def test_a_turned_sensor_is_told(mini: OpticalModel, small_photographs: Photographs) -> None:
     design = mini.design
     swapped = design.copy()
     for one, other in (("red", "blue"), ("blue", "red")):
         swapped = set_value(swapped, f"lights.{one}.colour", design.lights[other].colour)
-    one = photographs.subset([0])
+    one = small_photographs.subset([0])
     found = compare(ots.OpticalModel(swapped), one, photons=PHOTONS, seed=5)
     assert found.realism.median("unexplained") > 0.5
     turns = [abs(press.turn[0]) for press in found.realism.presses]

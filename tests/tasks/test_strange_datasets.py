@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -57,10 +58,12 @@ def test_a_member_that_is_no_array_is_refused(whole: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["images", "arrays", "radiance"])
-def test_links_are_not_written_through(name: str, mini: OpticalModel, tmp_path: Path) -> None:
+def test_links_are_not_written_through(
+    name: str, whole: Path, mini: OpticalModel, tmp_path: Path
+) -> None:
     folder, outside = tmp_path / "dataset", tmp_path / "outside"
     outside.mkdir()
-    generate(mini, folder, 1, SETTINGS)
+    shutil.copytree(whole, folder)
     (folder / name).rename(tmp_path / "moved")
     (folder / name).symlink_to(outside)
     with pytest.raises(OutputError, match="leads out of the folder through a link"):

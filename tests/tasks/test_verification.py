@@ -83,8 +83,8 @@ def test_an_interrupted_verification_continues_where_it_was(
     lambertian: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Balls and objects that were read are not pressed again, and the result is the same."""
-    objects = FEW[:2]
-    settings = VerificationSettings(objects, places=1, readers=1, reading=READING)
+    objects, reading = FEW[:2], replace(READING, presses=3)
+    settings = VerificationSettings(objects, places=1, readers=1, reading=reading)
     pair = (lambertian, lambertian)
     pressed = []
     take = CalibratedSensor._render
@@ -101,7 +101,7 @@ def test_an_interrupted_verification_continues_where_it_was(
     with pytest.raises(KeyboardInterrupt):
         verify(pair, settings, progress=stop, kept=KeptArrays(tmp_path / "presses"))
     before = len(pressed)
-    assert before >= READING.presses + 1
+    assert before >= reading.presses + 1
     found = verify(pair, settings, kept=KeptArrays(tmp_path / "presses"))
     # Both sensors are the same, so that the second one finds everything.
     assert len(pressed) == before + 1
