@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
 
 from optisense.optics.backend.variant import use_variant
 
@@ -12,3 +15,15 @@ from optisense.optics.backend.variant import use_variant
 use_variant(os.environ.get("OPTISENSE_TEST_VARIANT", "llvm"))
 # For `reference_scenes`, which several of them share.
 sys.path.insert(0, str(Path(__file__).parent))
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel
+
+
+@pytest.fixture(scope="session")
+def plain_mini() -> OpticalModel:
+    """A GelSight Mini with a flat gel and an ideal camera; tests don't change it."""
+    from optisense.optics import OpticalModel
+    from optisense.sensors import build
+
+    return OpticalModel(build("gelsight-mini-ideal"), "llvm")

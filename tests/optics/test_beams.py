@@ -39,8 +39,8 @@ def test_merged_beams_give_the_picture_of_all_bins(
         assert np.sqrt((off**2).mean()) < PER_PIXEL * layer[seen].mean()
 
 
-def test_no_light_is_lost_in_merging() -> None:
-    model = OpticalModel(build("gelsight-mini-ideal"), "llvm")
+def test_no_light_is_lost_in_merging(plain_mini: OpticalModel) -> None:
+    model = plain_mini
     model.render(resolution=(16, 12), photons=100_000)
     field = field_of(model)
     # The entries of the surface come before those of the raised plane.
@@ -67,15 +67,14 @@ def test_no_light_is_lost_in_merging() -> None:
 
 
 def test_one_more_beam_leaves_the_shadow_rays_of_the_others_as_they_are(
-    monkeypatch: pytest.MonkeyPatch,
+    plain_mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Rounding decides of some beams whether they pass near an indenter."""
-    model = OpticalModel(build("gelsight-mini-ideal"), "llvm")
     beside = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
     images = []
     for reach in (beams.READ_DISTANCE, beams.READ_DISTANCE + 1e-3):
         monkeypatch.setattr(beams, "READ_DISTANCE", reach)
-        images.append(model.render([beside], resolution=(80, 60), photons=200_000).layers)
+        images.append(plain_mini.render([beside], resolution=(80, 60), photons=200_000).layers)
     for group, layer in images[0].items():
         assert same_light(images[1][group], layer, TURNED_BESIDE_CONTACT)
 

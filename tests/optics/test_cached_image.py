@@ -26,10 +26,9 @@ def test_noise_is_grainy_and_slopes_edges_of_the_mask_and_darkness_are_not() -> 
     assert not grainy(image.astype(np.float32), np.zeros_like(where)).any()
 
 
-def test_a_contact_may_fill_the_picture() -> None:
-    model = OpticalModel(build("gelsight-mini-ideal"), "llvm")
+def test_a_contact_may_fill_the_picture(plain_mini: OpticalModel) -> None:
     plate = Contact(Plane(size=60.0), at=(0.0, 0.0), depth=0.5)
-    image = model.render([plate], resolution=(32, 24), photons=100_000)
+    image = plain_mini.render([plate], resolution=(32, 24), photons=100_000)
     assert image.contact_mask.all()
     assert (image.radiance.sum(axis=2) > 0).all()
 
@@ -68,14 +67,13 @@ def test_an_untouched_gel_has_less_grain_than_one_camera_sample_a_pixel_would_sh
 
 
 def test_the_skin_beside_a_contact_has_the_light_that_the_contact_reflects_to_it(
-    monkeypatch: pytest.MonkeyPatch,
+    plain_mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = OpticalModel(build("gelsight-mini-ideal"), "llvm")
     ball = Contact(Sphere(radius=1.5), at=(0.0, 0.0), depth=0.8)
     ring = np.zeros((120, 160), dtype=bool)
 
     def light() -> float:
-        image = model.render([ball], (160, 120), 100_000, skin="conforming")
+        image = plain_mini.render([ball], (160, 120), 100_000, skin="conforming")
         if not ring.any():
             away = ndimage.distance_transform_edt(~image.contact_mask)
             ring[(away > 4.5) & (away <= 12)] = True

@@ -132,14 +132,14 @@ def test_a_camera_sees_each_channel_by_its_own_way() -> None:
         assert np.hypot(points[0], points[1]) == pytest.approx(reach, abs=2e-3)
 
 
-def test_equal_indices_for_all_channels_give_the_usual_picture() -> None:
+def test_equal_indices_for_all_channels_give_the_usual_picture(plain_mini: OpticalModel) -> None:
     design = ots.load("gelsight-mini-ideal")
     for name, material in design.materials.items():
         assert isinstance(material, Dielectric)
         ior = material.ior
         design.materials[name] = Dielectric(ior=ior, dispersion=(ior, ior, ior + 1e-9))
     design.dispersion = True
-    usual = OpticalModel(ots.load("gelsight-mini-ideal")).render((), (64, 48), photons=300_000)
+    usual = plain_mini.render((), (64, 48), photons=300_000)
     spread = OpticalModel(design)
     assert spread.scene.dispersive
     image = spread.render((), (64, 48), photons=900_000)
@@ -152,8 +152,10 @@ def test_equal_indices_for_all_channels_give_the_usual_picture() -> None:
         assert blocks[0] == pytest.approx(blocks[1], abs=0.05 * float(blocks[1].mean()))
 
 
-def test_an_index_for_each_channel_counts_only_where_the_design_asks() -> None:
-    assert not OpticalModel(ots.load("gelsight-mini-ideal")).scene.dispersive
+def test_an_index_for_each_channel_counts_only_where_the_design_asks(
+    plain_mini: OpticalModel,
+) -> None:
+    assert not plain_mini.scene.dispersive
     asked = ots.set_value(ots.load("gelsight-mini-ideal"), "dispersion", True)
     model = OpticalModel(asked)
     assert model.scene.dispersive

@@ -61,8 +61,8 @@ def test_photons_end_as_the_ledger_says(name: str) -> None:
 
 
 @pytest.fixture(scope="module")
-def mini() -> dict[str, list[PhotonPath]]:
-    return photon_paths(OpticalModel(ots.load("gelsight-mini-ideal")))
+def mini(plain_mini: OpticalModel) -> dict[str, list[PhotonPath]]:
+    return photon_paths(plain_mini)
 
 
 def test_a_way_leads_from_a_light_to_where_it_ends(mini: dict[str, list[PhotonPath]]) -> None:

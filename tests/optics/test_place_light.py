@@ -54,9 +54,11 @@ def test_a_white_sphere_lights_its_port_as_the_formula_says() -> None:
     assert found.sky.sum() == pytest.approx(1.0)
 
 
-def test_the_groups_of_a_mini_come_from_their_sides_of_the_picture() -> None:
+def test_the_groups_of_a_mini_come_from_their_sides_of_the_picture(
+    plain_mini: OpticalModel,
+) -> None:
     """As they do in the real one: red from the top, green from the right, blue from below."""
-    model = OpticalModel(ots.load("gelsight-mini-ideal"))
+    model = plain_mini
     middle = light_at(model, (0.0, 0.0), PHOTONS)
     for group, azimuth in (("red", 90.0), ("green", 0.0), ("blue", -90.0)):
         assert middle.groups[group].main_azimuth == pytest.approx(azimuth, abs=12.0)
