@@ -38,7 +38,7 @@ def test_a_dataset_is_made_and_continued(tmp_path: Path) -> None:
     assert made[2].image.shape == (36, 48, 3)
     code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "3", *SMALL)
     assert code == 2
-    assert "settings.contacts.indenters was" in text
+    assert 'settings.contacts.indenters: ["sphere:2", "cylinder:1,3"] -> ["' in text
 
 
 @pytest.mark.parametrize(
