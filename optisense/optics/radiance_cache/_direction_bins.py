@@ -86,7 +86,8 @@ CURVED_BINS = DirectionBins(18, 0.6, True)
 """The bins for diffuse coatings and broad lobes on curved surfaces, in front of which light varies
 faster. In a contact of the diffuse spherical GelSight Mini the RMS error over patches is 3.1 % with
 16 x 16 bins, 2.0 % where their blur is undone bin by bin, and 1.3 % with these. Tracing the light
-takes a quarter longer; images from a finished cache take as long as with `COARSE_BINS`."""
+takes a quarter longer; images from a finished cache take as long as with `COARSE_BINS`. The noise
+is 1.2 to 1.3 times as large, but error and noise together are not (see docs/performance.md)."""
 FINE_BINS = DirectionBins(24, 0.6, True)
 """The bins for lobes that resolve the lamps: 576 bins, 8.5 degrees across in the mean."""
 FINEST_BINS = DirectionBins(32, 0.6, True)

@@ -144,9 +144,10 @@ class Kernels:
             photons: number of emitted photons.
             corrected: whether the blur is undone in each direction bin by itself. With K the kernel
                 and B the blur, light L becomes 2 K L - B K L ("twicing", Stuetzle and Mittal 1979):
-                the remaining blur grows with the fourth power of the radius, and the noise is 1.2
-                times that of K. (Where the second moment of B is not that of kernel and cells, as
-                both hold few cells, the difference K L - B K L is scaled by their ratio.)
+                the remaining blur grows with the fourth power of the radius, and the noise is 1.34
+                times that of K if both hold many cells. (Where the second moment of B is not that
+                of kernel and cells, as both hold few cells, the difference K L - B K L is scaled by
+                their ratio.)
         """
         key = photons, corrected
         if key not in self._known:
