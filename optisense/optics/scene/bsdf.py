@@ -27,6 +27,10 @@ MIN_DISC_COSINE = 0.1
 """Lower bound on the cosine of the half vector with the light, by which a disc of light widens
 among half vectors. Below it the light and the eye are more than 168 degrees apart, so that both are
 at grazing angles."""
+PEAK_ANGLES = 0.3, 0.5
+"""Angles (radians) between the half vector and the normal over which the peak of a narrow metallic
+lobe passes into its tail. Beyond 0.5, the slope of a GGX distribution is at most twice that of a
+lobe of alpha 0.4, for which coarse direction bins suffice."""
 MIN_DISC = 1e-9
 """Lower bound on the squared radius of a disc of half vectors (radians squared). It avoids a
 division by zero; a disc of this radius (0.002 degrees) is a single direction."""
@@ -66,7 +70,8 @@ class CoatingBsdf:
 
     ``metallic`` is False if no surface has a metallic lobe, which is then not compiled into
     kernels. ``light_radius2`` is the squared angular radius (radians squared) of the disc of light
-    over which the metallic lobe is averaged; None for light of a single direction.
+    over which the metallic lobe is averaged; None for light of a single direction. ``only_tail`` is
+    whether the peaks of metallic lobes are left out (see `peak_share`).
     """
 
     reflectance: mi.Color3f
@@ -76,6 +81,7 @@ class CoatingBsdf:
     alpha: mi.Float
     metallic: bool = True
     light_radius2: mi.Float | None = None
+    only_tail: bool = False
 
 
 def surface_kind(
@@ -206,14 +212,38 @@ def _ggx_of_disc(
         light_radius2: squared angular radius of the disc (radians squared).
     """
     a2 = alpha * alpha
-    # The solid angle of half vectors is that of the light over 4 cos_d; seen along the normal it
-    # shrinks by cos_m.
-    scale = (1 - a2) * cos_m / (4 * dr.maximum(cos_d, MIN_DISC_COSINE))
-    rho2 = dr.maximum(light_radius2 * scale, MIN_DISC)
+    rho2 = dr.maximum((1 - a2) * _half_vector_disc(cos_m, cos_d, light_radius2), MIN_DISC)
     q = a2 + (1 - a2) * dr.maximum(1 - cos_m * cos_m, 0) - rho2
     h = dr.sqrt(q * q + 4 * a2 * rho2)
     # Two forms of (1 - cos c) / (2 rho^2); each is free of cancellation on its side.
     return dr.inv_pi * dr.select(q > 0, 2 * a2 / (h * (h + q)), (h - q) / (2 * rho2 * h))
+
+
+def _half_vector_disc(cos_m: mi.Float, cos_d: mi.Float, light_radius2: mi.Float) -> mi.Float:
+    """Return the squared radius (n,) of a disc of half vectors, seen along the normal; see
+    `_ggx_of_disc`.
+
+    The solid angle of half vectors is that of the light over 4 cos_d; seen along the normal, it
+    shrinks by cos_m.
+    """
+    return light_radius2 * cos_m / (4 * dr.maximum(cos_d, MIN_DISC_COSINE))
+
+
+def _ggx_tail_of_disc(
+    cos_m: mi.Float, cos_d: mi.Float, alpha: mi.Float, light_radius2: mi.Float
+) -> mi.Float:
+    """Return the tail of the GGX distribution averaged over the half vectors of a disc of light;
+    the arguments are those of `_ggx_of_disc`.
+
+    The mean is that of two angles with the normal, one standard deviation of the disc above and
+    below that of its middle.
+    """
+    angle = dr.safe_acos(cos_m)
+    away = dr.sqrt(_half_vector_disc(mi.Float(1), cos_d, light_radius2)) / 2
+    density = mi.Float(0)
+    for shifted in (dr.cos(angle + away), dr.cos(angle - away)):
+        density += _ggx(shifted, alpha) * (1 - peak_share(shifted)) / 2
+    return density
 
 
 def _smith(cosine: mi.Float, alpha: mi.Float) -> mi.Float:
@@ -254,13 +284,44 @@ def evaluate_coating(
     cos_m = dr.dot(half, normal)
     if coating.light_radius2 is None:
         density = _ggx(cos_m, coating.alpha)
+        if coating.only_tail:
+            density *= 1 - peak_share(cos_m)
     else:
         cos_h = dr.dot(half, towards_light)
-        density = _ggx_of_disc(cos_m, cos_h, coating.alpha, coating.light_radius2)
+        average = _ggx_tail_of_disc if coating.only_tail else _ggx_of_disc
+        density = average(cos_m, cos_h, coating.alpha, coating.light_radius2)
     lobe = density * _smith(cos_i, coating.alpha) * _smith(cos_o, coating.alpha) / (4 * cos_o)
     metal = fresnel_metal(dr.abs(dr.dot(half, towards_light)), coating.metal_eta, coating.metal_k)
     shiny = dr.select(lit, metal * (coating.specularity * lobe), 0.0)
     return diffuse * (1 - coating.specularity) + shiny
+
+
+def peak_share(cos_m: mi.Float) -> mi.Float:
+    """Return the share (n,) of a narrow metallic lobe that belongs to its peak.
+
+    Args:
+        cos_m: cosine of the half vector with the normal.
+    """
+    first, last = PEAK_ANGLES
+    x = dr.clip((dr.safe_acos(cos_m) - first) / (last - first), 0, 1)
+    return 1 - x * x * (3 - 2 * x)
+
+
+def coating_density(
+    coating: CoatingBsdf, normal: mi.Vector3f, towards_light: mi.Vector3f, towards_eye: mi.Vector3f
+) -> mi.Float:
+    """Return the density (n,), 1/sr, of the directions that `sample_coating` draws with random
+    picks; 0 below the surface.
+
+    Args:
+        normal: unit normals.
+        towards_light, towards_eye: unit directions away from the surface.
+    """
+    cos_i, cos_o = dr.dot(normal, towards_light), dr.dot(normal, towards_eye)
+    cos_m = dr.dot(dr.normalize(towards_light + towards_eye), normal)
+    lobe = _ggx(cos_m, coating.alpha) * _smith(cos_o, coating.alpha) / (4 * cos_o)
+    density = lobe * coating.specularity + cos_i * (dr.inv_pi * (1 - coating.specularity))
+    return dr.select((cos_i > 0) & (cos_o > 0), density, 0.0)
 
 
 def sample_coating(
