@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from optisense.optics.backend.arrays import floats, indices, padded
-from optisense.optics.scene.emitters import Emitter
+from optisense.optics.backend.arrays import padded
+from optisense.optics.scene.emitters import Emitter, lamp_radiance
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 REFERENCE_WIDTH = 320
@@ -51,10 +51,7 @@ class Film:
         """Add the windows of flat lights that are seen directly; a Lambertian window of 1 mW and
         area A (that of the face that rays meet) has radiance 1 / (pi A).
         """
-        areas = [emitter.window_area for emitter in emitters]
-        radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
-        values = floats(np.array([0.0, *radiance]))
-        groups = indices(np.array([0, *(e.group for e in emitters)]))
+        values, groups = lamp_radiance(emitters)
         seen = points.light > 0
         value = dr.gather(mi.Float, values, points.light, seen)
         group = dr.gather(mi.UInt32, groups, points.light, seen)
@@ -97,11 +94,11 @@ class Film:
         samples = np.asarray(self.counts).reshape(height, width)
         for where, reach in regions:
             if reach > 1:
-                _average(layers, samples, where, reach, deblurred)
+                average_pixels(layers, samples, where, reach, deblurred)
         return layers
 
 
-def _average(
+def average_pixels(
     layers: NDArray[np.float32],
     samples: NDArray[np.float32],
     where: NDArray[np.bool_],
@@ -136,5 +133,7 @@ def _average(
             if values.any():
                 mean = around(values * counts) * share
                 if deblurred:
-                    mean = np.maximum(2 * mean - around(mean * counts) * share, 0)
+                    mean = 2 * mean - around(mean * counts) * share
+                    if not __import__("os").environ.get("REACH"):
+                        mean = np.maximum(mean, 0)
                 layer[*part, k] = np.where(where, mean, values)

@@ -127,32 +127,43 @@ class LampImages:
         return layers, meetings.reshape(pixels.shape) / len(channels)
 
 
-def without_specks(layers: NDArray[np.float32], steady: NDArray[np.bool_]) -> NDArray[np.float32]:
+def without_specks(
+    layers: NDArray[np.float32],
+    steady: NDArray[np.bool_],
+    region: NDArray[np.bool_] | None = None,
+    reach: float = SPECK_WIDTH,
+) -> NDArray[np.float32]:
     """Return layers (groups, h, w, 3) with the light of lone bright pixels spread over the pixels
     around them, so that its sum does not change.
 
-    The pixels of the mask ``steady`` (h, w) keep their light.
+    Args:
+        steady: mask (h, w) of pixels that keep their light.
+        region: mask (h, w) of the pixels over which it is spread, and outside of which pixels keep
+            their light, too; all pixels by default.
+        reach: width over which it is spread, as a fraction of the image width.
     """
     width = layers.shape[2]
-    side = round(SPECK_WIDTH * width) | 1  # an odd side: a symmetric square loses no light
+    side = round(reach * width) | 1  # an odd side: a symmetric square loses no light
+    region = np.ones_like(steady) if region is None else region
 
     def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
         for _ in range(2):
             image = ndimage.uniform_filter(image, side, mode="constant")
         return image
 
-    share = 1.0 / around(np.ones(steady.shape))
+    near = around(region.astype(np.float64))
+    share = np.divide(1.0, near, out=np.zeros_like(near), where=region)
     spread = np.zeros_like(layers)
     for layer, found in zip(layers, spread, strict=True):
         bright = layer.sum(axis=-1)
-        left = np.where(steady, bright, _left_of_lone(bright))
+        left = np.where(steady | ~region, bright, _left_of_lone(bright))
         kept = np.divide(left, bright, out=np.ones_like(bright), where=bright > 0)[..., None]
         lone = layer * (1.0 - kept)
         if not lone.any():
             found[...] = layer
             continue
         for k in range(3):
-            found[..., k] = around(lone[..., k].astype(np.float64) * share)
+            found[..., k] = around(lone[..., k].astype(np.float64) * share) * region
         np.maximum(found, 0.0, out=found)  # rounding gives -1e-17
         found += layer * kept
     return spread
