@@ -119,7 +119,7 @@ class OpticalModel(RayModel):
 
     def _new_store(self) -> CacheStore:
         rays = self.chief_rays(VIEW_RESOLUTION)
-        return self.store_type(LitScene.of(self.scenes), rays.points[rays.hit])
+        return self.store_type(LitScene.of(self.scenes, not self.is_draft), rays.points[rays.hit])
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
         is_same = scenes.assembly is self.scenes.assembly and view is self._view
@@ -129,7 +129,7 @@ class OpticalModel(RayModel):
             if not is_same:
                 self._caches = None
             elif scenes is not self.scenes:
-                self._caches = self._caches.coated(LitScene.of(scenes))
+                self._caches = self._caches.coated(LitScene.of(scenes, not self.is_draft))
         super()._set(design, scenes, view)
 
     def forget_light(self, guide: bool = False) -> None:
@@ -139,7 +139,9 @@ class OpticalModel(RayModel):
             guide: whether the emission guide and the surface cells are dropped as well.
         """
         if self._caches is not None:
-            self._caches = None if guide else self._caches.coated(LitScene.of(self.scenes))
+            self._caches = (
+                None if guide else self._caches.coated(LitScene.of(self.scenes, not self.is_draft))
+            )
             dr.flush_malloc_cache()
 
     @property

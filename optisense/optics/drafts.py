@@ -259,7 +259,7 @@ class DraftModel(OpticalModel):
             lit = self._kept.lit_by(self._moved, self.scenes)
             if before.has_guide_for(lit):
                 return DraftCacheStore(lit, before.seen, before, range(len(self._moved)))
-        lit = LitScene.of(self.scenes)
+        lit = LitScene.of(self.scenes, may_trace_lobes=False)
         if before is not None and before.has_guide_for(lit):
             return DraftCacheStore(lit, before.seen, before)
         rays = self.chief_rays(VIEW_RESOLUTION)

@@ -52,7 +52,7 @@ def test_spreading_keeps_even_light_and_the_sum_of_a_bright_sample() -> None:
 
 
 def test_drawing_a_part_of_the_places_changes_no_mean(monkeypatch: pytest.MonkeyPatch) -> None:
-    design = ots.set_value(ots.load("gelsight-mini-ideal-cylindrical"), "coating.specularity", 1.0)
+    design = ots.set_value(ots.load("gelsight-mini-ideal-cylindrical"), "coating.specularity", 0.8)
     model = ots.OpticalModel(design)
     ball = [ots.Contact(ots.Sphere(4.0), at=(0.5, 0.3), depth=0.8)]
 

@@ -20,6 +20,7 @@ from optisense.optics.imaging._contact_light import (
 from optisense.optics.imaging._film import Film, repeated
 from optisense.optics.imaging._grain import GRAIN_SAMPLES, OUTLINE_SAMPLES, grainy, outline
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
+from optisense.optics.imaging._traced_light import lobe_samples, traced_layers
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.lamp_images import LampImages
@@ -104,14 +105,16 @@ def render_cached(
     else:
         layers, reflections = image.sample_far()
     main = layers - reflections if known is not None else None
-    if regions.near.any() and not image.faint_known:
+    if cache.traced_lobes:
+        layers = layers + image.traced()
+    elif regions.near.any() and not image.faint_known:
         layers = layers + image.interreflection()
     if known is not None and main is not None:
         if image.faint_known:
             layers = known.with_faint(main)
         else:
             known.keep_faint(main, layers - main)
-    if regions.near.any() and not plan.draft:
+    if regions.near.any() and not plan.draft and not cache.traced_lobes:
         layers = image.with_light_of_contacts(layers)
     mirrored = None if lamps is None else lamps.layers(camera, seed)
     if mirrored is not None:
@@ -178,6 +181,13 @@ class _Shading:
             return np.zeros((len(self.film.sums), *self.size[::-1], 3), dtype=np.float32)
         return self.mirrored.layers(*self.size)
 
+    def traced(self) -> NDArray[np.float32]:
+        """Return the layers of the light in the peaks of narrow lobes."""
+        samples = lobe_samples(self.plan, self.regions, self.cache.photons)
+        return traced_layers(
+            self.cache, self.scenes, self.camera, self.emitters, samples, self.seed
+        )
+
     def interreflection(self) -> NDArray[np.float32]:
         """Return the layers of the light that skin and contacts reflect to contacts."""
         reach = 1
@@ -215,7 +225,11 @@ class _Shading:
             )
             if in_contacts:
                 direct, exchanged = shade_in_contacts(
-                    self.cache, self.scenes, main, self.effort, not self.faint_known
+                    self.cache,
+                    self.scenes,
+                    main,
+                    self.effort,
+                    not (self.faint_known or self.cache.traced_lobes),
                 )
                 self.film.add(main, direct)
                 if exchanged is not None:

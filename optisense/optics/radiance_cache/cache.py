@@ -63,6 +63,8 @@ class RadianceCache:
         photons: number of emitted photons.
         noise: relative RMS noise of the smoothed irradiance.
         worst_noise: relative RMS noise that the noisiest 5 % of the area have at least.
+        traced_lobes: whether the peaks of metallic lobes are traced (see `traced_lobes`), so that
+            only their tails read the cache.
     """
 
     binned: BinnedLight
@@ -71,6 +73,7 @@ class RadianceCache:
     photons: int
     noise: float
     worst_noise: float
+    traced_lobes: bool = False
 
     @property
     def metallic(self) -> bool:

@@ -8,6 +8,13 @@ from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.sensor_scenes import SensorScenes
 
+TRACED_ROUGHNESS = 0.15
+"""GGX alpha of metallic lobes below which their peaks are traced. At 0.2, beams of two discs leave
+an error of 1.3 % in a contact of GelSight Mini, with a fifth of the noise of traced peaks."""
+TAIL_ROUGHNESS = 0.4
+"""GGX alpha of the lobe whose direction bins serve the tails of lobes with traced peaks. With the
+finer bins of 0.2, errors in contacts of GelSight Mini and Svelte of specularity 1 are the same."""
+
 
 @dataclass(frozen=True)
 class LitScene:
@@ -18,7 +25,9 @@ class LitScene:
         opaque: its opaque pieces.
         table: its lights.
         coloured: whether surfaces are coloured.
-        roughness: GGX alpha of the sharpest metallic lobe of a coating; None without metal.
+        roughness: GGX alpha of the sharpest metallic lobe that reads the cache; None without metal.
+        traced_lobes: whether the peaks of metallic lobes are traced, and only their tails read the
+            cache.
         pilot: the scene that pilot photons are traced in; ``scene`` if None. The first landings of
             photons do not depend on the coating. With the same coating in every pilot pass, images
             do not depend on the coating that the sensor had when its guide was learned.
@@ -30,18 +39,32 @@ class LitScene:
     table: EmitterTable
     coloured: bool
     roughness: float | None = None
+    traced_lobes: bool = False
     pilot: RayScene | None = None
     pilot_coloured: bool = False
 
     @classmethod
-    def of(cls, scenes: SensorScenes) -> LitScene:
-        """Return the sensor of these scenes."""
+    def of(cls, scenes: SensorScenes, may_trace_lobes: bool = True) -> LitScene:
+        """Return the sensor of these scenes.
+
+        Args:
+            may_trace_lobes: whether the peaks of lobes narrower than `TRACED_ROUGHNESS` are traced,
+                if all lights have Lambertian windows, which rays can meet.
+        """
+        roughness = scenes.roughness
+        traced = (
+            may_trace_lobes
+            and roughness is not None
+            and roughness < TRACED_ROUGHNESS
+            and all(emitter.has_lambertian_window for emitter in scenes.assembly.emitters)
+        )
         return cls(
             scenes.full,
             scenes.opaque,
             scenes.emitter_table,
             scenes.coloured,
-            scenes.roughness,
+            TAIL_ROUGHNESS if traced else roughness,
+            traced,
             scenes.pilot,
             scenes.pilot_coloured,
         )

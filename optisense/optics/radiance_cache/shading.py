@@ -95,6 +95,7 @@ def shade_in_contacts(
     )
     start = leave(points.point, points.face_normal, points.face_normal)
     coating = coating_of(table, points.surface, active, cache.metallic)
+    coating.only_tail = cache.traced_lobes
     at = ShadingPoints(points, coating, start, cell, shift, active, raised)
     horizon = occluder_horizon(
         scenes.balls,
@@ -152,6 +153,7 @@ def shade(
     )
     start = leave(base, points.face_normal, points.face_normal)
     coating = coating_of(scenes.full.table, points.surface, active, cache.metallic)
+    coating.only_tail = cache.traced_lobes
     at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
     indenters = scenes.indenters
     totals: list[mi.Color3f]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple, Self
 
@@ -321,7 +322,7 @@ class CacheStore:
         name = (key, tally.passes)
         if interrupted or name not in self._done:
             on_stage(Stage.SMOOTHING, 1.0, tally.photons, noise)
-            light = tally.smoothed()
+            light = replace(tally.smoothed(), traced_lobes=self._lit.traced_lobes)
             if interrupted:
                 return light, True
             self._done[name] = light
