@@ -109,24 +109,25 @@ class PatchCase:
 
 
 CASES = [
-    *(PatchCase("gelsight-mini-ideal", s, referee=Referee.PATH, batches=16) for s in (0.6, 1.0)),
+    PatchCase("gelsight-mini-ideal", 0.6, referee=Referee.PATH, batches=16),
+    PatchCase("gelsight-mini-ideal", 1.0, referee=Referee.PATH, batches=16, images=6),
     *(PatchCase("gelsight-mini-ideal", s) for s in (0.0, 0.3, 0.6, 0.8)),
     *(PatchCase("gelsight-mini-ideal", s, place=0, images=8) for s in BROAD),
-    PatchCase("gelsight-mini-ideal", 1.0, place=0, referee=Referee.PATH, batches=24),
+    PatchCase("gelsight-mini-ideal", 1.0, place=0, referee=Referee.PATH, batches=24, images=6),
     *(
         PatchCase("gelsight-mini-ideal-cylindrical", s, depth=0.3, batches=24, images=6)
         for s in BROAD
     ),
-    PatchCase("gelsight-mini-ideal-cylindrical", 1.0, 4, 0.3, Referee.PATH, batches=32, images=4),
+    PatchCase("gelsight-mini-ideal-cylindrical", 1.0, 4, 0.3, Referee.PATH, batches=32, images=6),
     *(PatchCase("gelsight-mini-ideal-spherical", s, batches=16, images=4) for s in BROAD),
-    PatchCase("gelsight-mini-ideal-spherical", 1.0, referee=Referee.PATH, batches=24, images=4),
+    PatchCase("gelsight-mini-ideal-spherical", 1.0, referee=Referee.PATH, batches=24, images=6),
     *(PatchCase("gelbelt", s, batches=16, images=4) for s in BROAD),
     *(PatchCase("gelbelt", s, place=0) for s in (0.0, 0.6)),
-    PatchCase("gelbelt", 1.0, referee=Referee.PATH),
+    PatchCase("gelbelt", 1.0, referee=Referee.PATH, images=4),
     *(PatchCase("gelsight-svelte", s) for s in BROAD),
-    PatchCase("gelsight-svelte", 1.0, referee=Referee.PATH),
+    PatchCase("gelsight-svelte", 1.0, referee=Referee.PATH, images=4),
     *(PatchCase("gelsight360", s, images=4) for s in BROAD),
-    PatchCase("gelsight360", 1.0, referee=Referee.PATH),
+    PatchCase("gelsight360", 1.0, referee=Referee.PATH, images=4),
 ]
 """Cases: flat and curved gels, the middle of the view and its corner (place 0), and coatings from
 diffuse to mirroring. The cylindrical gel is pressed by 0.3 mm, the depth of scores. Its reference
