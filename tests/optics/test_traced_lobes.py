@@ -47,7 +47,7 @@ def test_specks_are_spread_within_their_region() -> None:
     layers[0, 20, 10], layers[0, 20, 30] = 1.0, 1.0
     region = np.zeros((40, 40), dtype=bool)
     region[:, :20] = True
-    found = without_specks(layers, np.zeros_like(region), region, 1 / 8)[0, ..., 0]
+    found = without_specks(layers, np.zeros_like(region), region)[0, ..., 0]
     assert found[:, :20].sum() == pytest.approx(1.0, rel=1e-5)
     assert found[20, 10] < 0.1
     assert found[20, 30] == 1.0 and found[:, 20:].sum() == 1.0

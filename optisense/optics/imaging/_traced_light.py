@@ -13,7 +13,7 @@ from optisense.optics.backend.arrays import padded
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film, average_pixels, repeated
-from optisense.optics.imaging.lamp_images import SPECK_WIDTH, without_specks
+from optisense.optics.imaging.lamp_images import without_specks
 from optisense.optics.imaging.sampling import PixelRegions, SamplingPlan
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.traced_lobes import FEWEST_RAYS, LobeRays, LobeTracer
@@ -44,17 +44,13 @@ million photons give the mean of this skin a noise of 2 % on GelSight Mini."""
 BESIDE_RANGE = 0.1
 """Distance from contacts as a fraction of the image width: 2 mm on GelSight Mini. The interfaces
 and the skin mirror contacts to the skin within it."""
-SKIN_RAYS = 0.2
+SKIN_RAYS = 0.4
 """Number of rays from all other pixels for each photon of the cache. Nineteen of twenty leave
 GelSight Mini through the glass, so that each takes a third of the time of a ray from a contact."""
 CONTACT_REACH = 1
 """Distance (pixels) in rows and columns up to which pixels in contacts share their rays. In a
 contact of GelSight Mini at 160x120 pixels, this reduces the noise of pixels from 21 to 16 %. A
 distance of 2 reduces it little more."""
-BESIDE_SPECK_WIDTH = 1 / 40
-"""Width over which the light of lone bright pixels beside contacts is spread, as a fraction of the
-image width: half a millimetre on GelSight Mini. A few rays meet a lamp; on the other skin, whose
-light varies less, they are spread over `SPECK_WIDTH`."""
 MIRRORED_SHARE = 0.25
 """Number of rays from a point that the camera sees by reflection at an interface, as a share of
 those from a point that it sees directly. On the skin around a contact of GelSight Svelte of
@@ -79,18 +75,12 @@ class LobeSamples:
         count: number of camera samples of each pixel.
         directions: number of rays from each sample.
         reach: distance (pixels) in rows and columns up to which they share their rays.
-        skin: (h, w) mask of the pixels whose light is smooth, so that it is averaged; None for
-            none.
-        speck_width: width over which the light of lone bright pixels among them is spread, as a
-            fraction of the image width.
     """
 
     pixels: NDArray[np.bool_]
     count: int
     directions: int
     reach: int = 0
-    skin: NDArray[np.bool_] | None = None
-    speck_width: float = 0.0
 
     @classmethod
     def of_contacts(cls, pixels: NDArray[np.bool_], count: int, rays: float) -> LobeSamples:
@@ -99,13 +89,12 @@ class LobeSamples:
 
     @classmethod
     def of_skin(
-        cls, pixels: NDArray[np.bool_], skin: NDArray[np.bool_], rays: float, speck_width: float
+        cls, pixels: NDArray[np.bool_], skin: NDArray[np.bool_], rays: float
     ) -> LobeSamples:
         """Return the samples of pixels outside contacts, of which those that see the ``skin`` draw
         a number of rays together.
         """
-        skin = pixels & skin
-        return cls(pixels, 1, _directions(rays, skin, 1), 0, skin, speck_width)
+        return cls(pixels, 1, _directions(rays, pixels & skin, 1))
 
 
 def _directions(rays: float, pixels: NDArray[np.bool_], count: int) -> int:
@@ -134,8 +123,8 @@ def lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> lis
     beside = (regions.near | regions.within(BESIDE_RANGE)) & ~inside
     hit = regions.rays.hit
     samples = [
-        LobeSamples.of_skin(beside, hit, BESIDE_RAYS * photons, BESIDE_SPECK_WIDTH),
-        LobeSamples.of_skin(~(inside | beside), hit, SKIN_RAYS * photons, SPECK_WIDTH),
+        LobeSamples.of_skin(beside, hit, BESIDE_RAYS * photons),
+        LobeSamples.of_skin(~(inside | beside), hit, SKIN_RAYS * photons),
     ]
     if tiers:
         samples.append(LobeSamples.of_contacts(*tiers[0], rays))
@@ -148,6 +137,7 @@ def traced_layers(
     camera: RayCamera,
     emitters: list[Emitter],
     samples: list[LobeSamples],
+    smooth: list[tuple[NDArray[np.bool_], bool]],
     seed: int,
 ) -> NDArray[np.float32]:
     """Return the radiance (groups, h, w, 3), mW/(mm^2 sr) for lights of 1 mW, of the light in
@@ -158,6 +148,8 @@ def traced_layers(
         scenes: the scenes of the image.
         emitters: the lights.
         samples: the samples of the image.
+        smooth: masks (h, w) of regions in each of which the light is averaged, and whether that of
+            lone bright pixels is spread over the region before.
         seed: seed of the image.
     """
     width, height = camera.width, camera.height
@@ -186,12 +178,12 @@ def traced_layers(
                 _add_own(film, rays, mirrored, scenes.full.table, 1 / directions)
                 dr.eval(film.sums)
     layers = film.layers(width, height)
-    for each in samples:
-        if each.skin is not None and each.skin.any():
-            steady = np.zeros_like(each.skin)
-            layers = without_specks(layers, steady, each.skin, each.speck_width)
-            reach = round(SKIN_WIDTH * width) | 1
-            average_pixels(layers, each.skin.astype(np.float32), each.skin, reach, False)
+    reach = round(SKIN_WIDTH * width) | 1
+    for region, spread in smooth:
+        if region.any():
+            if spread:
+                layers = without_specks(layers, np.zeros_like(region), region)
+            average_pixels(layers, region.astype(np.float32), region, reach, False)
     return layers
 
 

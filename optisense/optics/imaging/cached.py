@@ -183,9 +183,15 @@ class _Shading:
 
     def traced(self) -> NDArray[np.float32]:
         """Return the layers of the light in the peaks of narrow lobes."""
-        samples = lobe_samples(self.plan, self.regions, self.cache.photons)
+        regions, hit = self.regions, self.regions.rays.hit
+        samples = lobe_samples(self.plan, regions, self.cache.photons)
+        smooth: list[tuple[NDArray[np.bool_], bool]] = []
+        if not self.plan.only_contacts:
+            outside = regions.distance > 1.0
+            far = outside & ~regions.near
+            smooth = [(outside & ~far, False), (far & hit, True), (far & ~hit, True)]
         return traced_layers(
-            self.cache, self.scenes, self.camera, self.emitters, samples, self.seed
+            self.cache, self.scenes, self.camera, self.emitters, samples, smooth, self.seed
         )
 
     def interreflection(self) -> NDArray[np.float32]:
