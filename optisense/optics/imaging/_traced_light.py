@@ -45,8 +45,9 @@ BESIDE_RANGE = 0.1
 """Distance from contacts as a fraction of the image width: 2 mm on GelSight Mini. The interfaces
 and the skin mirror contacts to the skin within it."""
 SKIN_RAYS = 0.4
-"""Number of rays from all other pixels for each photon of the cache. Nineteen of twenty leave
-GelSight Mini through the glass, so that each takes a third of the time of a ray from a contact."""
+"""Number of rays from all other pixels that see the skin for each photon of the cache. Nineteen of
+twenty leave GelSight Mini through the glass, so that each takes a third of the time of a ray from a
+contact."""
 CONTACT_REACH = 1
 """Distance (pixels) in rows and columns up to which pixels in contacts share their rays. In a
 contact of GelSight Mini at 160x120 pixels, this reduces the noise of pixels from 21 to 16 %. A
@@ -88,13 +89,9 @@ class LobeSamples:
         return cls(pixels, count, _directions(rays, pixels, count), CONTACT_REACH)
 
     @classmethod
-    def of_skin(
-        cls, pixels: NDArray[np.bool_], skin: NDArray[np.bool_], rays: float
-    ) -> LobeSamples:
-        """Return the samples of pixels outside contacts, of which those that see the ``skin`` draw
-        a number of rays together.
-        """
-        return cls(pixels, 1, _directions(rays, pixels & skin, 1))
+    def of_skin(cls, pixels: NDArray[np.bool_], rays: float) -> LobeSamples:
+        """Return the samples of pixels outside contacts, which draw a number of rays together."""
+        return cls(pixels, 1, _directions(rays, pixels, 1))
 
 
 def _directions(rays: float, pixels: NDArray[np.bool_], count: int) -> int:
@@ -123,8 +120,9 @@ def lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> lis
     beside = (regions.near | regions.within(BESIDE_RANGE)) & ~inside
     hit = regions.rays.hit
     samples = [
-        LobeSamples.of_skin(beside, hit, BESIDE_RAYS * photons),
-        LobeSamples.of_skin(~(inside | beside), hit, SKIN_RAYS * photons),
+        LobeSamples.of_skin(beside & hit, BESIDE_RAYS * photons),
+        LobeSamples.of_skin(~(inside | beside) & hit, SKIN_RAYS * photons),
+        LobeSamples(~(inside | hit), count=1, directions=1),
     ]
     if tiers:
         samples.append(LobeSamples.of_contacts(*tiers[0], rays))
