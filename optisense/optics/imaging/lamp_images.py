@@ -131,6 +131,7 @@ def without_specks(
     layers: NDArray[np.float32],
     steady: NDArray[np.bool_],
     region: NDArray[np.bool_] | None = None,
+    reach: float = SPECK_WIDTH,
 ) -> NDArray[np.float32]:
     """Return layers (groups, h, w, 3) with the light of lone bright pixels spread over the pixels
     around them, so that its sum does not change.
@@ -139,9 +140,10 @@ def without_specks(
         steady: mask (h, w) of pixels that keep their light.
         region: mask (h, w) of the pixels over which it is spread, and outside of which pixels keep
             their light, too; all pixels by default.
+        reach: width over which it is spread, as a fraction of the image width.
     """
     width = layers.shape[2]
-    side = round(SPECK_WIDTH * width) | 1  # an odd side: a symmetric square loses no light
+    side = round(reach * width) | 1  # an odd side: a symmetric square loses no light
     region = np.ones_like(steady) if region is None else region
 
     def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
