@@ -22,6 +22,7 @@ from optisense.optics.scene.bsdf import (
     coating_density,
     coating_of,
     evaluate_coating,
+    half_vector_cosine,
     peak_share,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
@@ -34,7 +35,7 @@ from optisense.optics.transport.camera_paths import (
 
 CONTACT_RAYS = 0.4
 """Number of rays from contacts for each photon of the cache, so that the noise of both falls with
-the number of photons. At a specularity of 1, two million photons give GelSight Mini a noise of 3 %
+the number of photons. At a specularity of 1, two million photons give GelSight Mini a noise of 4 %
 over patches of the contact."""
 MOST_RAYS = 2_000_000
 """Largest number of rays that are traced together; their light takes up to 200 MB."""
@@ -57,9 +58,9 @@ MIRRORED_SHARE = 0.25
 those from a point that it sees directly. On the skin around a contact of GelSight Svelte of
 specularity 1, a tenth of the light comes from such points."""
 SKIN_WIDTH = 1 / 64
-"""Width over which this light is averaged outside contacts, as a fraction of the image width: 5
-pixels of 320. Single rays that meet a lamp are bright: without the average, pixels of GelSight
-Svelte's skin of specularity 1 have a noise of 50 % with two million photons."""
+"""Width over which the light of traced peaks is averaged outside contacts, as a fraction of the
+image width: 5 pixels of 320. Single rays that meet a lamp are bright: without the average, pixels
+of GelSight Svelte's skin of specularity 1 have a noise of 50 % with two million photons."""
 SKIN_SPECK_WIDTH = 1 / 16
 """Width over which the light of lone bright pixels outside contacts is spread, as a fraction of the
 image width. Over twice this width, it would lighten the skin between the lamps in the corner of
@@ -171,8 +172,11 @@ def traced_layers(
             )
             tracer = LobeTracer(cache, scenes, lamps, channel)
             rays = tracer.trace(points, each.directions)
-            seen = _Seen.of(points, scenes.full.table, each.pixels)
-            _add_shared(film, rays, seen, each.reach, 1 / each.directions)
+            if each.reach > 0:
+                seen = _Seen.of(points, scenes.full.table, each.pixels)
+                _add_shared(film, rays, seen, each.reach, 1 / each.directions)
+            else:
+                _add_own(film, rays, points, scenes.full.table, 1 / each.directions)
             dr.eval(film.sums)
             if mirrored is not None:
                 directions = max(1, round(MIRRORED_SHARE * each.directions))
@@ -273,7 +277,6 @@ def _add_shared(film: Film, rays: LobeRays, seen: _Seen, reach: int, share: floa
 def _scatter_shared(
     film: Film, rays: LobeRays, seen: _Seen, lit: mi.UInt32, side: int, share: float
 ) -> None:
-    groups = len(film.sums)
     owner = dr.gather(mi.UInt32, rays.owner, lit)
     whole = dr.gather(mi.Bool, rays.whole, lit)
     start = dr.gather(mi.Point3f, seen.points.point, owner)
@@ -284,7 +287,7 @@ def _scatter_shared(
     i = mi.UInt32(0)
     while dr.hint(
         i < side * side,
-        exclude=[film, rays, seen, lit, groups, side, whole, pixel, end, first, weight],
+        exclude=[film, rays, seen, lit, side, whole, pixel, end, first, weight],
     ):
         points, coating, there = seen.beside(pixel, i, side, first)
         there &= ~whole | (i == side * side // 2)
@@ -296,7 +299,6 @@ def _scatter_shared(
                 rays,
                 seen,
                 lit,
-                groups,
                 side,
                 whole,
                 end,
@@ -318,10 +320,7 @@ def _scatter_shared(
                 j += 1
             density *= dr.squared_norm(end - points.point)
             value = reflected * points.weight * (weight / dr.maximum(density, LEAST_DENSITY))
-            for g in range(groups):
-                for k in range(3):
-                    light = dr.gather(mi.Float, rays.light, (lit * groups + g) * 3 + k)
-                    dr.scatter_add(film.sums[g], light * value[k], points.pixel * 3 + k)
+            _add_light(film, rays, lit, value, points.pixel)
         i += 1
 
 
@@ -329,8 +328,7 @@ def _add_own(
     film: Film, rays: LobeRays, seen: VisiblePoints, table: mi.Float, share: float
 ) -> None:
     """Add the light that arrives along rays to the pixels that drew them; see `_add_shared`."""
-    groups = len(film.sums)
-    lit = _lit_rays(rays, groups)
+    lit = _lit_rays(rays, len(film.sums))
     if dr.width(lit) < FEWEST_RAYS:
         return
     points = dr.gather(VisiblePoints, seen, dr.gather(mi.UInt32, rays.owner, lit))
@@ -338,10 +336,18 @@ def _add_own(
     way, whole = dr.gather(mi.Vector3f, rays.way, lit), dr.gather(mi.Bool, rays.whole, lit)
     value = _reflected(points, coating, way, whole) * points.weight
     value *= dr.opaque(mi.Float, share) / dr.gather(mi.Float, rays.density, lit)
+    _add_light(film, rays, lit, value, points.pixel)
+
+
+def _add_light(
+    film: Film, rays: LobeRays, lit: mi.UInt32, value: mi.Color3f, pixel: mi.UInt32
+) -> None:
+    """Add the light of the rays of numbers ``lit`` to pixels (n,), times a colour (3, n)."""
+    groups = len(film.sums)
     for g in range(groups):
         for k in range(3):
             light = dr.gather(mi.Float, rays.light, (lit * groups + g) * 3 + k)
-            dr.scatter_add(film.sums[g], light * value[k], points.pixel * 3 + k)
+            dr.scatter_add(film.sums[g], light * value[k], pixel * 3 + k)
 
 
 def _reflected(
@@ -352,6 +358,6 @@ def _reflected(
     """
     lobe = replace(coating, reflectance=mi.Color3f(0))
     peak = evaluate_coating(lobe, points.normal, way, points.towards_eye)
-    peak *= peak_share(dr.dot(dr.normalize(way + points.towards_eye), points.normal))
+    peak *= peak_share(half_vector_cosine(points.normal, way, points.towards_eye))
     every = evaluate_coating(coating, points.normal, way, points.towards_eye)
     return dr.select(whole, every, peak)

@@ -27,6 +27,7 @@ from optisense.optics.radiance_cache.shading_points import (
 from optisense.optics.scene.bsdf import (
     coating_density,
     coating_of,
+    half_vector_cosine,
     peak_share,
     sample_coating,
     surface_kind,
@@ -118,8 +119,8 @@ class LobeTracer:
         ray.active &= (dr.max(weight) > 0) & (coating.specularity > 0)
         ray.active &= dr.dot(way, first.face_normal) > 0
         whole = self._is_uncached(first, ray)
-        half = dr.normalize(way + first.towards_eye)
-        ray.active &= whole | (peak_share(dr.dot(half, first.normal)) > 0)
+        cos_m = half_vector_cosine(first.normal, way, first.towards_eye)
+        ray.active &= whole | (peak_share(cos_m) > 0)
         density = coating_density(coating, first.normal, way, first.towards_eye)
         found = LobeRays(
             owner,
@@ -296,7 +297,7 @@ def _reflected(
     place = mi.Point2f(unit_float(bits * 277803737), unit_float((bits ^ GOLDEN_BITS) * 69069))
     way, share = sample_coating(coating, end.normal, -end.towards_eye, mi.Float(0), place)
     weight = end.weight * share * coating.specularity
-    half = dr.normalize(way + end.towards_eye)
-    weight *= dr.select(on_skin, peak_share(dr.dot(half, end.normal)), 1)
+    cos_m = half_vector_cosine(end.normal, way, end.towards_eye)
+    weight *= dr.select(on_skin, peak_share(cos_m), 1)
     goes_on = (dr.max(weight) > 0) & (dr.dot(way, end.face_normal) > 0)
     return Ray(leave(end.point, end.face_normal, way), way, goes_on), weight

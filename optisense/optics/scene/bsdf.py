@@ -307,6 +307,11 @@ def peak_share(cos_m: mi.Float) -> mi.Float:
     return 1 - x * x * (3 - 2 * x)
 
 
+def half_vector_cosine(normal: mi.Vector3f, one: mi.Vector3f, other: mi.Vector3f) -> mi.Float:
+    """Return the cosine (n,) of the half vector of two unit directions with a unit normal."""
+    return dr.dot(dr.normalize(one + other), normal)
+
+
 def coating_density(
     coating: CoatingBsdf, normal: mi.Vector3f, towards_light: mi.Vector3f, towards_eye: mi.Vector3f
 ) -> mi.Float:
@@ -318,7 +323,7 @@ def coating_density(
         towards_light, towards_eye: unit directions away from the surface.
     """
     cos_i, cos_o = dr.dot(normal, towards_light), dr.dot(normal, towards_eye)
-    cos_m = dr.dot(dr.normalize(towards_light + towards_eye), normal)
+    cos_m = half_vector_cosine(normal, towards_light, towards_eye)
     lobe = _ggx(cos_m, coating.alpha) * _smith(cos_o, coating.alpha) / (4 * cos_o)
     density = lobe * coating.specularity + cos_i * (dr.inv_pi * (1 - coating.specularity))
     return dr.select((cos_i > 0) & (cos_o > 0), density, 0.0)
