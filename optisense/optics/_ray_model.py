@@ -12,6 +12,7 @@ from optisense.geometry import Contact, Indenter, SensingSurface, TriangleMesh
 from optisense.mechanics import ELASTIC, PressedSkin
 from optisense.optics._skin_view import SkinView, ray_camera
 from optisense.optics.backend.interrupts import reraise_interrupts
+from optisense.optics.backend.memory import keep_freed_memory
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.assembly import assemble
 from optisense.optics.scene.contact_scenes import ContactScenes
@@ -62,6 +63,7 @@ class RayModel:
 
         refuse_no_design(design)
         self.variant = use_variant(variant)
+        keep_freed_memory()
         self.design = design.copy()
         known = None if before is None else before.scenes
         shapes = None if known is None else known.assembly

@@ -1,4 +1,4 @@
-"""Limits on the freed memory that Dr.Jit keeps for further arrays."""
+"""Freed memory that the process keeps for further arrays, and limits on it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ctypes
 import gc
 import os
 import sys
+from functools import cache
 from pathlib import Path
 
 import drjit as dr
@@ -18,6 +19,25 @@ LEAST_FREED = 2**30
 """Growth of the resident memory (bytes) after freed memory was returned, from which on it is
 returned again. A GB is less than one trace of a sensor takes, so that processes in which more than
 `MOST_RESIDENT` are in use do not return memory before every image."""
+
+_M_TRIM_THRESHOLD, _M_MMAP_MAX = -1, -4
+"""The numbers of two parameters of glibc's ``mallopt``: the free memory (bytes) at the end of the
+heap from which on it is returned to the system, and the most blocks outside of the heap, which are
+returned when they are freed."""
+
+
+@cache
+def keep_freed_memory() -> None:
+    """Let glibc keep freed memory for further arrays, until `bound_memory` returns it.
+
+    By default, it returns each large array at once. The system clears each page of the next one,
+    which took up to a quarter of the processor time of the first image of a sensor.
+    """
+    if sys.platform == "linux":
+        set_option = getattr(ctypes.CDLL(None), "mallopt", None)
+        if set_option is not None:
+            set_option(_M_TRIM_THRESHOLD, MOST_RESIDENT - 1)  # the largest number that it takes
+            set_option(_M_MMAP_MAX, 0)
 
 
 class _Bound:
