@@ -61,8 +61,8 @@ demo: setup
 	@$(BIN)/optisense render gelsight-mini --contact sphere:1.5@0,0:0.8 --out demo-output
 	@printf '\nThat was the demo. What to try next:\n'; sh scripts/next_steps.sh
 
-# Each of these runs whatever becomes of the others, two at a time; a summary at the end says what
-# failed. Those that take longest begin first.
+# Each of these runs whatever becomes of the others, several at a time; a summary at the end says
+# what failed. Those that take longest begin first.
 CHECKS := pytest-rest pytest-tasks pytest-optics pytest-docs pytest-search studio-tests \
     pytest-sensors types docs bare-pytest lint import-rules
 test: setup
@@ -92,7 +92,7 @@ docs-as-typed: setup
 pytest: setup
 	$(BIN)/python -m pytest
 
-# The same in lots, which `make test` runs two at a time. A lot is one process: its folders share
+# The same in lots, which `make test` runs side by side. A lot is one process: its folders share
 # imports, and the first renderings, which load the kernels.
 LOTS := optics search sensors tasks
 LOT_optics := optics

@@ -1,6 +1,6 @@
 #!/bin/sh
-# Run the named targets of the Makefile, two at a time in the given order, each whatever became of
-# the others, and say at the end which passed. What a target prints follows when it has ended, so
+# Run the named targets of the Makefile, several at a time in the given order, each whatever became
+# of the others, and say at the end which passed. What a target prints follows when it has ended, so
 # that the lines of two targets do not mix. The exit status is 1 if one failed.
 set -u
 cd "$(dirname "$0")/.."
@@ -10,16 +10,20 @@ trap 'rm -rf "$folder"' EXIT
 # Background jobs do not hear Ctrl-C: the shell hides it from them.
 trap 'printf "\nInterrupted.\n" >&2; cat "$folder"/*.outcome >&2; trap "" TERM; kill 0; exit 130' INT
 
-# Most of the time one thread works: two targets take little longer than the longer one alone. Each
-# turn has half of the processors: the renderer's threads that wait for work take a tenth to a fifth
-# of the processors' time where two targets share them.
+# Most of the time one thread of a target works, and a seventh of the time it waits for a browser or
+# for a clock, so that only four targets at a time keep two processors busy. A target takes up to
+# 3 GiB of memory; where four do not fit, two run. Each has its share of the processors: the threads
+# of renderers that share processors would take a tenth to a fifth of the time to wait for work.
 at_a_time=2
-share=$(($(nproc 2>/dev/null || echo 0) / at_a_time))
+free=$(awk '/^MemAvailable:/ { print int($2 / 2^20) }' /proc/meminfo 2>/dev/null)
+[ "${free:-0}" -lt 12 ] || at_a_time=4
+processors=$(nproc 2>/dev/null || echo 0)
+share=$((processors < at_a_time ? 1 : processors / at_a_time))
 
 run_target() { # a target, on the processors of a turn where that can be said
-    processors="$(($2 * share))-$((($2 + 1) * share - 1))"
-    if [ "$share" -ge 1 ] && taskset -c "$processors" true 2>/dev/null; then
-        taskset -c "$processors" $make --no-print-directory "$1"
+    first=$(($2 * share % (processors > 0 ? processors : 1)))
+    if taskset -c "$first-$((first + share - 1))" true 2>/dev/null; then
+        taskset -c "$first-$((first + share - 1))" $make --no-print-directory "$1"
     else
         $make --no-print-directory "$1"
     fi
