@@ -18,7 +18,7 @@ from .pages import write_pages
 from .visit import DESKTOP, PATIENCE, Visit
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL by the processor
+FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"]
 
 Open = Callable[..., Visit]
 
