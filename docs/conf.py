@@ -27,7 +27,9 @@ include_patterns = [
     "SECURITY.md",
     "LICENSE",
 ]
-exclude_patterns = ["docs/examples/**"]
+exclude_patterns = ["docs/examples/**", ".*", "site", "tests"]
+"""What is no page, and folders without pages of which the files need not be looked at, as those of
+``.venv``."""
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 
 myst_heading_anchors = 4
