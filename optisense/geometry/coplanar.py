@@ -77,15 +77,13 @@ def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.in
 
 def _outline(faces: NDArray[np.int64]) -> list[Loop] | None:
     """Return the loops of vertices around a patch, inside on the left; None if two loops touch."""
-    directed = {
-        (int(a), int(b)) for f in faces for a, b in ((f[0], f[1]), (f[1], f[2]), (f[2], f[0]))
-    }
-    follow: dict[int, int] = {}
-    for a, b in directed:
-        if (b, a) not in directed:
-            if a in follow:
-                return None
-            follow[a] = b
+    number = int(faces.max()) + 1
+    sides = faces.ravel() * number + np.roll(faces, -1, axis=1).ravel()
+    other_way = np.roll(faces, -1, axis=1).ravel() * number + faces.ravel()
+    starts, ends = divmod(np.unique(sides[~np.isin(sides, other_way)]), number)
+    follow: dict[int, int] = dict(zip(starts.tolist(), ends.tolist(), strict=True))
+    if len(follow) < len(starts):
+        return None
     loops = []
     while follow:
         start, here = follow.popitem()
