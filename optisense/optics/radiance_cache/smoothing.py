@@ -152,8 +152,10 @@ class Kernels:
         key = photons, corrected
         if key not in self._known:
             radii = self.radii(photons)
-            matrix = kernel_matrix(self.cells, radii)
-            blur = kernel_matrix(self.cells, np.sqrt(radii**2 + CELL_BLUR * self._size**2))
+            wider = np.sqrt(radii**2 + CELL_BLUR * self._size**2)
+            distances = distances_within(self.cells, wider)
+            matrix = kernel_matrix(self.cells, radii, distances)
+            blur = kernel_matrix(self.cells, wider, distances)
             wanted = self._second_moment(matrix) + CELL_BLUR * self._size**2 / 3
             strength = wanted / np.maximum(self._second_moment(blur), 1e-30)
             twice = self._twice(blur, strength) if corrected else None
@@ -207,7 +209,7 @@ def varies_over(cells: SurfaceCells, halves: FloatingArray, radii: FloatingArray
         halves: (2, cells, groups) power (mW) of each half of the photons on each cell.
         radii: (cells,) kernel radii (mm).
     """
-    kernel = kernel_matrix(cells, radii)
+    kernel = kernel_matrix(cells, radii, distances_within(cells, radii))
     areas = cells.areas[:, None]
     once = [kernel @ half for half in halves]
     one, other = (kernel @ (light * areas) - light for light in once)
@@ -220,31 +222,34 @@ def varies_over(cells: SurfaceCells, halves: FloatingArray, radii: FloatingArray
     return np.asarray(radii / np.sqrt(2 * np.maximum(relative, 1e-9)))
 
 
-def kernel_matrix(cells: SurfaceCells, radii: FloatingArray) -> csr_matrix:
+def kernel_matrix(cells: SurfaceCells, radii: FloatingArray, distances: csr_matrix) -> csr_matrix:
     """Return Epanechnikov's kernel (cells, cells) around each cell, which maps mW on cells to
     mW/mm^2.
 
     The kernel is normalised by the surface's area under it, so that no light is lost at edges and
-    on oblique cells. Cells with another orientation (`MIN_NORMAL_COSINE`) have no weight.
+    on oblique cells.
+
+    Args:
+        radii: (cells,) kernel radii (mm).
+        distances: those within these or larger radii, of `distances_within`.
     """
-    rows, columns, distance = _pairs_within(cells.centres, radii)
-    normals = cells.normals
-    alike = np.einsum("ij,ij->i", normals[rows], normals[columns]) > MIN_NORMAL_COSINE
-    weight = np.maximum(1 - (distance / radii[rows]) ** 2, 0.0) * alike
+    rows = np.repeat(np.arange(cells.cells), np.diff(distances.indptr))
+    weight = 1 - (distances.data / radii[rows]) ** 2
     kept = weight > 0
-    rows, columns, weight = rows[kept], columns[kept], weight[kept]
+    rows, columns, weight = rows[kept], distances.indices[kept], weight[kept]
     weight /= np.bincount(rows, weight * cells.areas[columns], cells.cells)[rows]
-    return csr_matrix((weight, (rows, columns)), shape=(cells.cells, cells.cells))
+    starts = np.concatenate([[0], np.bincount(rows, minlength=cells.cells).cumsum()])
+    return csr_matrix((weight, columns, starts), shape=distances.shape)
 
 
-def _pairs_within(
-    places: FloatingArray, radii: FloatingArray
-) -> tuple[NDArray[np.integer], NDArray[np.integer], FloatingArray]:
-    """Return the pairs (m,) of places that are closer than the radius of the first, and their
-    distances (m,), mm, in ascending order of the first and of the second.
+def distances_within(cells: SurfaceCells, radii: FloatingArray) -> csr_matrix:
+    """Return the distances, mm, of the cells around each cell that are closer than its radius, as a
+    matrix (cells, cells) in ascending order.
 
-    Places with small radii are looked up by themselves: outside of the view they are many.
+    Cells with another orientation (`MIN_NORMAL_COSINE`) are left out. Cells with small radii are
+    looked up by themselves: outside of the view they are many.
     """
+    places, normals = cells.centres, cells.normals
     tree = cKDTree(places)
     narrow = radii <= np.sqrt(radii.min() * radii.max())
     found = []
@@ -255,8 +260,14 @@ def _pairs_within(
             )
             found.append((part[pairs["i"]], pairs["j"], pairs["v"]))
     rows, columns, distance = (np.concatenate(each) for each in zip(*found, strict=True))
-    order = np.lexsort((columns, rows))
-    return rows[order], columns[order], distance[order]
+    kept = distance < radii[rows]
+    rows, columns, distance = rows[kept], columns[kept], distance[kept]
+    alike = np.einsum("ij,ij->i", normals[rows], normals[columns]) > MIN_NORMAL_COSINE
+    within = csr_matrix(
+        (distance[alike], (rows[alike], columns[alike])), shape=(cells.cells, cells.cells)
+    )
+    within.sort_indices()
+    return within
 
 
 def product(matrix: csr_matrix, table: NDArray[np.float32]) -> NDArray[np.float32]:
