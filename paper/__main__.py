@@ -13,7 +13,6 @@ from optisense.cli import stopping
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
 from optisense.cli.leaving import run_and_leave
 from optisense.cli.progress import progress_line
-from optisense.time_left import TimedStep, TimeLeft
 
 if TYPE_CHECKING:
     from paper import Experiment
@@ -104,10 +103,10 @@ def experiment(
     count = min(processors(), MOST_WORKERS) if workers is None else workers
     try:
         if len(chosen) > 1:
-            with _shown_units(name, count) as show:
+            with _shown_units(name) as show:
                 prepare(chosen, Bench(out, count, show), quick, seeds)
         for each in chosen:
-            with _shown_units(each.name, count) as show:
+            with _shown_units(each.name) as show:
                 result = run(each, Bench(out, count, show), quick, seeds)
             _print_result(each, result, out)
     except KeyboardInterrupt:
@@ -125,24 +124,21 @@ MOST_WORKERS = 8
 
 
 @contextmanager
-def _shown_units(name: str, workers: int) -> Iterator[ShowUnits]:
+def _shown_units(name: str) -> Iterator[ShowUnits]:
     """Yield a callback that shows the units of an experiment's step on a progress line.
 
     The time left is that of the step, since an experiment may have more units after it.
     """
     with progress_line() as line:
-        line.say(f"{name}: loading")
-        time_left: TimeLeft | None = None
+        line.begin(f"{name}: loading")
         begun = 0, 0
 
         def show(done: int, count: int, label: str) -> None:
-            nonlocal time_left, begun
-            if time_left is None or count != begun[1] or done < begun[0]:
-                time_left = TimeLeft([TimedStep("units", count, warm_up=min(workers, count - 1))])
-                time_left.begin("units", done=done)
+            nonlocal begun
+            if count != begun[1] or done < begun[0]:
+                line.begin(name, count, done)
                 begun = done, count
-            time_left.advance(done)
-            line.show(name, done, count, time_left.seconds_left, [label] if label else [])
+            line.advance(done, count, *([label] if label else []))
 
         yield show
 

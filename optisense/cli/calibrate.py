@@ -13,15 +13,11 @@ from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CalibrateOptions
-from optisense.time_left import TimedStep
 from optisense.writing import write_json, write_text, written_together
 
 if TYPE_CHECKING:
     from optisense.calibration.realism import Realism
     from optisense.calibration.result import Calibration
-
-LOADING, FITTING = "loading", "fitting"
-"""Steps of the progress line."""
 
 COLUMNS = "unexplained", "contact", "ring", "similarity"
 """Figures of presses whose medians are printed."""
@@ -44,8 +40,8 @@ def calibrate(
     are held out of the fit and test the result. If the command was interrupted, the same command
     continues from the renderings that it kept in the folder.
     """
-    with progress_line(TimedStep(LOADING, 1, 3.0), TimedStep(FITTING, 20, 100.0)) as line:
-        line.begin(LOADING)
+    with progress_line() as line:
+        line.begin("loading")
         from optisense.calibration import read_photographs
         from optisense.calibration.calibrating import calibrate as fit_design
         from optisense.calibration.kept_renderings import KeptRenderings
@@ -56,11 +52,10 @@ def calibrate(
         photographs = read_photographs(photos, options.ball)
         take_folder(out)
         kept = KeptRenderings(out)
-        line.begin(FITTING)
+        line.begin("fitting")
 
         def report(what: str, done: int, count: int) -> None:
-            line.time_left.expect(FITTING, count=count)
-            line.time_left.advance(done)
+            line.advance(done, count)
             line.say(what, done, count)
 
         try:

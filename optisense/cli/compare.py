@@ -13,14 +13,10 @@ from optisense.cli.console import handles_errors, messages, output, table_of
 from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CompareOptions
-from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
     from optisense.calibration.comparing import Comparison
     from optisense.calibration.realism import Realism
-
-PICTURES, WRITING = "rendering the presses", "writing the page"
-"""Steps of the progress line."""
 
 PhotosArgument = Annotated[
     Path,
@@ -52,7 +48,7 @@ def compare(
     """
     if out is not None and out.is_dir():
         raise typer.BadParameter(f"'{out}' is a folder", param_hint="--out")
-    with progress_line(TimedStep("loading", 1, 3.0), TimedStep(PICTURES, 8, 10.0)) as line:
+    with progress_line() as line:
         line.begin("loading")
         from optisense.calibration import read_photographs
         from optisense.calibration.comparing import compare as compare_with
@@ -67,7 +63,7 @@ def compare(
             ensure_writable(out.parent)
         model = OpticalModel(sensor, variant)
         count = 1 + len(photographs.presses)
-        line.begin(PICTURES, count)
+        line.begin("rendering the presses", count)
         found = compare_with(
             model,
             photographs,
@@ -77,7 +73,7 @@ def compare(
             progress=lambda done: line.advance(done, count),
         )
         if out is not None:
-            line.say(WRITING)
+            line.begin("writing the page")
             write_comparison(out, sensor, found)
     for note in found.notes:
         messages.print(f"note: {note}")

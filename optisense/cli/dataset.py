@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,28 +11,12 @@ import typer
 from optisense.cli.console import EXIT_FAILURE, handles_errors, messages, output
 from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.progress import progress_line
-from optisense.cli.sampling import (
-    LOADING,
-    load_sensor,
-    loading_steps,
-    sample_progress,
-    sample_steps,
-)
+from optisense.cli.sampling import LOADING, load_sensor, sample_progress
 from optisense.commands.options import MOST_ITEMS
 from optisense.commands.sampling import DatasetOptions
-from optisense.time_left import TimedStep
-from optisense.usual_times import USUAL_PIXELS, UsualTimes
 
 if TYPE_CHECKING:
-    from optisense.design import SensorDesign
     from optisense.tasks import Dataset
-
-
-SAMPLES, WRITING = "samples", "writing Parquet files"
-"""Steps of the progress."""
-
-SAMPLE_WORK = 0.5
-"""Processor time of a sample of `USUAL_PIXELS`, files included, s; measured on GelSight Mini."""
 
 
 @handles_errors
@@ -76,15 +59,6 @@ def dataset(
     If it was stopped, the same command continues it. A folder that was begun with other settings is
     not changed.
     """
-
-    def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:
-        pixels = USUAL_PIXELS
-        if sensor is not None:
-            pixels = math.prod(options.resolution or sensor.camera.resolution)
-        work = SAMPLE_WORK * (0.5 + 0.5 * pixels / USUAL_PIXELS)
-        made = sample_steps(SAMPLES, options.photons, count, work, 0.2, times=times)
-        return [*made, TimedStep(WRITING, count, 0.1)] if parquet else made
-
     from optisense.tasks.data_card import check_licence, write_card
     from optisense.tasks.parquet import require_parquet, write_parquet
 
@@ -92,17 +66,17 @@ def dataset(
     if parquet:
         require_parquet()
     try:
-        with progress_line(*loading_steps(), *steps(UsualTimes.here())) as line:
+        with progress_line() as line:
             line.begin(LOADING)
             from optisense.tasks import DatasetSettings, generate
 
             settings = DatasetSettings(**options.settings())
             settings.contacts.parsed()
-            model = load_sensor(line, design, out, variant, steps)
-            show = sample_progress(line, model, SAMPLES, "reading the dataset")
+            model = load_sensor(line, design, out, variant)
+            show = sample_progress(line, model, "samples", "reading the dataset")
             made = generate(model, out, count, settings, show, mend=mend)
             if parquet:
-                line.begin(WRITING, text="writing Parquet files")
+                line.begin("writing Parquet files")
                 write_parquet(made, line.advance)
             write_card(made, licence)
     except KeyboardInterrupt:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,17 +20,13 @@ from optisense.cli.console import (
 from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
-from optisense.cli.sampling import BUILDING, LOADING, loading_steps
+from optisense.cli.sampling import BUILDING, LOADING
 from optisense.commands.scoring import EvaluateOptions
-from optisense.quality import SCORE_PHOTONS, photons_of
-from optisense.time_left import TimedStep
-from optisense.usual_times import UsualTimes
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective
     from optisense.objectives.scored import Scored
-    from optisense.objectives.usual_score import UsualScore
     from optisense.optics import OpticalModel
 
 JSON_FILE = "scores.json"
@@ -59,13 +56,11 @@ def evaluate(
     settings, seeds = options.for_objectives(), options.seeds
 
     interrupted = False
-    photons = photons_of(settings.get("photons") or SCORE_PHOTONS)
-    with progress_line(*_steps(seeds, photons)) as line:
+    with progress_line() as line:
         line.begin(LOADING)
         from optisense.objectives import BUILT_IN, Settings
         from optisense.objectives.combined import resolve
         from optisense.objectives.run import split_settings
-        from optisense.objectives.usual_score import usual_score
         from optisense.sensors import load
 
         objectives = resolve(options.objectives or BUILT_IN)
@@ -80,15 +75,12 @@ def evaluate(
 
         scored = Scored(sensor)
         line.begin(BUILDING)
-        usual = usual_score(sensor, [each.name for each in objectives], Settings(**shared))
-        whole = usual.first + (seeds - 1) * usual.whole
-        line.time_left.expect(SCORING, count=whole)
         model = OpticalModel(sensor, variant=variant)
-        line.begin(SCORING)
+        line.begin("scoring", seeds)
         try:
             for number in range(seeds):
                 seed_of_run = {**settings, "seed": options.seed + number}
-                progress = ScoreProgress(line, number, seeds, len(objectives), usual)
+                progress = ScoreProgress(line, number, seeds, objectives)
                 _score(model, objectives, seed_of_run, scored, progress)
         except KeyboardInterrupt:
             if not scored.scores:
@@ -170,39 +162,20 @@ def _print_table(scored: Scored) -> None:
             output.print(f"{score.name} failed: {score.failure}")
 
 
-SCORING = "scoring"
-
-
-USUAL_SCORING = 3.0
-"""Processor time of scoring with one seed, without its light, s; the estimate before the sensor and
-the objectives are known.
-"""
-
-
-def _steps(seeds: int, photons: int) -> list[TimedStep]:
-    """Return the steps, with their usual durations; a piece of scoring takes one second."""
-    times = UsualTimes.here()
-    each = USUAL_SCORING * times.pace + times.tracing(photons)
-    return [
-        *loading_steps(),
-        TimedStep(SCORING, seeds * each, 1.0),
-    ]
+IMAGES_SHARE = 0.8
+"""Share of the images in the time of scoring; the rest is that of the objectives themselves."""
 
 
 class ScoreProgress:
-    """Progress of scoring with one seed: images, which objectives share, and objectives.
-
-    Each part of the work counts as many pieces as the seconds that it usually takes.
-    """
+    """Progress of scoring with one seed: images, which objectives share, and objectives."""
 
     def __init__(
-        self, line: ProgressLine, number: int, seeds: int, objectives: int, usual: UsualScore
+        self, line: ProgressLine, number: int, seeds: int, objectives: Sequence[Objective]
     ) -> None:
-        """Show seed ``number`` (from 0) of ``seeds``, for ``objectives`` objectives."""
+        """Show seed ``number`` (from 0) of ``seeds``."""
         self._line = line
-        self._number, self._seeds, self._objectives = number, seeds, objectives
-        self._usual = usual
-        self._before = number * usual.whole + (usual.first - usual.whole) * (number > 0)
+        self._number, self._seeds, self._objectives = number, seeds, len(objectives)
+        self._images_share = 0.0 if all(each.rays_only for each in objectives) else IMAGES_SHARE
         self._images = 0.0
         self._finished = 0
         self._title = ""
@@ -223,11 +196,8 @@ class ScoreProgress:
         self._show(f"{self._title}: {text}")
 
     def _show(self, text: str) -> None:
-        usual, scored = self._usual, self._finished / self._objectives
-        # If an objective without images comes first, its share of the rest counts as done.
-        rendered = max(self._images, scored if scored == 1.0 else 0.0)
-        judging = usual.judging + (usual.libraries if self._number == 0 else 0.0)
-        done = usual.done(rendered, first=self._number == 0) + scored * judging
-        self._line.time_left.advance(self._before + done)
+        share = self._images_share
+        done = share * self._images + (1.0 - share) * self._finished / self._objectives
+        self._line.advance(self._number + done)
         of = f"seed {self._number + 1} of {self._seeds}, " if self._seeds > 1 else ""
         self._line.say(f"{of}{text}")

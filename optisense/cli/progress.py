@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from optisense.cli import stopping
 from optisense.cli.console import messages
-from optisense.time_left import TimedStep, TimeLeft
+from optisense.time_left import TimeLeft
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -29,49 +29,57 @@ MOST_BAR, LEAST_BAR = 30, 8
 
 
 class ProgressLine:
-    """Progress of a command: the current step, the time left, and results so far.
+    """Progress of a command: the current step, its time left, and results so far.
 
     ``scoring trial 12/40 ━━━━━━━━━━━━╸━━━━━━━━━━━  0:42, 3:10 left  best 0.6123``
     """
 
-    def __init__(
-        self, steps: Sequence[TimedStep] = (), clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         """Start the clock.
 
         Args:
-            steps: steps of the work, for the time left; empty if `show` is given the time left.
             clock: function that returns the time, s.
         """
-        self.time_left = TimeLeft(steps, clock=clock)
         self._clock = clock
-        self._began = self._shown = self._logged = clock()
+        self._began = self._logged = clock()
         self._what = "starting"
         self._count = ""
         self._notes: tuple[str, ...] = ()
-        self._left: float | None = None
-        self._told_fraction = 0.0
+        self._step: TimeLeft | None = None
         self._log_lines = False
         self._lock = threading.Lock()
 
-    def begin(
-        self, step: str, count: float | None = None, done: float = 0.0, text: str | None = None
-    ) -> None:
+    def begin(self, what: str, count: float | None = None, done: float = 0.0) -> None:
         """Begin a step of the work.
 
         Args:
-            count, done: see `TimeLeft.begin`.
-            text: text of the step; its name if None.
+            what: text of the step.
+            count: number of its pieces; None if unknown.
+            done: number of pieces that were finished earlier.
         """
         with self._lock:
-            self.time_left.begin(step, count, done)
-        self.say(text or step, done, count)
+            self._step = None if count is None else TimeLeft(count, done, self._clock)
+        self.say(what, done, count)
 
     def advance(self, done: float, count: float | None = None, *notes: str) -> None:
         """Show that ``done`` pieces of the step are finished, of ``count`` if it is given."""
         with self._lock:
-            self.time_left.advance(done)
+            if self._step is None:
+                self._step = TimeLeft(1.0 if count is None else count, done, self._clock)
+            self._step.count = self._step.count if count is None else count
+            self._step.advance(done)
         self.say(self._what, done, count, *notes)
+
+    def follow(
+        self, what: str, done: float | None, count: float | None, notes: Sequence[str] = ()
+    ) -> None:
+        """Show progress of work that begins a step whenever its text changes."""
+        if what != self._what:
+            self.begin(what, count, done or 0.0)
+        if done is None or count is None:
+            self.say(what, done, count, *notes)
+        else:
+            self.advance(done, count, *notes)
 
     def say(
         self, what: str, done: float | None = None, count: float | None = None, *notes: str
@@ -83,36 +91,23 @@ class ProgressLine:
         if self._log_lines:
             self._log()
 
-    def show(
-        self,
-        what: str,
-        done: float | None,
-        count: float | None,
-        left: float,
-        notes: Sequence[str] = (),
-    ) -> None:
-        """Show progress with an estimate by the caller: seconds left, NaN if unknown."""
-        self._left, self._shown = left, self._clock()
-        self.say(what, done, count, *notes)
+    @property
+    def pace(self) -> float:
+        """Time from piece to piece of the step, s; NaN if unknown."""
+        with self._lock:
+            return math.nan if self._step is None else self._step.pace
 
     @property
     def seconds_left(self) -> float:
-        """Time until the end, s; NaN if unknown."""
-        if self._left is not None and math.isnan(self._left):
-            return math.nan
-        if self._left is not None:
-            return max(0.0, self._left - (self._clock() - self._shown))
+        """Time until the end of the step, s; NaN if unknown."""
         with self._lock:
-            return self.time_left.seconds_left
+            return math.nan if self._step is None else self._step.seconds_left
 
     @property
     def fraction(self) -> float:
-        """Share of the whole time that has passed; it never falls."""
-        left, elapsed = self.seconds_left, self._clock() - self._began
-        if math.isfinite(left):
-            now = elapsed / max(elapsed + left, 1e-9)
-            self._told_fraction = max(self._told_fraction, now)
-        return self._told_fraction
+        """Finished share of the step; 0 if unknown."""
+        with self._lock:
+            return 0.0 if self._step is None else self._step.fraction
 
     def text(self, columns: int) -> Text:
         """Return the line, in at most ``columns`` columns."""
@@ -157,7 +152,7 @@ class ProgressLine:
 
 @contextmanager
 def progress_line(
-    *steps: TimedStep, waits: Callable[[ProgressLine], str] | None = None
+    waits: Callable[[ProgressLine], str] | None = None,
 ) -> Iterator[ProgressLine]:
     """Show a line of progress that vanishes at its end; without a terminal, print lines from time
     to time.
@@ -165,7 +160,7 @@ def progress_line(
     Args:
         waits: function that says what Ctrl-C waits for, if it does; see `stopping.waiting`.
     """
-    line = ProgressLine(steps, time.monotonic)
+    line = ProgressLine(time.monotonic)
     with stopping.waiting(None if waits is None else lambda: waits(line)):
         if not messages.is_terminal:
             line._log_lines = True

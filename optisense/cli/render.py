@@ -16,13 +16,11 @@ from optisense.cli.options import (
     parse_contacts,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import ProgressLine, about, progress_line
-from optisense.cli.sampling import BUILDING, LOADING, loading_steps, set_expected_durations
+from optisense.cli.progress import ProgressLine, progress_line
+from optisense.cli.sampling import BUILDING, LOADING
 from optisense.cli.stopping import Interrupt, deferred_interrupt
 from optisense.commands.rendering import RenderOptions
 from optisense.quality import PICTURE_PHOTONS
-from optisense.time_left import TimedStep
-from optisense.usual_times import USUAL_PIXELS, UsualTimes
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, RenderProgress, TactileImage
@@ -51,7 +49,7 @@ def render(
     contacts = parse_contacts(contact)
 
     with (
-        progress_line(*_steps(UsualTimes.here(), options), waits=_waits) as line,
+        progress_line(lambda line: "finishing the picture") as line,
         deferred_interrupt() as interrupt,
     ):
         line.begin(LOADING)
@@ -61,6 +59,7 @@ def render(
         take_folder(out)
 
         from optisense.optics import OpticalModel
+        from optisense.optics.backend.stages import Stage
         from optisense.optics.imaging.tactile_image import REPORT_FILE
         from optisense.report import write_report
         from optisense.report.camera_rays import CameraRays
@@ -69,16 +68,13 @@ def render(
 
         interrupt.raise_if_requested()
         line.begin(BUILDING)
-        width, height = size or sensor.camera.resolution
-        pixels = width * height
-        set_expected_durations(line, sensor, lambda times: _steps(times, options, pixels))
         model = OpticalModel(sensor, variant=variant)
         interrupt.raise_if_requested()
-        stages = RenderStages(line)
 
         def report_progress(progress: RenderProgress) -> None:
-            stages(progress)
-            if progress.photons and stages.stage == TRACING:  # a picture can be made of these
+            _show_render(line, progress)
+            # A picture can be made of the photons so far.
+            if progress.photons and progress.stage is Stage.PHOTONS:
                 interrupt.raise_if_requested()
 
         image = model.render(
@@ -91,16 +87,16 @@ def render(
             skin=options.skin,
             progress=report_progress,
         )
-        line.begin(WRITING)
+        line.begin("writing the report")
         image.settings["contacts"] = list(contact or [])
         image.save(out, options.exposure)
         real = None
         if has_real_picture(sensor) and not image.interrupted and not interrupt.requested:
-            line.say(COMPARING)
+            line.begin("comparing with a real sensor")
             real = _compare_with_real(model, image, interrupt)
         light = None
         if not image.interrupted and not interrupt.requested:
-            line.say(FOLLOWING)
+            line.begin("following the light of each group")
             light = LightSection.of(model, seed=options.seed)
         write_report(
             out / REPORT_FILE,
@@ -117,45 +113,6 @@ def render(
         messages.print("interrupted: the files contain what was finished")
     if interrupt.requested:
         raise typer.Exit(EXIT_INTERRUPTED)
-
-
-WRITING = "writing the report"
-TRACING, SHADING = "tracing photons", "shading the picture"
-COMPARING = "comparing with a real sensor"
-FOLLOWING = "following the light of each group"
-
-NOISE_PHOTONS = 4_000_000
-"""Number of photons that a noise target is expected to take, before the noise is known."""
-
-WRITING_TIME = 0.8
-"""Time to write the files and the report, s; measured on GelSight Mini at 320x240."""
-
-
-def _steps(
-    times: UsualTimes, options: RenderOptions, pixels: int = USUAL_PIXELS
-) -> list[TimedStep]:
-    """Return the steps of a render with this number of pixels, and their usual durations."""
-    usual = NOISE_PHOTONS if options.noise is not None else PICTURE_PHOTONS
-    tracing = times.tracing(options.photons or usual)
-    if options.photons is None and options.seconds is not None:
-        tracing = max(1.0, options.seconds - 5.0)
-    compiling = times.compiling() / 2.0
-    return [
-        *loading_steps(),
-        TimedStep("preparing the scene", 1, times.preparing()),
-        TimedStep("tracing pilot photons", 1, times.pilot()),
-        TimedStep(TRACING, 1, tracing + compiling),
-        TimedStep("smoothing the light", 1, times.smoothing()),
-        TimedStep(SHADING, 1, times.picture(pixels) + compiling),
-        TimedStep(WRITING, 1, WRITING_TIME * times.thread_pace),
-    ]
-
-
-def _waits(line: ProgressLine) -> str:
-    """Return what a first Ctrl-C waits for: a picture is made from the light so far."""
-    left = line.time_left
-    rest = left.seconds_left - left.seconds_left_of(TRACING)
-    return f"finishing the picture{about(rest)}"
 
 
 def _compare_with_real(
@@ -175,36 +132,20 @@ def _compare_with_real(
         return None
 
 
-class RenderStages:
-    """Display of the stages of a render on a progress line.
+def _show_render(line: ProgressLine, progress: RenderProgress) -> None:
+    """Show the progress of a render: its stage, its finished share, photons and noise."""
+    from optisense.optics.backend.stages import Stage
 
-    Attributes:
-        stage: current stage.
-    """
-
-    def __init__(self, line: ProgressLine) -> None:
-        """Show the stages on ``line``, which has a step for each."""
-        self._line = line
-        self.stage = ""
-
-    def __call__(self, progress: RenderProgress) -> None:
-        """Show a report of progress."""
-        from optisense.optics.backend.stages import Stage
-
-        if progress.stage is Stage.DONE:
-            return
-        if progress.stage.value != self.stage:
-            self.stage = progress.stage.value
-            self._line.begin(self.stage)
-        notes = [f"{progress.photons / 1e6:.1f} million photons"] if progress.photons else []
-        if progress.noise is not None:
-            notes.append(f"noise {progress.noise:.1f} %")
-        what = self.stage
-        if self.stage == TRACING:
-            self._line.time_left.advance(progress.part * self._line.time_left.count)
-            if not progress.photons:
-                what = "compiling, " + what
-        self._line.say(what, None, None, *notes)
+    if progress.stage is Stage.DONE:
+        return
+    what = progress.stage.value
+    notes = [f"{progress.photons / 1e6:.1f} million photons"] if progress.photons else []
+    if progress.noise is not None:
+        notes.append(f"noise {progress.noise:.1f} %")
+    if progress.stage is Stage.PHOTONS and not progress.photons:
+        what = "compiling, " + what
+    line.advance(progress.fraction)
+    line.say(what, None, None, *notes)
 
 
 def _print_summary(image: TactileImage, folder: Path) -> None:

@@ -11,7 +11,6 @@ import typer
 from optisense.cli.console import handles_errors, output
 from optisense.cli.progress import ProgressLine, progress_line
 from optisense.commands.rendering import BeforeAndAfterOptions
-from optisense.time_left import TimedStep
 
 if TYPE_CHECKING:
     import numpy as np
@@ -98,26 +97,12 @@ def report(
             raise typer.BadParameter(f"'{page}' is a folder", param_hint="--out")
         ensure_writable(page.parent)
         count = trial_pictures if pictures else 0
-        with progress_line(*_steps(options.photons, pictures, count)) as line:
+        with progress_line() as line:
             views = _design_views(opened, options.photons, pictures, line)
             shown = _pictures(opened, count, line)
-            line.begin(WRITING)
+            line.begin("writing the page")
             write_study_report(page, opened, views, pictures=shown, named=str(study))
     output.print(f"report: {page}")
-
-
-WRITING, TRIALS = "writing the page", "rendering trials"
-
-
-def _steps(photons: int, pictures: bool, trials: int) -> list[TimedStep]:
-    """Return the steps, with usual durations (s on two desktop cores, for GelSight Mini)."""
-    per_view = 5.0 + 2.2 * photons / 1e6 if pictures else 1.0
-    return [
-        TimedStep("the sensor before the search", 1, 3.0 + per_view),
-        TimedStep("the sensor after the search", 1, per_view),
-        TimedStep(TRIALS, trials, 2.0),
-        TimedStep(WRITING, 1, 3.0),
-    ]
 
 
 def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray[np.uint8]]:
@@ -127,7 +112,7 @@ def _pictures(study: Study, count: int, line: ProgressLine) -> dict[int, NDArray
     made, found = TrialPictures(study), {}
     chosen = select_for_pictures(study, study.trials, count)
     if chosen:
-        line.begin(TRIALS, len(chosen))
+        line.begin("rendering trials", len(chosen))
     for done, trial in enumerate(chosen):
         line.say(f"rendering trial {trial.number}", done, len(chosen))
         picture = made.of(trial)
@@ -155,8 +140,7 @@ def _design_views(
     found = {}
     verb = "rendering" if pictures else "tracing the rays of"
     for label, design in designs.items():
-        step = f"the sensor {label} the search"
-        line.begin(step, text=f"{verb} {step}")
+        line.begin(f"{verb} the sensor {label} the search")
         try:
             settings = study.settings.settings
             found[label] = design_view(design, settings, pictures=pictures, photons=photons)

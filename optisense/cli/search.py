@@ -90,7 +90,7 @@ def search(
     with ExitStack() as stack:
         # It may ask whether code is trusted, so it comes before the progress.
         study = _resumed_study(out, design, options.as_stored(), trust) if resume else None
-        with search_progress(workers if cluster is None else 0) as (line, show):
+        with search_progress(workers if cluster is None else 0) as show:
             if study is None:
                 study = _new_study(out, design, options)
             from optisense.search import run_study
@@ -103,7 +103,6 @@ def search(
                 variant=variant,
                 progress=show,
                 on_wait=stopping.print_wait,
-                time_left=line.time_left,
             )
         best = result.study.best
         better = best is not None and not best.is_start

@@ -5,20 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from optisense.cli.console import messages
-from optisense.cli.progress import ProgressLine, about, progress_line
-from optisense.time_left import TimedStep
-from optisense.usual_times import UsualTimes
+from optisense.cli.progress import about, progress_line
 
 if TYPE_CHECKING:
     from optisense.search import SearchProgress
-
-LOADING = "loading"
-
-LOADING_TIME = 0.7
-"""Time to load the program and a design, s."""
 
 WORTH_STOPPING = 20.0
 """Time left (s) from which on a search is worth stopping. With less left, warnings are left to its
@@ -29,36 +22,26 @@ CONDITIONS = "conditions"
 """Key of the warning that no trial meets the conditions."""
 
 
-class SearchLine(NamedTuple):
-    """Progress line of a search, and the function that shows its progress there."""
-
-    line: ProgressLine
-    show: Callable[[SearchProgress], None]
-
-
 @contextmanager
-def search_progress(workers: int) -> Iterator[SearchLine]:
-    """Show the number of trials and the time left, with the best score so far, failures and trials
-    per hour.
+def search_progress(workers: int) -> Iterator[Callable[[SearchProgress], None]]:
+    """Yield a function that shows the number of trials and the time left, with the best score so
+    far, failures and trials per hour.
 
     With one worker Ctrl-C waits for the current trial; several workers drop theirs at once.
     """
     last: list[SearchProgress] = []
     waits = (lambda line: _waits(last)) if workers == 1 else None
-    loading = TimedStep(LOADING, 1, LOADING_TIME * UsualTimes.here().thread_pace, gauges=False)
-    searching = (TimedStep(stage) for stage in ("start", "trials", "fresh seeds"))
-    with progress_line(loading, *searching, waits=waits) as line:
-        line.begin(LOADING)
-
+    with progress_line(waits) as line:
+        line.begin("loading")
         warnings = EarlyWarnings()
 
         def show(progress: SearchProgress) -> None:
             last[:] = [progress]
             for warning in warnings.of(progress):
                 messages.print(f"note: {warning}", style="yellow")
-            line.show(*stage_text(progress), progress.seconds_left, notes(progress))
+            line.follow(*stage_text(progress), notes(progress))
 
-        yield SearchLine(line, show)
+        yield show
 
 
 def stage_text(progress: SearchProgress) -> tuple[str, int | None, int | None]:

@@ -20,23 +20,14 @@ from optisense.cli.options import (
     parse_contacts,
 )
 from optisense.cli.progress import progress_line
-from optisense.cli.sampling import (
-    LOADING,
-    load_sensor,
-    loading_steps,
-    sample_progress,
-    sample_steps,
-)
+from optisense.cli.sampling import LOADING, load_sensor, sample_progress
 from optisense.cli.task_result import print_perception, print_reconstruction
 from optisense.commands.sampling import CylinderOptions, ReconstructionOptions, SampleOptions
-from optisense.time_left import TimedStep
-from optisense.usual_times import UsualTimes
 from optisense.writing import inside
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from optisense.design import SensorDesign
     from optisense.tasks import PerceptionTask
 
 RESULT = "result.json"
@@ -56,22 +47,6 @@ OutOption = Annotated[
 ]
 JsonOption = Annotated[bool, json_option("Print JSON instead of a table.")]
 BallOption = Annotated[float, typer.Option(min=0.1, metavar="MM", help="Radius of the ball, mm.")]
-
-PICTURES = "pictures"
-"""Name of the progress step of reconstructions."""
-
-SAMPLE_WORK, PICTURE_WORK = 0.23, 0.25
-"""Processor time of a task's sample, and of a reconstruction's picture, s; on GelSight Mini."""
-
-LIBRARIES_TIME = 1.0
-"""Time to load scikit-learn and other libraries of the tasks, s, for the time left."""
-
-USUAL_OBJECTS = 3
-"""Number of objects that a reconstruction task presses by default, those of
-`optisense.tasks._reconstruction.unseen_objects`, which loads slowly."""
-
-READING_TIME, FITTING_TIME = 1.0, 3.0
-"""Time to read the samples of the tasks, and to fit the pictures of a reconstruction, s."""
 
 
 @task_app.command()
@@ -215,18 +190,11 @@ def reconstruction(
 ) -> None:
     """Reconstruct shapes of objects: errors of normals (degrees) and depth (mm)."""
     contacts = dict(zip(thing or [], parse_contacts(thing), strict=True)) or None
-
-    count = options.presses + (len(contacts) if contacts is not None else USUAL_OBJECTS)
-
-    def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:
-        work, photons = PICTURE_WORK, options.photons
-        return sample_steps(PICTURES, photons, count, work, FITTING_TIME, times=times)
-
-    with progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here())) as line:
+    with progress_line() as line:
         line.begin(LOADING)
         settings = tasks.ReconstructionSettings(**options.model_dump())
-        model = load_sensor(line, design, out, variant, steps)
-        show = sample_progress(line, model, PICTURES, "comparing")
+        model = load_sensor(line, design, out, variant)
+        show = sample_progress(line, model, "pictures", "comparing")
         result = tasks.reconstruct(model, settings, contacts, show)
     if out is not None:
         from optisense.tasks.figures import draw_reconstruction
@@ -248,23 +216,12 @@ def _perceive(
     variant: str,
 ) -> None:
     """Run tasks, which are made by name, one after the other; several have a folder each."""
-
-    def steps(times: UsualTimes, sensor: SensorDesign | None = None) -> list[TimedStep]:
-        found: list[TimedStep] = []
-        for name in wanted:
-            photons, count, is_cached = options.photons, options.samples, bool(found)
-            found += sample_steps(
-                name, photons, count, SAMPLE_WORK, READING_TIME, is_cached=is_cached, times=times
-            )
-        return found
-
     results = []
-    line_of_steps = progress_line(*loading_steps(LIBRARIES_TIME), *steps(UsualTimes.here()))
-    with _kept_samples_note(out), line_of_steps as line:
+    with _kept_samples_note(out), progress_line() as line:
         line.begin(LOADING)
         settings = tasks.SampleSettings(**options.settings())
         made = [make() for make in wanted.values()]
-        model = load_sensor(line, design, out, variant, steps)
+        model = load_sensor(line, design, out, variant)
         from optisense.tasks.figures import draw_perception
 
         for task in made:

@@ -19,19 +19,13 @@ from optisense.cli.options import (
     out_option,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import about, progress_line
+from optisense.cli.progress import ProgressLine, about, progress_line
 from optisense.commands.scoring import ToleranceOptions
-from optisense.time_left import TimedStep
-from optisense.usual_times import LOADING as LOADING_TIME
-from optisense.usual_times import UsualTimes
 from optisense.writing import remove_own_page, write_text
 
 if TYPE_CHECKING:
     from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
     from optisense.search.tolerance.sensitivity import Estimate
-
-LOADING, FIRST, SENSORS = "loading", "the nominal design", "sensors"
-"""Steps of the progress; the last two are those of `tolerance.analysis`, which loads slowly."""
 
 JSON_FILE = "tolerance.json"
 REPORT_FILE = "tolerance.html"
@@ -60,12 +54,10 @@ def tolerance(
         raise typer.BadParameter("needs a folder: --out DIR", param_hint="--report")
     settings = options.for_objectives()
 
-    last: list[tuple[int, float]] = []
-    loading = TimedStep(LOADING, 1, LOADING_TIME * UsualTimes.here().thread_pace, gauges=False)
-    scoring = TimedStep(FIRST), TimedStep(SENSORS)
-    waits = (lambda line: _waits(last)) if workers == 1 else None
-    with progress_line(loading, *scoring, waits=waits) as line:
-        line.begin(LOADING)
+    last: list[int] = []
+    waits = (lambda line: _waits(line, last)) if workers == 1 else None
+    with progress_line(waits) as line:
+        line.begin("loading")
         from optisense.sensors import load
 
         sensor = load(design)
@@ -76,9 +68,9 @@ def tolerance(
         if out is not None:
             take_folder(out)
 
-        def show(done: int, count: int, left: float, doing: str) -> None:
-            last[:] = [(done, left / max(1, count - done))]
-            line.show(*stage_text(done, count), left, [doing] if doing else [])
+        def show(done: int, count: int, doing: str) -> None:
+            last[:] = [done]
+            line.follow(*stage_text(done, count), [doing] if doing else [])
 
         found = find_tolerance(
             sensor,
@@ -91,7 +83,6 @@ def tolerance(
             variant=variant,
             progress=show,
             on_wait=stopping.print_wait,
-            time_left=line.time_left,
         )
     text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
     if out is not None:
@@ -123,12 +114,11 @@ def stage_text(done: int, count: int) -> tuple[str, int, int]:
     return "scoring sensors", done - OWN_SCORES, count - OWN_SCORES
 
 
-def _waits(last: list[tuple[int, float]]) -> str:
+def _waits(line: ProgressLine, last: list[int]) -> str:
     """Return what a first Ctrl-C waits for: the current score."""
-    if not last:
-        return "finishing the current score"
-    done, each = last[0]
-    return f"finishing score {done + 1}{about(each)}"
+    return (
+        f"finishing score {last[0] + 1}{about(line.pace)}" if last else "finishing the first score"
+    )
 
 
 def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:

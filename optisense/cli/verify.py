@@ -12,12 +12,10 @@ import typer
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
 from optisense.cli.options import VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import ProgressLine, progress_line
-from optisense.cli.sampling import BUILDING, LOADING, loading_steps, sample_progress, sample_steps
+from optisense.cli.progress import progress_line
+from optisense.cli.sampling import BUILDING, LOADING, sample_progress
 from optisense.cli.verify_result import conditions_of, print_conditions, print_verification
 from optisense.commands.sampling import VerifyOptions
-from optisense.time_left import TimedStep
-from optisense.usual_times import UsualTimes
 from optisense.writing import write_text
 
 if TYPE_CHECKING:
@@ -29,15 +27,6 @@ JSON_FILE = "verify.json"
 REPORT_FILE = "verify.html"
 KEPT_FOLDER = "presses"
 """Subfolder of --out in which what was read from each press is kept while the command runs."""
-
-PICTURE_WORK = 0.4
-"""Processor time of a picture with an object and of reading it, s; measured on GelSight Mini."""
-
-LIBRARIES_TIME = 1.0
-"""Time to load scikit-learn and other libraries of the tasks, s, for the time left."""
-
-FITTING_TIME = 5.0
-"""Time of the fits of a sensor's three readers, s, for the estimate of the time left."""
 
 
 @handles_errors
@@ -111,7 +100,7 @@ def compare(
         typer.BadParameter: only one design is named.
     """
     count = options.pictures()
-    with progress_line(*loading_steps(LIBRARIES_TIME), *_steps(options, UsualTimes.here())) as line:
+    with progress_line() as line:
         line.begin(LOADING)
         settings = options.settings()
         names, designs = _designs(first, second, trial)
@@ -121,8 +110,6 @@ def compare(
         models = [
             _model(name, design, variant) for name, design in zip(names, designs, strict=True)
         ]
-        for design, label in zip(designs, SIDES, strict=True):
-            _expect(line, options, design, label)
         from optisense.kept_arrays import KeptArrays
         from optisense.tasks import verify as compared_by_objects
 
@@ -166,22 +153,6 @@ def print_comparison(compared: ComparisonResult, out: Path | None) -> None:
 
 SIDES = ("first sensor", "second sensor")
 """Steps of the progress in which each sensor is pressed."""
-
-
-def _steps(options: VerifyOptions, times: UsualTimes) -> list[TimedStep]:
-    photons, count = options.wanted_photons(), options.pictures()
-    found: list[TimedStep] = []
-    for label in SIDES:
-        found += sample_steps(label, photons, count, PICTURE_WORK, FITTING_TIME, times=times)
-    return found
-
-
-def _expect(line: ProgressLine, options: VerifyOptions, design: SensorDesign, label: str) -> None:
-    """Set the expected durations for this sensor on this machine."""
-    times = UsualTimes.here(design.sensing_area, len(design.lights))
-    for step in _steps(options, times):
-        if label in step.name:
-            line.time_left.expect(step.name, seconds=step.seconds)
 
 
 def _designs(

@@ -13,7 +13,7 @@ from optisense.engine.failures import Cancelled
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
 from optisense.engine.search_process import SearchProcess, is_running
-from optisense.time_left import TimedStep, TimeLeft
+from optisense.time_left import TimeLeft
 
 if TYPE_CHECKING:
     from optisense.search import Study, Trial
@@ -118,9 +118,7 @@ class Following:
         self._done = sum(row.generation >= 0 for row in rows)
         self._failed = sum(row.generation >= 0 and _failed(row) for row in rows)
         if self._time_left is None:
-            # The first trial that is waited for also compiles.
-            self._time_left = TimeLeft([TimedStep("trials", self._total(study), warm_up=1)])
-            self._time_left.begin("trials", done=self._done)
+            self._time_left = TimeLeft(self._total(study), self._done)
         said = self._in_words(study)
         if not new and said == self._said:
             return
@@ -147,7 +145,7 @@ class Following:
 
     def _in_words(self, study: Study) -> str:
         """Return what the search does, and how far it is."""
-        from optisense.search.study.stages import FRESH, START_STAGE
+        from optisense.search.study.progress import FRESH, START_STAGE
 
         stage = study.store.fact("stage")
         if stage == START_STAGE:

@@ -97,25 +97,21 @@ def space(session: Session, fields: Space, job: Job) -> dict[str, Any]:
 @handles("advise", Advise, Lane.QUICK)
 def advise(session: Session, fields: Advise, job: Job) -> dict[str, Any]:
     """Return whether a search can succeed, and its expected duration, before it begins."""
-    from optisense.objectives.settings import Settings
-    from optisense.objectives.usual_score import UsualTrials, usual_score
     from optisense.search import SearchSpace
     from optisense.search.methods import find
     from optisense.search.space.text import parse_space
-    from optisense.search.study.advice import LIGHT_OBJECTIVES, advice
+    from optisense.search.study.advice import LIGHT_OBJECTIVES, advice, usual_seconds
 
     design = design_of(session, fields, job)
     space = parse_space(fields.vary)
     bound = SearchSpace(space).bind(design)
     budget = fields.budget or find(fields.method).default_budget(bound)
-    usual = usual_score(design, fields.objectives, Settings())
-    trials = UsualTrials.of(usual, usual.building + usual.whole, usual.whole)
     against = advice(space, fields.objectives)
     return {
         "advice": against,
         "fitting": [] if against is None else list(LIGHT_OBJECTIVES),
         "trials": budget,
-        "seconds": round(trials.first + budget * trials.trial, 1),
+        "seconds": round(usual_seconds(design, fields.objectives, budget), 1),
     }
 
 

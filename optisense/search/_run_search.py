@@ -17,7 +17,6 @@ from optisense.search.study.loop import StudyRun
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchProgressCallback, SearchResult
 from optisense.search.study.study import Study
-from optisense.time_left import TimeLeft
 
 
 def search(
@@ -124,7 +123,6 @@ def run_study(
     variant: str = "auto",
     progress: SearchProgressCallback | None = None,
     on_wait: Callable[[], None] | None = None,
-    time_left: TimeLeft | None = None,
 ) -> SearchResult:
     """Run a study, or resume one.
 
@@ -135,8 +133,6 @@ def run_study(
         variant: variant of the renderer, see `search`.
         progress: function that is called a few times a second.
         on_wait: function that is called when Ctrl-C waits for a trial in this process to finish.
-        time_left: time estimate of a command whose last steps are the stages of this search
-            (`optisense.search.study.stages`).
 
     Raises:
         OptiSenseError: see `search`.
@@ -146,7 +142,7 @@ def run_study(
         return create_runner(evaluator, workers, on_wait)
 
     try:
-        return StudyRun(study, make_runner, progress, limit, variant, time_left).run()
+        return StudyRun(study, make_runner, progress, limit, variant).run()
     except FolderInUseError:
         raise
     except OptiSenseError as error:

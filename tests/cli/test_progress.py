@@ -13,7 +13,6 @@ from optisense.cli import progress
 from optisense.cli.progress import ProgressLine, about, duration, progress_line
 from optisense.design import SensorDesign
 from optisense.search import SearchProgress
-from optisense.time_left import TimedStep
 
 
 class Clock:
@@ -43,8 +42,10 @@ def test_a_search_fits_the_terminal(told: SearchProgress, columns: int) -> None:
 
     clock = Clock()
     line = ProgressLine(clock=clock)
+    what, done, total = stage_text(told)
+    line.follow(what, 0, total)
     clock.now = 4321.0
-    line.show(*stage_text(told), told.seconds_left, notes(told))
+    line.follow(what, done, total, notes(told))
     text = line.text(columns - 1).plain
     assert len(text) < columns
     assert CLOCK_AND_LEFT.search(text) or columns < 40
@@ -52,8 +53,9 @@ def test_a_search_fits_the_terminal(told: SearchProgress, columns: int) -> None:
         assert text.startswith(stage_text(told)[0])
         if told.stage == "trials":
             assert f"{told.done}/{told.total}" in text
-        if math.isfinite(told.seconds_left):
-            assert f"{duration(told.seconds_left)} left" in text
+        if told.stage == "trials":
+            left = 4321.0 * (told.total - told.done) / told.done
+            assert f"{duration(left)} left" in text
     if columns >= 80 and told.best == 0.98765 and told.stage == "trials":
         assert "best 0.9877 (start 0.8071)" in text
     if columns == 200 and told.failed and told.stage == "trials":
@@ -61,27 +63,26 @@ def test_a_search_fits_the_terminal(told: SearchProgress, columns: int) -> None:
         assert f"{told.failed} failed" in text
 
 
-def test_a_line_names_the_step_and_counts_the_whole_time() -> None:
+def test_a_line_names_the_step_and_counts_its_time() -> None:
     clock = Clock()
-    line = ProgressLine(
-        [TimedStep("loading", 1, 2.0), TimedStep("tracing photons", 10, 1.0)], clock=clock
-    )
+    line = ProgressLine(clock=clock)
     line.begin("loading")
-    assert line.text(79).plain.startswith("loading ─")
     clock.now = 2.0
-    line.begin("tracing photons")
+    assert line.text(79).plain == f"loading {'─' * 30}  0:02"
+    line.begin("tracing photons", 10)
     clock.now = 7.0
-    line.advance(5, 10, "noise 2.4 %")
+    line.advance(4, 10, "noise 2.4 %")
     text = line.text(79).plain
-    assert text.startswith("tracing photons 5/10 ━")
-    assert text.endswith("0:07, 0:05 left  noise 2.4 %")
-    assert text.count("━") == pytest.approx(7 / 12 * (text.count("━") + text.count("─")), abs=1)
+    assert text.startswith("tracing photons 4/10 ━")
+    assert text.endswith("0:07, 0:08 left  noise 2.4 %")
+    assert text.count("━") == pytest.approx(0.4 * (text.count("━") + text.count("─")), abs=1)
+    assert line.pace == pytest.approx(1.25)
 
 
 def test_the_bar_never_goes_back_and_the_clock_never_stops() -> None:
     clock = Clock()
-    line = ProgressLine([TimedStep("seeds", 6, 10.0)], clock=clock)
-    line.begin("seeds")
+    line = ProgressLine(clock=clock)
+    line.begin("seeds", 6)
     full, clocks = 0, []
     for number in range(6):
         for part in (0.3, 0.2, 1.0):  # objectives of a seed begin anew
@@ -94,18 +95,16 @@ def test_the_bar_never_goes_back_and_the_clock_never_stops() -> None:
     assert clocks == [duration(5.0 * k) for k in range(1, 19)]
 
 
-def test_what_somebody_else_estimated_runs_down() -> None:
+def test_a_step_begins_where_the_text_changes() -> None:
     clock = Clock()
     line = ProgressLine(clock=clock)
-    clock.now = 8.0
-    line.say("loading")
-    assert line.text(79).plain == f"loading {'─' * 30}  0:08"
-    clock.now = 0.0
-    line.show("trials", 3, 9, 60.0)
-    clock.now = 20.0
-    assert "0:20, 0:40 left" in line.text(79).plain
-    clock.now = 90.0
-    assert "1:30, 0:00 left" in line.text(79).plain
+    line.follow("scoring the start", None, None)
+    clock.now = 30.0  # compiling
+    for done in range(4):
+        line.follow("trials", done, 9)
+        clock.now += 2.0
+    clock.now -= 1.0
+    assert "0:37, 0:11 left" in line.text(79).plain
 
 
 def test_in_a_log_a_line_comes_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,14 +112,14 @@ def test_in_a_log_a_line_comes_now_and_then(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(progress, "messages", Console(file=log, width=120))
     clock = Clock()
     monkeypatch.setattr(progress.time, "monotonic", clock)
-    with progress_line(TimedStep("samples", 9)) as line:
-        line.begin("samples")
+    with progress_line() as line:
+        line.begin("samples", 9)
         for done, now in enumerate([10.0, 45.0, 50.0, 80.0], start=1):
             clock.now = now
             line.advance(done, 9, f"contact {done}")
     assert log.getvalue().splitlines() == [
-        "samples 2/9, 0:45 so far, 2:38 left, contact 2",
-        "samples 4/9, 1:20 so far, 1:40 left, contact 4",
+        "samples 2/9, 0:45 so far, 4:05 left, contact 2",
+        "samples 4/9, 1:20 so far, 1:57 left, contact 4",
     ]
 
 
@@ -128,8 +127,8 @@ def test_on_a_terminal_one_line_is_drawn_and_goes(monkeypatch: pytest.MonkeyPatc
     screen = io.StringIO()
     console = Console(file=screen, force_terminal=True, width=80)
     monkeypatch.setattr(progress, "messages", console)
-    with progress_line(TimedStep("samples", 9)) as line:
-        line.begin("samples")
+    with progress_line() as line:
+        line.begin("samples", 9)
         line.advance(3, 9, "contact 3")
     assert screen.getvalue().endswith("\x1b[2K")
     shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", screen.getvalue())
@@ -160,7 +159,7 @@ def test_the_bar_of_a_tolerance_counts_the_sensors_that_its_page_tells_of() -> N
         flux,
         {"lights.red.flux": 0.1, "lights.blue.flux": 0.1},
         sensors=30,
-        progress=lambda done, count, left, doing: told.append(stage_text(done, count)),
+        progress=lambda done, count, doing: told.append(stage_text(done, count)),
     )
     assert told[0] == ("scoring the nominal design", 0, 4)
     assert told[-1] == ("scoring sensors", found.sensors, found.sensors)

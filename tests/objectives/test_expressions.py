@@ -15,7 +15,6 @@ from optisense.objectives.combined import combined, goal_of, objective_of, resol
 from optisense.objectives.expressions import MOST_CHARACTERS, Expression, ScoreTerm
 from optisense.objectives.named import are_rays_only, named_in
 from optisense.objectives.testing import evaluation
-from optisense.objectives.usual_score import usual_score
 
 KNOWN = {ScoreTerm("a"): 3.0, ScoreTerm("b"): -2.0, ScoreTerm("a", "part"): 0.25}
 
@@ -203,10 +202,3 @@ def test_rays_only_is_known_without_running_files() -> None:
     assert are_rays_only(["aoap + coverage", "2to3pw"])
     assert not are_rays_only(["aoap + rgb2normal"])
     assert not are_rays_only(["missing.py:score"])
-
-
-def test_the_usual_time_of_an_expression_is_that_of_its_objectives() -> None:
-    design, settings = evaluation().design, evaluation().settings
-    rays = usual_score(design, ["aoap + coverage"], settings)
-    assert rays.light == 0.0
-    assert usual_score(design, ["aoap + rgb2normal"], settings).light > 0.0

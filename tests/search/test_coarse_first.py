@@ -16,8 +16,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study._promotion import LEAST_PROMOTED
 from optisense.search.study.plan import Plan
-from optisense.search.study.progress import SearchProgress
-from optisense.search.study.stages import FRESH
+from optisense.search.study.progress import FRESH, SearchProgress
 from optisense.search.study.study import beside
 
 FULL = {"resolution": [640, 480], "photons": 1_000_000}

@@ -21,7 +21,6 @@ from optisense.objectives.named import named_in
 from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
-from optisense.objectives.usual_score import UsualScore, UsualTrials, usual_score
 from optisense.search.evaluation.models import ModelCache
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
@@ -207,26 +206,6 @@ class DesignEvaluator(PickledWithoutCaches):
     def used_settings(self) -> Mapping[str, Any]:
         """The settings with which designs are scored."""
         return self.settings
-
-    def usual_score(self) -> UsualScore | None:
-        """Return the usual duration of a score; None if all goals are functions of the design."""
-        if not self.renders:
-            return None
-        shared, _ = split_settings(self.settings, self._all_objectives)
-        names = [each.name for each in self._all_objectives]
-        return usual_score(self.space.design, names, Settings(**shared))
-
-    def usual_trials(self) -> UsualTrials | None:
-        """Return the usual duration of the trials, or None if it is unknown.
-
-        A search over only colours and powers of lights weights layers anew and renders none.
-        """
-        usual = self.usual_score()
-        if usual is None:
-            return None
-        relit = all(RELIGHTS.search(name) for name in self.space.names)
-        trial = usual.relit if relit else usual.building + usual.whole
-        return UsualTrials.of(usual, trial, usual.whole)
 
     def failed(self, reason: str, began: float) -> Outcome:
         """Return an outcome without scores; `began` is the start time by `time.perf_counter`."""

@@ -20,7 +20,6 @@ from optisense.objectives.registry import pixels_read
 from optisense.objectives.relighting import Relighting
 from optisense.objectives.run import split_settings
 from optisense.objectives.scoring import run_objective
-from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import RELIGHTS, DesignEvaluator
 
 if TYPE_CHECKING:
@@ -29,11 +28,6 @@ if TYPE_CHECKING:
 KEPT_SEEDS = 3
 """Number of seeds whose images are kept: the three fresh seeds of the final scoring, which starts
 when the study's own seed is no longer needed.
-"""
-
-RELIGHTING_SHARE = 0.02
-"""Time to relight and judge the images of a score, as a share of the time to render and judge them;
-measured on GelSight Mini, for nine presses of which only the contacts are read.
 """
 
 
@@ -77,16 +71,6 @@ class RelitEvaluator(DesignEvaluator):
         if not self.brief:
             return found
         return {name: _without_details(score) for name, score in found.items()}
-
-    def usual_trials(self) -> UsualTrials | None:
-        """Return the usual duration of the trials (see `DesignEvaluator.usual_trials`); a trial
-        renders nothing, and all designs share the light of a fresh seed.
-        """
-        usual = self.usual_score()
-        if usual is None:
-            return None
-        trial = RELIGHTING_SHARE * (usual.images + usual.judging)
-        return UsualTrials.of(usual, trial, trial)
 
     @cached_property
     def _images(self) -> OrderedDict[int, _SeedImages]:

@@ -13,7 +13,6 @@ from optisense.array_types import FloatArray
 from optisense.errors import OptiSenseError, UnknownPartError
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import CONDITIONS
-from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import Requirement
@@ -54,15 +53,6 @@ class RobustEvaluator:
         self.samples = samples
         self._drawn: dict[int, FloatArray] = {}
         self._errors(errors.bind(usual.space.prepared))
-
-    def usual_trials(self) -> UsualTrials | None:
-        """Return the usual duration of the trials (see `DesignEvaluator.usual_trials`), each of
-        which scores several sensors.
-        """
-        usual, trials = self.usual.usual_score(), self.usual.usual_trials()
-        if usual is None or trials is None:
-            return None
-        return trials.slower((self.samples - 1) * (usual.building + usual.whole))
 
     def report_progress_to(self, callback: ProgressCallback) -> None:
         """See `DesignEvaluator.report_progress_to`."""

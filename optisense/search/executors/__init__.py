@@ -4,8 +4,7 @@ from optisense.search.executors._choice import Workers, create_runner
 from optisense.search.executors._remote import DaskRunner, ExecutorRunner
 from optisense.search.executors._serial import SerialRunner
 from optisense.search.executors.base import Runner
-from optisense.search.executors.pool import ProcessPool
-from optisense.usual_times import processors
+from optisense.search.executors.pool import ProcessPool, processors
 
 __all__ = [
     "DaskRunner",

@@ -26,7 +26,6 @@ from optisense.errors import OptiSenseError, SearchError, SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors.base import Runner, pickled, receive, send
-from optisense.usual_times import processors
 
 MOST_DEATHS = 2
 """Number of workers that may die during one trial; a trial at which so many died fails, as it is
@@ -44,6 +43,13 @@ STDERR_TAIL = 2000
 """Number of bytes at the end of a dead worker's output that are searched for its last line, which
 names the reason; error messages are shorter.
 """
+
+
+def processors() -> int:
+    """Return the number of processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 @dataclass

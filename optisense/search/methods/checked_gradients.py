@@ -163,9 +163,6 @@ class GradientEvaluator(PickledWithoutCaches):
         seconds = outcome.seconds + time.perf_counter() - began
         return Outcome(outcome.scores, None, parts, seconds, found.gradients.ravel())
 
-    def usual_trials(self) -> None:
-        """Return None: the duration of gradients is unknown before the first one was made."""
-
     def checked_gradient(self, vector: FloatArray, seed: int) -> CheckedGradient:
         """Return the smoothed score at a point (n,), and a gradient that has been compared with the
         score.

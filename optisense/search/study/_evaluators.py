@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from optisense.errors import SearchError
-from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.coarse import CoarseEvaluator
 from optisense.search.evaluation.evaluator import DesignEvaluator, Evaluator
 from optisense.search.evaluation.relit import RelitEvaluator, can_relight
@@ -39,21 +36,6 @@ def evaluators(study: Study, usual: DesignEvaluator, method: Method) -> tuple[Ev
     return (
         _with_errors(study, CoarseEvaluator(usual)) if study.settings.coarse_first else full
     ), full
-
-
-def usual_times(trials: Evaluator, full: Evaluator) -> UsualTrials | None:
-    """Return the usual durations of the scores of a study, or None if they are unknown.
-
-    Args:
-        trials, full: the evaluators that `evaluators` returns.
-    """
-    found = [
-        None if (tell := getattr(each, "usual_trials", None)) is None else tell()
-        for each in (trials, full)
-    ]
-    if found[0] is None or found[1] is None:
-        return None
-    return replace(found[0], fresh=found[1].fresh, fresh_again=found[1].fresh_again)
 
 
 def _with_errors(study: Study, usual: DesignEvaluator) -> Evaluator:

@@ -108,7 +108,7 @@ def _scored(
 ) -> list[Trial]:
     """Return the trials with full scores by these seeds; `more` scores are expected later."""
     jobs = [(trial, seed) for trial in trials for seed in seeds if seed not in trial.fresh]
-    outcomes = work(jobs, more, 0.0) if jobs else []
+    outcomes = work(jobs, more) if jobs else []
     fresh = {trial.number: dict(trial.fresh) for trial in trials}
     for (trial, seed), outcome in zip(jobs, outcomes, strict=True):
         fresh[trial.number][seed] = outcome

@@ -7,9 +7,10 @@ import re
 from collections.abc import Iterable
 from typing import Any
 
-from optisense.design import get_value
+from optisense.design import SensorDesign, get_value
 from optisense.errors import OptiSenseError
 from optisense.objectives.named import are_rays_only, named_in
+from optisense.search.executors import processors
 from optisense.search.space.parameters import Choice
 from optisense.search.space.search_space import BoundSpace
 
@@ -27,6 +28,40 @@ _FLUX = re.compile(r"lights\.[^.]+\.flux(\..+|\[.+)?")
 
 LIGHT_OBJECTIVES = ("rgb2normal", "normdiff")
 """Objectives of this package that read pictures."""
+
+
+LOADING_TIME = 2.0
+"""Time to load and compile before the first score, s; measured on two processors."""
+
+RAYS_TIME = 0.1
+"""Processor time of a score that traces rays only, s; measured on GelSight Svelte."""
+
+PICTURES_TIME = 3.4
+"""Processor time of a score by pictures with `TRIAL_PHOTONS`, s; measured on GelSight Mini."""
+
+USUAL_AREA = 524.0
+"""Area of the sensing surface of GelSight Mini, mm2."""
+
+LARGEST_FACTOR = 3.0
+"""Largest factor on the duration of a score for larger surfaces: GelSight Svelte (1,478 mm2),
+GelSight360 (2,989 mm2) and GelBelt (3,581 mm2) take 2.9 to 3.3 times as long as GelSight Mini.
+"""
+
+MOST_THREADS = 8
+"""Largest number of processors that shorten a score; more are idle between short kernels."""
+
+
+def usual_seconds(design: SensorDesign, objectives: Iterable[str], trials: int) -> float:
+    """Return the usual duration of a search in one process on this machine, s.
+
+    Raises:
+        ObjectiveError: an objective is unknown.
+    """
+    if are_rays_only(objectives):
+        each = RAYS_TIME
+    else:
+        each = PICTURES_TIME * min(max(design.sensing_area / USUAL_AREA, 0.5), LARGEST_FACTOR)
+    return LOADING_TIME + (1 + trials) * each / min(processors(), MOST_THREADS)
 
 
 def changes_no_ray(path: str) -> bool:

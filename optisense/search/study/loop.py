@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import queue
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -18,25 +17,23 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
 from optisense.search.executors.base import outcome_of
 from optisense.search.methods import Method, Problem, make
-from optisense.search.study._evaluators import evaluators, usual_times
+from optisense.search.study._evaluators import evaluators
 from optisense.search.study._promotion import promote
 from optisense.search.study._reading_watch import ReadingWatch
 from optisense.search.study._tally import Tally
 from optisense.search.study.advice import moved_start_note
 from optisense.search.study.best import tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
-from optisense.search.study.progress import SearchProgress, SearchProgressCallback, SearchResult
-from optisense.search.study.rescoring import SEEDS as FRESH_SEEDS
-from optisense.search.study.rescoring import rescore
-from optisense.search.study.settings import package_versions
-from optisense.search.study.stages import (
+from optisense.search.study.progress import (
     FRESH,
     START_STAGE,
     TRIALS,
-    USUAL_FRESH,
-    expect_stages,
-    stages,
+    SearchProgress,
+    SearchProgressCallback,
+    SearchResult,
 )
+from optisense.search.study.rescoring import rescore
+from optisense.search.study.settings import package_versions
 from optisense.search.study.store import START, Row
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
@@ -49,13 +46,6 @@ releases of libraries differ in rounding.
 
 TICK = 0.2
 """Interval between checks of the clock while trials are scored, s; short for a smooth display."""
-
-FRESH_SHARE = 0.8
-"""Smallest duration of the first score with a fresh seed, as a share of the first trial's duration.
-Such a score takes as long as a trial, or this share if that is longer: if trials share the light
-that is traced for the first one, another seed needs its own. The rest of the first trial's time is
-taken to be compiling.
-"""
 
 
 MakeRunner = Callable[[Evaluator], Runner]
@@ -71,7 +61,6 @@ class StudyRun:
         progress: SearchProgressCallback | None = None,
         limit: int | None = None,
         variant: str = "auto",
-        time_left: TimeLeft | None = None,
     ) -> None:
         """Set up the run; nothing is scored yet.
 
@@ -80,7 +69,6 @@ class StudyRun:
             make_runner: function that returns the executor of the trials.
             progress: function that is called a few times a second.
             limit: largest number of trials; the study's budget if None.
-            time_left: time estimate of a command whose last steps are the stages of this search.
 
         Raises:
             OptiSenseError: the study can't be run here.
@@ -99,25 +87,18 @@ class StudyRun:
         )
         self.method: Method = make(settings.method, problem, settings.options)
         self._evaluator, self._full = evaluators(study, usual, self.method)
-        self._usual = usual_times(self._evaluator, self._full)
         self._make_runner = make_runner
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
         self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
         self._tally = Tally(study.objective)
         self._watch = ReadingWatch(study, self._tally, usual)
-        self._first_seconds = 0.0
         self._last_report = time.monotonic()
         self._stage = START_STAGE
-        self._plain = self._coarse or self._full is usual or settings.errors is not None
-        steps = stages(self.limit, self._usual, plain_trials=self._plain)
-        self._time_left = time_left or TimeLeft(steps)
+        self._time_left = TimeLeft(1)
         self._fresh_done = self._fresh_count = 0
-        self._fresh_seeds: set[int] = set()
-        self._again = 1.0
         self._trials_an_hour = 0.0
         self._doing = ""
-        self._pace = math.nan
         self._generations = 0
 
     def run(self) -> SearchResult:
@@ -136,27 +117,18 @@ class StudyRun:
                 self._tally.count(row, row.outcome)
         try:
             with self._running(self._evaluator) as runner:
-                expect_stages(
-                    self._time_left,
-                    self.limit,
-                    self._usual,
-                    runner.workers,
-                    plain_trials=self._plain,
-                )
-                if self._usual is not None:
-                    self._expect_fresh_scores(USUAL_FRESH)
-                self._begin(START_STAGE)
+                self._begin(START_STAGE, 1)
                 self._score_start(runner)
-                self._begin(TRIALS, self._tally.done)
+                self._begin(TRIALS, self.limit, self._tally.done)
                 ended = self._search(runner)
                 self._watch_reading(last=True)
                 self._report(now=True)
                 if not self._coarse:
-                    self._begin(FRESH)
+                    self._begin(FRESH, 0)
                     rescore(study, partial(self._score_fresh, runner))
             if self._coarse:
                 with self._running(self._full) as runner:
-                    self._begin(FRESH)
+                    self._begin(FRESH, 0)
                     promote(study, partial(self._score_fresh, runner))
         except KeyboardInterrupt:
             interrupted, ended = True, "interrupted"
@@ -179,7 +151,6 @@ class StudyRun:
     def _running(self, evaluator: Evaluator) -> Iterator[Runner]:
         """Yield a runner of an evaluator, which ends with the block."""
         with self._make_runner(evaluator) as runner:
-            self._time_left.workers = runner.workers
             if isinstance(runner, SerialRunner):
                 runner.report_progress_to(self._trial_progress)
             yield runner
@@ -233,10 +204,9 @@ class StudyRun:
             self.study.store.finish(number, outcome)
             self._tally.count(by_number[number], outcome)
             if self._stage == TRIALS:
-                self._time_left.advance(self._tally.done, outcome.seconds, outcome.worker)
-            else:
-                self._time_left.advance(1.0, outcome.seconds, outcome.worker)
-            self._expect_fresh(outcome)
+                self._time_left.advance(self._tally.done)
+                pace = self._time_left.pace
+                self._trials_an_hour = 3600.0 / pace if pace > 0.0 else self._trials_an_hour
             self._report()
 
         jobs = []
@@ -249,12 +219,11 @@ class StudyRun:
         self._run_jobs(runner, jobs, finished)
 
     def _score_fresh(
-        self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int, later: float
+        self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int
     ) -> list[Outcome]:
-        """Score trials with other seeds; `more` may follow for these trials, `later` for others."""
+        """Score trials with other seeds; `more` scores of these trials may follow."""
         found: dict[int, Outcome] = {}
-        self._fresh_count = self._fresh_done + len(jobs) + more
-        self._expect_fresh_scores(self._fresh_count + later)
+        self._time_left.count = self._fresh_count = self._fresh_done + len(jobs) + more
         self._report(now=True)
 
         def finished(number: int, outcome: Outcome) -> None:
@@ -262,9 +231,7 @@ class StudyRun:
             self.study.store.finish_fresh(trial.number, seed, outcome)
             found[number] = outcome
             self._fresh_done += 1
-            self._fresh_seeds.add(seed)
-            done = self._in_first_scores(self._fresh_done, len(self._fresh_seeds))
-            self._time_left.advance(done, outcome.seconds, outcome.worker)
+            self._time_left.advance(self._fresh_done)
             self._report(now=True)
 
         numbered = [(k, trial.vector, seed) for k, (trial, seed) in enumerate(jobs)]
@@ -317,49 +284,18 @@ class StudyRun:
             f"({why}): it continues from the stored trials"
         )
 
-    def _begin(self, stage: str, done: float = 0.0) -> None:
-        """Begin a stage, of which earlier runs finished `done` pieces."""
+    def _begin(self, stage: str, count: int, done: int = 0) -> None:
+        """Begin a stage of `count` scores, of which earlier runs finished `done`."""
         self._stage = stage
         self.study.store.set_fact("stage", stage)  # for those who only read the study
-        self._time_left.begin(stage, done=done)
+        self._time_left = TimeLeft(count, done)
         self._report(now=True)
-
-    def _expect_fresh(self, outcome: Outcome) -> None:
-        """Estimate from a score how long one with a fresh seed will take."""
-        if self._stage == START_STAGE:
-            self._first_seconds = outcome.seconds
-        pace = self._time_left.pace
-        if math.isfinite(pace) and self._stage == TRIALS:
-            self._pace = pace
-            self._expect_fresh_scores(USUAL_FRESH)
-            if pace > 0.0:
-                self._trials_an_hour = 3600.0 / pace
-
-    def _expect_fresh_scores(self, count: float) -> None:
-        """Expect `count` scores with fresh seeds, the first one of each seed with its own light.
-
-        Their time is counted in units of first scores; other scores take a part of one.
-        """
-        if self._usual is not None:
-            first, again = self._usual.fresh, self._usual.fresh_again
-        else:
-            again = self._pace
-            first = max(again, FRESH_SHARE * self._first_seconds / self._time_left.workers)
-        if self._stage != FRESH:  # what is done is counted in them, too
-            self._again = again / first if again < first else 1.0
-        whole = self._in_first_scores(count, min(count, FRESH_SEEDS))
-        known = first if math.isfinite(first) else None
-        self._time_left.expect(FRESH, count=whole, seconds=known)
-
-    def _in_first_scores(self, count: float, seeds: float) -> float:
-        """Return how many first scores take as long as `count` scores with `seeds` seeds."""
-        return seeds + (count - seeds) * self._again
 
     def _trial_progress(self, fraction: float, text: str) -> None:
         """Store the progress of the trial that this process is scoring."""
         self._doing = text
-        if self._stage == START_STAGE and self._usual is not None:
-            self._time_left.advance(self._usual.done(fraction))
+        if self._stage == START_STAGE:
+            self._time_left.advance(fraction)
         self._report()
 
     def _report(self, now: bool = False) -> None:

@@ -9,6 +9,9 @@ from typing import Any
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 
+START_STAGE, TRIALS, FRESH = "start", "trials", "fresh seeds"
+"""Stages of a search; see `SearchProgress`."""
+
 
 @dataclass(frozen=True)
 class SearchProgress:
@@ -30,7 +33,7 @@ class SearchProgress:
         best: best score so far of trials that meet all conditions; NaN before there is one.
         start: score of the start.
         trials_per_hour: rate of the last trials; 0 before it is known.
-        seconds_left: time until the end, s, with the scoring by fresh seeds; NaN if not known yet.
+        seconds_left: time until the end of the stage, s; NaN if not known yet.
         facts: facts that the method reports about its state.
         doing: stage of the current trial, if it is scored in this process.
     """

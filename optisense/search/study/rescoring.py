@@ -37,9 +37,9 @@ _FRESH = 0xF2E5
 trials; its value is arbitrary.
 """
 
-Work = Callable[[Sequence[tuple[Trial, int]], int, float], list[Outcome]]
+Work = Callable[[Sequence[tuple[Trial, int]], int], list[Outcome]]
 """Function that scores trials with seeds. It also takes the number of such scores that may follow
-for these trials, and the expected number for others after them.
+for these trials.
 """
 
 
@@ -66,30 +66,18 @@ def rescore(study: Study, work: Work) -> None:
         if trial.score <= best or (number >= MOST_RESCORED and best > -math.inf):
             return  # even with its luck it is not better, or enough were scored
         scored = [trial, *start] if number == 0 else [trial]
-        rivals = others[number + 1 : MOST_RESCORED]
-        again = _score(scored, seeds, work, [each.score for each in rivals], best)[0]
+        again = _score(scored, seeds, work)[0]
         if again.is_feasible and math.isfinite(again.fresh_score()):
             best = max(best, again.fresh_score())
 
 
-def _score(
-    trials: Sequence[Trial],
-    seeds: Sequence[int],
-    work: Work,
-    rivals: Sequence[float] = (),
-    best: float = -math.inf,
-) -> list[Trial]:
-    """Return the trials with their scores by fresh seeds; one seed suffices if seeds do not matter.
-
-    Args:
-        work: function that scores them.
-        rivals: scores of the trials that may come next.
-        best: largest mean over fresh seeds so far.
+def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[Trial]:
+    """Return the trials with their scores by fresh seeds; one seed suffices if seeds do not
+    matter.
     """
     first = [(trial, seeds[0]) for trial in trials if seeds[0] not in trial.fresh]
     rest = len(trials) * (len(seeds) - 1)
-    later = 0.5 * len(rivals[:1]) if best == -math.inf else _likely(rivals, best)
-    found = work(first, rest, len(seeds) * later) if first else []
+    found = work(first, rest) if first else []
     outcomes = dict(zip((t.number for t, _ in first), found, strict=True))
     fresh = {t.number: {**t.fresh} for t in trials}
     for number, outcome in outcomes.items():
@@ -101,9 +89,7 @@ def _score(
         if seed not in fresh[trial.number]
         and not _alike(fresh[trial.number][seeds[0]], trial.outcome)
     ]
-    fresh_score = fresh[trials[0].number][seeds[0]].scores.get(trials[0].objective, math.nan)
-    later = _likely(rivals, max(best, fresh_score) if math.isfinite(fresh_score) else best)
-    outcomes_of_more = work(more, 0, len(seeds) * later) if more else []
+    outcomes_of_more = work(more, 0) if more else []
     for (trial, seed), outcome in zip(more, outcomes_of_more, strict=True):
         fresh[trial.number][seed] = outcome
     return [replace(trial, fresh=fresh[trial.number]) for trial in trials]
@@ -113,14 +99,6 @@ def _alike(one: Outcome, other: Outcome) -> bool:
     """Return whether two seeds give the same scores and the same values of limited quantities."""
     same = dict(one.conditions) == dict(other.conditions)
     return same and dict(one.scores) == dict(other.scores)
-
-
-def _likely(rivals: Sequence[float], best: float) -> float:
-    """Return the number of rivals that are expected to be scored: about half of those above the
-    best fresh score, since each that is scored usually raises it.
-    """
-    above = sum(score > best for score in rivals)
-    return 0.5 * (above + 1) if above else 0.0
 
 
 def _along_front(study: Study) -> list[Trial]:

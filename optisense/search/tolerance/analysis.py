@@ -16,7 +16,6 @@ from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.objectives.score import deviation_of, json_ready
-from optisense.objectives.usual_score import UsualTrials
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
@@ -30,7 +29,6 @@ from optisense.search.tolerance.sensitivity import (
     percentile_of,
     total_effect,
 )
-from optisense.time_left import TimedStep, TimeLeft
 
 SENSORS = 120
 """Default number of sensors with manufacturing errors. They render in about ten minutes, and shares
@@ -57,12 +55,9 @@ index. They are assumptions for a sensor that is built by hand: LEDs soldered to
 glued in, a printed mould, silicone and resin of another batch.
 """
 
-FIRST, SENSORS_STEP = "the nominal design", "sensors"
-"""Stages for estimates of the time left: the first score, with compiling, and all others."""
-
-ToleranceCallback = Callable[[int, int, float, str], None]
-"""Function that is called with the number of finished scores, the number of all, the seconds left
-(NaN if unknown), and the stage of the current score, if it is computed in this process.
+ToleranceCallback = Callable[[int, int, str], None]
+"""Function that is called with the number of finished scores, the number of all, and the stage of
+the current score, if it is computed in this process.
 """
 
 
@@ -162,7 +157,6 @@ def tolerance(
     variant: str = "auto",
     progress: ToleranceCallback | None = None,
     on_wait: Callable[[], None] | None = None,
-    time_left: TimeLeft | None = None,
 ) -> Tolerance:
     """Score sensors with manufacturing errors, all with the same seed of the light.
 
@@ -177,7 +171,6 @@ def tolerance(
         variant: variant of the renderer: "auto", "llvm" or "cuda".
         progress: function that is called a few times a second.
         on_wait: function that is called when Ctrl-C waits for a sensor in this process to finish.
-        time_left: time estimate of a command whose last steps are those of `tolerance_steps`.
 
     Returns:
         Percentiles of the scores, and each source's share in their variance. Ctrl-C ends it
@@ -204,14 +197,7 @@ def tolerance(
     jobs = [(nominal, each) for each in (seed, *fresh_seeds(seed, NOISE_SEEDS))]
     jobs += [(point, seed) for point in points.reshape(-1, bound.size)]
     with create_runner(evaluator, workers, on_wait) as runner:
-        show = progress or (lambda done, of, left, doing: None)
-        usual = evaluator.usual_trials()
-        steps = tolerance_steps(len(jobs) - OWN_SCORES, usual, runner.workers)
-        left = time_left or TimeLeft(steps)
-        left.workers = runner.workers
-        for step in steps:
-            left.expect(step.name, step.count, step.seconds)
-        found, interrupted = _work(runner, jobs, show, left, usual)
+        found, interrupted = _work(runner, jobs, progress or (lambda done, of, doing: None))
     itself, again, tried = found[:1], found[1:OWN_SCORES], found[OWN_SCORES:]
     whole = len([each for each in tried if each is not None]) // count
     if itself[0] is None:
@@ -242,23 +228,6 @@ def tolerance(
         values=points[: shape[0]],
         names=bound.space.names,
     )
-
-
-def tolerance_steps(sensors: int, usual: UsualTrials | None, workers: int = 1) -> list[TimedStep]:
-    """Return the stages of a tolerance analysis with their usual durations, if known.
-
-    Args:
-        sensors: number of sensors with errors.
-        usual: usual durations of the first score and of the others.
-        workers: number of workers that share the processors.
-    """
-    rest = sensors + NOISE_SEEDS
-    if usual is None:
-        return [TimedStep(FIRST), TimedStep(SENSORS_STEP, rest)]
-    return [
-        TimedStep(FIRST, 1, usual.first * workers),
-        TimedStep(SENSORS_STEP, rest, usual.trial),
-    ]
 
 
 def _columns(errors: ManufacturingErrors) -> int:
@@ -297,35 +266,23 @@ def _work(
     runner: Runner,
     jobs: Sequence[tuple[FloatArray, int]],
     progress: ToleranceCallback,
-    time_left: TimeLeft,
-    usual: UsualTrials | None,
 ) -> tuple[list[Outcome | None], bool]:
     """Return the outcome of each job, None for jobs after Ctrl-C, and whether it was pressed."""
     found: list[Outcome | None] = [None] * len(jobs)
     running: dict[Future[Outcome], int] = {}
-    time_left.begin(FIRST)
     done = 0
 
     def collect() -> None:
         nonlocal done
         finished, _ = wait(running, return_when=FIRST_COMPLETED)
         for future in finished:
-            outcome = future.result()
-            found[running.pop(future)] = outcome
+            found[running.pop(future)] = future.result()
             done += 1
-            time_left.advance(max(1, done - 1), outcome.seconds, outcome.worker)
-            if done == 1:
-                time_left.begin(SENSORS_STEP)
-        progress(done, len(jobs), time_left.seconds_left, "")
+        progress(done, len(jobs), "")
 
-    def part_of_score(part: float, doing: str) -> None:
-        if done == 0 and usual is not None:
-            time_left.advance(usual.done(part))
-        progress(done, len(jobs), time_left.seconds_left, doing)
-
-    progress(0, len(jobs), time_left.seconds_left, "")
+    progress(0, len(jobs), "")
     if isinstance(runner, SerialRunner):
-        runner.report_progress_to(part_of_score)
+        runner.report_progress_to(lambda part, doing: progress(done, len(jobs), doing))
     try:
         for number, (point, seed) in enumerate(jobs):
             running[runner.submit(point, seed)] = number
