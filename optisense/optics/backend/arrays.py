@@ -52,23 +52,29 @@ def floats(values: NDArray[np.floating]) -> mi.Float:
 
     They are copied bit by bit, as some of them may hold integers.
     """
-    bits = np.ascontiguousarray(values, dtype=np.float32).ravel().view(np.uint32)
-    held = dr.reinterpret_array(mi.Float, _copied(bits))
-    dr.eval(held)
-    return held
+    return _copied(mi.Float, np.asarray(values, dtype=np.float32).ravel())
 
 
 def indices(values: NDArray[np.integer] | NDArray[np.bool_]) -> mi.UInt32:
     """Return all n values of an array of any shape as device integers (n,), in row-major order."""
-    held = _copied(np.asarray(values, dtype=np.uint32).ravel())
-    dr.eval(held)
+    return _copied(mi.UInt32, np.asarray(values, dtype=np.uint32).ravel())
+
+
+def _copied(kind: type[Value], values: NDArray[Any]) -> Value:
+    """Return a device array that has memory of its own, with the bits of an array (n,) of numbers
+    of four bytes.
+    """
+    bits = np.ascontiguousarray(values).view(np.uint32)
+    if len(bits) == 0:
+        return dr.zeros(kind, 0)
+    if dr.backend_v(kind) == dr.JitBackend.LLVM:
+        held = dr.empty(kind, len(bits))
+        dr.sync_thread()  # kernels that still run may use what was freed before
+        held.numpy().view(np.uint32)[:] = bits  # a view of the memory
+    else:
+        held = dr.reinterpret_array(kind, mi.UInt32(bits) + dr.opaque(mi.UInt32, 0))
+        dr.eval(held)
     return held
-
-
-def _copied(values: NDArray[np.uint32]) -> mi.UInt32:
-    """Return an expression of device integers that gets memory of its own when it is evaluated."""
-    held = mi.UInt32(padded(values))
-    return held + dr.opaque(mi.UInt32, 0) if len(values) else held
 
 
 def padded(values: NDArray[Any]) -> NDArray[Any]:
