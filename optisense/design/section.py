@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.design.parts import Role
 from optisense.design.projection import directions
 from optisense.geometry import TriangleMesh
+from optisense.geometry.connected import chains
 
 if TYPE_CHECKING:
     from optisense.design.sensor_design import SensorDesign
@@ -147,24 +147,4 @@ def cut(mesh: TriangleMesh, origin: FloatArray, normal: FloatArray) -> list[Floa
     a, b = unique.T
     share = (height[a] / (height[a] - height[b]))[:, None]
     points = welded.vertices[a] + share * (welded.vertices[b] - welded.vertices[a])
-    return [points[chain] for chain in _chains(numbers.reshape(-1, 2))]
-
-
-def _chains(links: NDArray[np.int64]) -> list[list[int]]:
-    """Join links (k, 2) between numbered points into chains; the ends of open ones come first."""
-    beside: dict[int, list[int]] = {}
-    for one, other in links.tolist():
-        beside.setdefault(one, []).append(other)
-        beside.setdefault(other, []).append(one)
-    starts = [point for point, others in beside.items() if len(others) == 1]
-    chains = []
-    for start in [*starts, *list(beside)]:
-        while beside[start]:
-            chain = [start]
-            while beside[chain[-1]]:
-                here = chain[-1]
-                there = beside[here].pop()
-                beside[there].remove(here)
-                chain.append(there)
-            chains.append(chain)
-    return chains
+    return [points[chain] for chain in chains(numbers.reshape(-1, 2))]

@@ -65,3 +65,9 @@ def as_manifold(mesh: TriangleMesh) -> Any:
 
     welded = mesh.welded()
     return manifold3d.Manifold(manifold3d.Mesh64(welded.vertices, welded.faces.astype(np.uint64)))
+
+
+def of_manifold(solid: Any) -> TriangleMesh:
+    """Return a manifold3d object as a mesh."""
+    mesh = solid.to_mesh64()
+    return TriangleMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))

@@ -1,4 +1,4 @@
-"""Connected components of a graph, such as the shells of a mesh."""
+"""Connected components and chains of a graph, such as the shells and outlines of a mesh."""
 
 from __future__ import annotations
 
@@ -25,3 +25,26 @@ def connected_components(
 
     edges = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(count, count))
     return np.asarray(csgraph.connected_components(edges, directed=False)[1], dtype=np.int64)
+
+
+def chains(links: NDArray[np.integer]) -> list[list[int]]:
+    """Join links (k, 2) between numbered points into chains, each a list of its points.
+
+    Open chains come first. Closed ones repeat their first point at the end.
+    """
+    beside: dict[int, list[int]] = {}
+    for one, other in links.tolist():
+        beside.setdefault(one, []).append(other)
+        beside.setdefault(other, []).append(one)
+    starts = [point for point, others in beside.items() if len(others) == 1]
+    found = []
+    for start in [*sorted(starts), *sorted(beside)]:
+        while beside[start]:
+            chain = [start]
+            while beside[chain[-1]]:
+                here = chain[-1]
+                there = beside[here].pop(0)
+                beside[there].remove(here)
+                chain.append(there)
+            found.append(chain)
+    return found

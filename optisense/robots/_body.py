@@ -15,7 +15,7 @@ from optisense.design.looks import ROLE_LOOKS
 from optisense.design.projection import image_edges
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.common_space import as_manifold
+from optisense.geometry.common_space import as_manifold, of_manifold
 from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
 from optisense.robots._densities import density_of
 from optisense.workshop.export import file_name
@@ -216,24 +216,19 @@ def mass_properties(
         bodies: closed bodies, each a `manifold3d.Manifold`, mm.
         densities: mass of one mm^3 of each, kg.
     """
-    total, moment, about_origin = 0.0, np.zeros(3), np.zeros((3, 3))
-    for body, density in zip(bodies, densities, strict=True):
-        mesh = body.to_mesh64()
-        a, b, c = np.moveaxis(
-            np.asarray(mesh.vert_properties)[:, :3][np.asarray(mesh.tri_verts)], 1, 0
-        )
-        # Each triangle and the origin span a tetrahedron, whose moments have closed forms.
-        volume = np.einsum("ij,ij->i", a, np.cross(b, c)) / 6.0
-        corners = np.stack([a, b, c], axis=1)
-        middle = corners.sum(axis=1)
-        total += density * float(volume.sum())
-        moment += density * METRES * (volume[:, None] * middle).sum(axis=0) / 4.0
-        squares = np.einsum("t,tci,tcj->ij", volume, corners, corners)
-        squares = (squares + np.einsum("t,ti,tj->ij", volume, middle, middle)) / 20.0
-        about_origin += density * METRES**2 * (np.trace(squares) * np.eye(3) - squares)
-    centre = moment / total
-    shift = total * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    return total, centre, about_origin - shift
+    from trimesh.triangles import mass_properties as properties_of
+
+    found = [
+        properties_of(of_manifold(body).triangles, density=density)
+        for body, density in zip(bodies, densities, strict=True)
+    ]
+    masses = np.array([each.mass for each in found])
+    centres = METRES * np.array([each.center_mass for each in found])
+    centre = masses @ centres / masses.sum()
+    inertia = METRES**2 * np.sum([np.asarray(each.inertia) for each in found], axis=0)
+    for mass, offset in zip(masses, centres - centre, strict=True):  # the parallel axis theorem
+        inertia += mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+    return float(masses.sum()), centre, inertia
 
 
 def _hulls(
@@ -254,17 +249,11 @@ def _hulls(
             )
         off = 0.0
         for number, hull in enumerate(hulls, start=1):
-            mesh = hull.to_mesh64()
-            vertices = np.asarray(mesh.vert_properties)[:, :3]
+            mesh = of_manifold(hull)
             if is_gel:
-                off = max(off, float(depth_in(skin.vertices, ConvexHull(vertices)).max()))
-            found.append(
-                _body_mesh(
-                    f"{shape.name}-hull{f'-{number}' if len(hulls) > 1 else ''}",
-                    TriangleMesh(vertices, np.asarray(mesh.tri_verts).astype(np.int32)),
-                    shape,
-                )
-            )
+                off = max(off, float(depth_in(skin.vertices, ConvexHull(mesh.vertices)).max()))
+            name = f"{shape.name}-hull{f'-{number}' if len(hulls) > 1 else ''}"
+            found.append(_body_mesh(name, mesh, shape))
         if off > COVERED:
             notes.append(f"the convex hulls of {shape.name} stand up to {off:.2g} mm off the skin")
     return found

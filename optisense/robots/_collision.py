@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from optisense.array_types import FloatArray
+from optisense.geometry.common_space import of_manifold
 
 COVERED = 0.05
 """Depth (mm) in a hull from which on a point of the skin counts as covered: more than the gap
@@ -81,7 +82,7 @@ def gel_hulls(gel: Any, skin: FloatArray, cuts: int = MOST_CUTS) -> list[Any]:
 def _covers(part: Any, skin: FloatArray) -> bool:
     """Return whether the convex hull of a part covers any of the skin."""
     try:
-        hull = ConvexHull(np.asarray(part.hull().to_mesh64().vert_properties)[:, :3])
+        hull = ConvexHull(of_manifold(part.hull()).vertices)
     except QhullError:  # flat
         return False
     return bool((depth_in(skin, hull) > COVERED).any())

@@ -16,7 +16,7 @@ from optisense.array_types import FloatArray
 from optisense.design import Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.common_space import as_manifold
+from optisense.geometry.common_space import as_manifold, of_manifold
 from optisense.geometry.patches import mean_normal
 from optisense.workshop.shapes import Shape
 
@@ -149,7 +149,8 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
     back -= _rod(sprue, bottom - WALL - 1.0, inside, FUNNEL, SPRUE)
     back -= _rod(vent, bottom - WALL - 1.0, inside, VENT)
     upright, undercut = _draft(local, parting)
-    return Mould(gel.name, _mesh(front, axes), _mesh(back, axes), axes[2], upright, undercut)
+    front, back = (of_manifold(half).transformed(axes.T) for half in (front, back))
+    return Mould(gel.name, front, back, axes[2], upright, undercut)
 
 
 def _outward(skins: list[TriangleMesh]) -> FloatArray:
@@ -228,9 +229,3 @@ def _draft(local: TriangleMesh, parting: float) -> tuple[float, float]:
     undercut = (opens < -UNDERCUT) & ~at_parting
     upright = (opens < LEAST_DRAFT) & ~undercut & ~at_parting
     return float(areas[upright].sum()), float(areas[undercut].sum())
-
-
-def _mesh(solid: Any, axes: FloatArray) -> TriangleMesh:
-    mesh = solid.to_mesh64()
-    vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3] @ axes
-    return TriangleMesh(vertices, np.asarray(mesh.tri_verts, dtype=np.int32))

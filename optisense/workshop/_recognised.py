@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
-from optisense.geometry.connected import connected_components
+from optisense.geometry.connected import chains, connected_components
 from optisense.geometry.patches import smoothly_joined
 
 SAME = 1e-6
@@ -99,9 +99,10 @@ def _turned_about(mesh: TriangleMesh, axis: int) -> Revolution | None:
     # Sides between rings, in the order in which the normals point outward.
     where = rings[mesh.faces]
     sides = np.concatenate([where[:, [0, 1]], where[:, [1, 2]], where[:, [2, 0]]])
-    sides = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
-    order = _walk(sides, len(counts))
-    return None if order is None else Revolution(axis, centre, profile[order])
+    loops = _loops(sides[sides[:, 0] != sides[:, 1]])
+    if loops is None or len(loops) != 1 or len(set(loops[0])) != len(counts):
+        return None
+    return Revolution(axis, centre, profile[loops[0]])
 
 
 def _axis_place(vertices: FloatArray, axis: int, k: int) -> float:
@@ -117,31 +118,6 @@ def _joined(points: FloatArray, distance: float) -> NDArray[np.int64]:
     cells, inverse = grid[0], np.asarray(grid[1]).reshape(-1)
     pairs = cKDTree(cells).query_pairs(1.5, output_type="ndarray")
     return connected_components(len(cells), pairs[:, 0], pairs[:, 1])[inverse]
-
-
-def _walk(sides: NDArray[np.int64], count: int) -> list[int] | None:
-    """Return the corners of one path, or of one closed outline (its first again at the end)."""
-    beside: list[list[int]] = [[] for _ in range(count)]
-    for one, other in sides.tolist():
-        beside[one].append(other)
-        beside[other].append(one)
-    degrees = [len(each) for each in beside]
-    if max(degrees, default=0) > 2 or min(degrees, default=0) < 1:
-        return None
-    ends = [k for k, degree in enumerate(degrees) if degree == 1]
-    start = ends[0] if ends else 0
-    order, before = [start], -1
-    while True:
-        ahead = [k for k in beside[order[-1]] if k != before]
-        if not ahead or (ahead[0] == start and len(order) > 2):
-            break
-        before = order[-1]
-        order.append(ahead[0])
-        if len(order) > count:
-            return None
-    if len(order) != count:
-        return None
-    return order if ends else [*order, start]
 
 
 def extrusion_of(mesh: TriangleMesh) -> Extrusion | None:
@@ -185,12 +161,11 @@ def extruded_along(mesh: TriangleMesh, axis: int) -> Extrusion | None:
     sides = np.concatenate(pairs)
     if len(sides) == 0:
         return None
-    used, numbered = np.unique(sides, return_inverse=True)
-    loops = _loops(numbered.reshape(-1, 2), len(used))
+    loops = _loops(sides)
     if loops is None:
         return None
     i, j = across(axis)
-    flat = mesh.vertices[used][:, (i, j)]
+    flat = mesh.vertices[:, (i, j)]
     outlines = [flat[loop] for loop in loops]
     wall_area = sum(float(np.linalg.norm(np.diff(o, axis=0), axis=1).sum()) for o in outlines)
     drawn = wall_area * (high - low)
@@ -203,28 +178,18 @@ def extruded_along(mesh: TriangleMesh, axis: int) -> Extrusion | None:
     return Extrusion(axis, low, high, outlines)
 
 
-def _loops(sides: NDArray[np.int64], count: int) -> list[list[int]] | None:
-    """Return outlines by their corners; None if more than two sides meet."""
+def _loops(sides: NDArray[np.integer]) -> list[list[int]] | None:
+    """Return outlines by their corners, closed ones with the first again at the end; None if more
+    than two sides meet.
+    """
     sides = np.unique(np.sort(sides, axis=1), axis=0)
-    labels = connected_components(count, sides[:, 0], sides[:, 1])
-    loops = []
-    for label in range(int(labels.max(initial=-1)) + 1):
-        members = np.flatnonzero(labels == label)
-        rows = sides[np.isin(sides[:, 0], members)]
-        order = _walk(np.searchsorted(members, rows), len(members))
-        if order is None:
-            return None
-        loops.append([int(members[k]) for k in order])
-    return loops
+    return None if np.bincount(sides.reshape(-1)).max(initial=0) > 2 else chains(sides)
 
 
 def rims(mesh: TriangleMesh) -> list[list[int]] | None:
     """Return the loops of edges with one face, by their vertices, the first again at the end."""
-    used, numbered = np.unique(mesh.open_edges, return_inverse=True)
-    loops = _loops(numbered.reshape(-1, 2), len(used))
-    if loops is None or any(loop[0] != loop[-1] for loop in loops):
-        return None
-    return [[int(used[k]) for k in loop] for loop in loops]
+    loops = _loops(mesh.open_edges)
+    return None if loops is None or any(loop[0] != loop[-1] for loop in loops) else loops
 
 
 def smooth_patches(mesh: TriangleMesh, sharp: float) -> list[NDArray[np.int64]]:

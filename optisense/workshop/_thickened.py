@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
-from optisense.geometry.common_space import as_manifold
+from optisense.geometry.common_space import as_manifold, of_manifold
+from optisense.geometry.connected import connected_components
 
 LONGEST_MITRE = 3.0
 """Largest distance of a corner of the far face from the near one, in thicknesses; the mitre of two
@@ -43,41 +42,38 @@ def thickened(mesh: TriangleMesh, thickness: float) -> TriangleMesh | None:
     whole = solids[0]
     for solid in solids[1:]:
         whole += solid
-    joined = whole.to_mesh64()
-    return TriangleMesh(
-        np.asarray(joined.vert_properties, dtype=np.float64)[:, :3],
-        np.asarray(joined.tri_verts, dtype=np.int32),
-    )
+    return of_manifold(whole)
 
 
 def _pieces(mesh: TriangleMesh) -> list[NDArray[np.int64]]:
     """Return the faces of each piece; edges shared by just two faces of one winding join them."""
-    ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
-    owner = np.tile(np.arange(len(mesh.faces)), 3)
-    _, inverse, counts = np.unique(
-        np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    inverse = np.asarray(inverse).reshape(-1)
+    ends, inverse, counts = _edges(mesh)
+    owner = np.repeat(np.arange(len(mesh.faces)), 3)
     order = np.argsort(inverse, kind="stable")
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])[counts == 2]
     one, other = order[starts], order[starts + 1]
     alike = ends[one, 0] == ends[other, 1]  # each runs along the edge in the opposite direction
-    pairs = owner[one[alike]], owner[other[alike]]
-    shape = (len(mesh.faces), len(mesh.faces))
-    matrix = coo_matrix((np.ones(int(alike.sum())), pairs), shape)
-    number, labels = connected_components(matrix, directed=False)
-    return [np.flatnonzero(labels == label) for label in range(number)]
+    labels = connected_components(len(mesh.faces), owner[one[alike]], owner[other[alike]])
+    return [np.flatnonzero(labels == label) for label in range(labels.max() + 1)]
+
+
+def _edges(mesh: TriangleMesh) -> tuple[NDArray[np.int32], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the sides of all faces, (3 m, 2) vertices, the number (3 m,) of the edge that each is,
+    and the number (k,) of sides of each edge.
+    """
+    sides = mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    _, edge, counts = np.unique(
+        np.sort(sides, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    return sides, np.asarray(edge).reshape(-1), counts
 
 
 def _plate(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
     """Return the closed plate of one piece."""
     count = len(mesh.vertices)
     far = mesh.vertices + _offsets(mesh, thickness)
-    ends = np.concatenate([mesh.faces[:, [0, 1]], mesh.faces[:, [1, 2]], mesh.faces[:, [2, 0]]])
-    _, inverse, counts = np.unique(
-        np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    a, b = ends[counts[np.asarray(inverse).reshape(-1)] == 1].T
+    ends, inverse, counts = _edges(mesh)
+    a, b = ends[counts[inverse] == 1].T
     walls = np.concatenate([np.stack([b, a, a + count], 1), np.stack([b, a + count, b + count], 1)])
     faces = np.concatenate([mesh.faces, mesh.faces[:, ::-1] + count, walls])
     return TriangleMesh(np.concatenate([mesh.vertices, far]), faces)

@@ -27,7 +27,7 @@ from optisense.design.arrangement import EQUAL_INDEX
 from optisense.errors import DesignError, MeshError
 from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
-from optisense.geometry.common_space import as_manifold, thick_place
+from optisense.geometry.common_space import as_manifold, of_manifold, thick_place
 from optisense.geometry.mesh import TriangleMesh
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 
@@ -285,7 +285,7 @@ def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
                 "larger priority",
             )
         larger = _manifold(_grown(result[i], CUT_CLEARANCE))
-        result[j] = replace(result[j], mesh=_from_manifold(_manifold(result[j]) - larger))
+        result[j] = replace(result[j], mesh=of_manifold(_manifold(result[j]) - larger))
     return [solid for solid in result if len(solid.mesh.faces)]
 
 
@@ -321,8 +321,3 @@ def _manifold(solid: Solid) -> Any:
             hint="repair it in your modelling program: no edge with more than two faces",
         )
     return result
-
-
-def _from_manifold(solid: Any) -> TriangleMesh:
-    mesh = solid.to_mesh64()
-    return TriangleMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))

@@ -9,6 +9,7 @@ import shapely
 
 from optisense.array_types import FloatArray
 from optisense.design import Light
+from optisense.design.section import cut
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.near import suggestion
@@ -69,23 +70,8 @@ def along(choice: LightsAlong, mesh: TriangleMesh) -> list[Light]:
 
 def _outline(mesh: TriangleMesh, axis: int, height: float, frame: FloatArray) -> FloatArray:
     """Return the largest outline of a section, anticlockwise, in a plane frame, (n, 2) mm."""
-    level = mesh.vertices[:, axis] - height
-    level[level == 0.0] = 1e-9  # a plane through a vertex passes just below it
-    signs = level[mesh.faces] > 0.0
-    cut = mesh.faces[signs.any(axis=1) & ~signs.all(axis=1)]
-    ends = []
-    for one, other in ((0, 1), (1, 2), (2, 0)):
-        a, b = cut[:, one], cut[:, other]
-        crosses = (level[a] > 0.0) != (level[b] > 0.0)
-        a, b = np.minimum(a, b), np.maximum(a, b)  # both faces beside an edge find one point
-        t = (level[a] / np.where(crosses, level[a] - level[b], 1.0))[:, None]
-        spots = (1.0 - t) * mesh.vertices[a] + t * mesh.vertices[b]
-        ends.append(np.where(crosses[:, None], spots @ frame.T, np.nan))
-    pairs = np.stack(ends, axis=1)
-    pairs = (
-        pairs[~np.isnan(pairs).any(axis=2)].reshape(-1, 2, 2) if len(cut) else np.zeros((0, 2, 2))
-    )
-    polygons = list(shapely.polygonize(shapely.linestrings(np.round(pairs, 9))).geoms)
+    lines = cut(mesh, height * np.eye(3)[axis], np.eye(3)[axis])
+    polygons = [shapely.Polygon(line @ frame.T) for line in lines if len(line) > 3]
     if not polygons:
         low, high = mesh.bounds[:, axis]
         raise DesignError(

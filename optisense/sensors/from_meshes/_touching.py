@@ -12,6 +12,7 @@ from optisense.design.check import solids_beside
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import cut, find_coincident
+from optisense.geometry.common_space import as_manifold
 from optisense.geometry.joining import EXACT, join, touching_area
 from optisense.geometry.overlaps import find_overlap
 from optisense.sensors.from_meshes.recipe import Recipe
@@ -114,10 +115,7 @@ def _only_joined(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> b
     """Return whether a part reaches into another by no more than the joining has moved it."""
     import manifold3d
 
-    solids = [
-        manifold3d.Manifold(manifold3d.Mesh64(m.vertices, m.faces.astype(np.uint64)))
-        for m in (mover, fixed)
-    ]
+    solids = [as_manifold(mover), as_manifold(fixed)]
     if any(solid.status() != manifold3d.Error.NoError for solid in solids):
         return False
     common = solids[0] ^ solids[1]
