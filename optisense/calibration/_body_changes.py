@@ -17,6 +17,7 @@ from optisense.design.emitters import AreaEmitter, LightModel, SpotEmitter
 from optisense.design.parts import FaceFinish, Role
 from optisense.errors import CalibrationError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.rotations import rotation
 
 FLAT = 0.2
 """Largest deviation of a flat gel's skin from its plane, mm, as a real GelSight Mini sags."""
@@ -62,10 +63,10 @@ def with_lights_tilted(design: SensorDesign, group: str, angle: float) -> Sensor
         axis = np.cross(direction, ahead)
         if np.linalg.norm(axis) < 1e-6:
             return light
-        axis /= np.linalg.norm(axis)
-        update = {"direction": tuple(turned(direction, axis, angle).tolist())}
+        turn = rotation(axis, angle)
+        update = {"direction": tuple((turn @ direction).tolist())}
         if light.up is not None:
-            update["up"] = tuple(turned(np.array(light.up), axis, angle).tolist())
+            update["up"] = tuple((turn @ np.array(light.up)).tolist())
         return light.model_copy(update=update)
 
     return _with_lights(design, group, tilted)
@@ -105,13 +106,6 @@ def _with_lights(design: SensorDesign, group: str, change) -> SensorDesign:  # t
     own = found.lights[group]
     found.lights[group] = own.model_copy(update={"lights": [change(each) for each in own.lights]})
     return found
-
-
-def turned(vector: FloatArray, axis: FloatArray, angle: float) -> FloatArray:
-    """Return a vector (3,) turned by an angle (degrees) about a unit axis (3,) (Rodrigues)."""
-    cosine, sine = math.cos(math.radians(angle)), math.sin(math.radians(angle))
-    along = axis * float(axis @ vector) * (1.0 - cosine)
-    return np.asarray(vector * cosine + np.cross(axis, vector) * sine + along)
 
 
 def with_single_lights(design: SensorDesign) -> SensorDesign:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from optisense.calibration._body_changes import turned
 from optisense.design import SensorDesign, set_value
+from optisense.geometry.rotations import rotation
 
 
 def with_camera_moved(axis: int, design: SensorDesign, amount: float) -> SensorDesign:
@@ -24,7 +24,7 @@ def with_camera_turned(axis: int, design: SensorDesign, angle: float) -> SensorD
     about its right (0), to the left about its top (1) or clockwise about its viewing direction (2).
     """
     axes = design.camera.axes()
-    direction, up = (turned(each, axes[axis], angle) for each in (axes[2], axes[1]))
+    direction, up = (rotation(axes[axis], angle) @ each for each in (axes[2], axes[1]))
     changed = set_value(design, "camera.direction", tuple(direction.tolist()))
     return set_value(changed, "camera.up", tuple(up.tolist()))
 

@@ -25,7 +25,8 @@ from optisense.geometry.indenter_kinds import (
     IndenterKind,
     quantity,
 )
-from optisense.geometry.mesh import TriangleMesh, grid_faces, turn_about_x_and_y
+from optisense.geometry.mesh import TriangleMesh, grid_faces
+from optisense.geometry.rotations import turn_about_axes
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,7 @@ class Plane(IndenterKind):
         """Return the whole plate, as thick as it is wide; see `Indenter.mesh`."""
         half = 0.5 * self.size
         block = TriangleMesh.box((-half, -half, 0.0), (half, half, self.size)).vertex_normals()
-        return _lowest_at_zero(block.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y)))
+        return _lowest_at_zero(block.transformed(turn_about_axes(self.tilt_x, self.tilt_y)))
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,8 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from optisense.errors import ContactError
-from optisense.geometry.mesh import TriangleMesh, turn_about_x_and_y
+from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.rotations import turn_about_axes
 from optisense.near import suggestion
 from optisense.registry import Registry
 
@@ -218,7 +219,7 @@ class Tilted:
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """Return the mesh of the whole rotated indenter; see `Indenter.mesh`."""
         whole = self.indenter.mesh(np.inf, facet_error)
-        turned = whole.transformed(turn_about_x_and_y(self.tilt_x, self.tilt_y))
+        turned = whole.transformed(turn_about_axes(self.tilt_x, self.tilt_y))
         size = np.ptp(turned.bounds, axis=0).max()
         lowest = turned.vertices[turned.vertices[:, 2] <= turned.bounds[0, 2] + 1e-6 * size]
         place = 0.5 * (lowest.min(axis=0) + lowest.max(axis=0))

@@ -278,14 +278,6 @@ class TriangleMesh:
         return TriangleMesh(self.vertices[vertex], faces, normals)
 
 
-def turn_about_x_and_y(angle_x: float, angle_y: float) -> NDArray[np.float64]:
-    """Return the rotation matrix (3, 3) by angles (degrees) about x and then about y."""
-    x, y = np.radians([angle_x, angle_y])
-    about_x = [[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]]
-    about_y = [[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]]
-    return np.array(about_y) @ np.array(about_x)
-
-
 def grid_faces(rows: int, columns: int) -> IntArray:
     """Return two triangles for each cell of a grid of vertices that are numbered row by row, as an
     array (m, 3) int32 with m = 2 (rows - 1) (columns - 1).

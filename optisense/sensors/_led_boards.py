@@ -10,6 +10,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import AreaEmitter, Light, LightGroup
 from optisense.geometry import TriangleMesh
+from optisense.geometry.rotations import rotation
 from optisense.sensors._led_flux import package
 
 COLOURS = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
@@ -88,7 +89,11 @@ class LedBoards:
                 low = (inner, y, z - 0.5 * LED[1])
                 bodies.append(TriangleMesh.box(low, (outer, y + high, z + 0.5 * LED[1])))
         return TriangleMesh.joined(
-            [body.transformed(_turned(board)) for board in range(BOARDS) for body in bodies]
+            [
+                body.transformed(rotation((0.0, 0.0, 1.0), 90.0 * board))
+                for board in range(BOARDS)
+                for body in bodies
+            ]
         )
 
     def light_groups(self, colours: str, flux: float) -> dict[str, LightGroup]:
@@ -102,7 +107,7 @@ class LedBoards:
         groups = {}
         for number, letter in enumerate(colours, start=1):
             side = 1.0 if number % 2 else -1.0
-            turn = _turned(number // 2 % BOARDS)
+            turn = rotation((0.0, 0.0, 1.0), 90.0 * (number // 2 % BOARDS))
             lights = [
                 _light(
                     turn @ (self.radius, side * self._window, z),
@@ -134,12 +139,6 @@ def ring(colour: str, radius: float, count: int, flux: float) -> LightGroup:
         for angle in 2.0 * np.pi * (np.arange(count) + 0.5) / count
     ]
     return _group(colour, flux, lights)
-
-
-def _turned(board: int) -> FloatArray:
-    """Return the exact rotation matrix (3, 3) about z that takes the first board to another."""
-    cosine, sine = ((1, 0), (0, 1), (-1, 0), (0, -1))[board]
-    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _light(position: FloatArray, direction: FloatArray, up: FloatArray) -> Light:

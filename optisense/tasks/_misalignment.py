@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, TriangleMesh
-from optisense.geometry.mesh import turn_about_x_and_y
+from optisense.geometry.rotations import turn_about_axes
 from optisense.mechanics import CONFORMING
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ class TiltedPlate:
         """Return the mesh; see `optisense.geometry.Indenter`. It reaches below z = 0 if tilted."""
         u, v = self.half
         block = TriangleMesh.box((-u, -v, 0.0), (u, v, THICKNESS)).vertex_normals()
-        return block.transformed(turn_about_x_and_y(self.angle_x, self.angle_y))
+        return block.transformed(turn_about_axes(self.angle_x, self.angle_y))
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def plane_contact(model: OpticalModel, angle_x: float, angle_y: float, depth: fl
     # These are a contact's own axes; v may point opposite to y.
     axes = np.column_stack([surface.u_axis, np.cross(-spot.inward, surface.u_axis), -spot.inward])
     corners = np.array([(a * u, b * v, 0.0) for a in (-1, 1) for b in (-1, 1)])
-    turned = corners @ (axes @ turn_about_x_and_y(angle_x, angle_y)).T
+    turned = corners @ (axes @ turn_about_axes(angle_x, angle_y)).T
     deepest = depth + float((turned @ spot.inward).max())
     for gel in model.gels:
         thickness = float(((gel.vertices - spot.point) @ spot.inward).max())

@@ -9,7 +9,7 @@ from optisense import OpticalModel
 from optisense.errors import TaskError
 from optisense.geometry import Cylinder, Plane, Sphere
 from optisense.geometry.indenter_kinds import tilted
-from optisense.geometry.mesh import turn_about_x_and_y
+from optisense.geometry.rotations import turn_about_axes
 from optisense.tasks._draws import ContactDraw, Places
 
 
@@ -60,7 +60,7 @@ def test_balls_stay_and_plates_add_their_tilts() -> None:
 
 
 def test_turns_are_about_x_then_y() -> None:
-    turned = turn_about_x_and_y(90, 90) @ [0, 0, 1]
+    turned = turn_about_axes(90, 90) @ [0, 0, 1]
     assert turned == pytest.approx([0, -1, 0], abs=1e-12)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.geometry import TriangleMesh
+from optisense.geometry.rotations import rotation
 from optisense.search.space.design_variables import DesignVariable
 
 
@@ -140,14 +141,6 @@ class PartTurn(_Move):
         middle = design.meshes[self.name].bounds.mean(axis=0)
         turn = rotation(_along(self.axis, 1.0), value)
         return _with_mesh(design, self.name, turn, middle - turn @ middle)
-
-
-def rotation(axis: FloatArray, degrees: float) -> FloatArray:
-    """Return the matrix (3, 3) of the right-handed rotation about an axis (Rodrigues' formula)."""
-    x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = np.radians(degrees)
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
 
 
 def _with_poses(

@@ -9,6 +9,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.rotations import turn_about_axes
 from optisense.sensors.from_meshes.directions import axis_of
 from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
 
@@ -26,28 +27,10 @@ def posed(mesh: TriangleMesh, shape: ShapeReference) -> TriangleMesh:
         flip["xyz".index(shape.mirror)] = -1.0
         mesh = TriangleMesh(mesh.vertices * flip, mesh.faces[:, ::-1])
     if shape.turn is not None:
-        mesh = mesh.with_vertices(mesh.vertices @ rotation(shape.turn).T)
+        mesh = mesh.with_vertices(mesh.vertices @ turn_about_axes(*shape.turn).T)
     if shape.move is not None and getattr(shape, "on", None) is None:
         mesh = mesh.with_vertices(mesh.vertices + np.array(shape.move))
     return mesh
-
-
-def rotation(degrees: tuple[float, float, float]) -> FloatArray:
-    """Return the matrix (3, 3) of rotations about x, then y, then z of a fixed frame.
-
-    Quarter turns are exact, so that flat faces stay in the planes of the axes.
-    """
-    result = np.eye(3)
-    for axis, angle in enumerate(degrees):
-        cosine, sine = np.cos(np.radians(angle)), np.sin(np.radians(angle))
-        if angle % 90.0 == 0.0:
-            cosine, sine = np.round(cosine), np.round(sine)
-        turn = np.eye(3)
-        i, j = (axis + 1) % 3, (axis + 2) % 3
-        turn[i, i] = turn[j, j] = cosine
-        turn[i, j], turn[j, i] = -sine, sine
-        result = turn @ result
-    return result
 
 
 def resting_order(parts: Mapping[str, PartChoice]) -> list[str]:

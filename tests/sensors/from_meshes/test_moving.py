@@ -13,8 +13,9 @@ import trimesh
 from optisense import sensors
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.rotations import turn_about_axes
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe, read_recipe, save_recipe
-from optisense.sensors.from_meshes._moving import laid_on, posed, rotation
+from optisense.sensors.from_meshes._moving import laid_on, posed
 from optisense.sensors.from_meshes._pick_and_place import BoardPart, read_pick_and_place
 from optisense.sensors.from_meshes._strips import along, from_table
 from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
@@ -35,9 +36,9 @@ class TestMoves:
         assert moved.volume == pytest.approx(BOX.volume)  # a mirrored solid still faces out
 
     def test_turns_follow_one_another_about_standing_axes(self) -> None:
-        turned = rotation((90.0, 0.0, 90.0)) @ np.array([0.0, 1.0, 0.0])
+        turned = turn_about_axes(90.0, 0.0, 90.0) @ np.array([0.0, 1.0, 0.0])
         np.testing.assert_array_equal(turned, [0.0, 0.0, 1.0])
-        turned = rotation((30.0, 0.0, 0.0)) @ np.array([0.0, 1.0, 0.0])
+        turned = turn_about_axes(30.0, 0.0, 0.0) @ np.array([0.0, 1.0, 0.0])
         np.testing.assert_allclose(turned, [0.0, math.sqrt(0.75), 0.5])
 
     def test_on_puts_a_flat_face_in_the_middle_of_a_face(self) -> None:
@@ -266,7 +267,7 @@ class TestFromTable:
 
     @pytest.mark.parametrize("count", [2, 3])
     def test_points_give_the_places_back(self, count: int) -> None:
-        turn = rotation((20.0, 110.0, -40.0))
+        turn = turn_about_axes(20.0, 110.0, -40.0)
         there = {
             n: tuple(float(v) for v in turn @ (p.x, p.y, 0.0) + (1.0, 2.0, 3.0))
             for n, p in TABLE.items()
