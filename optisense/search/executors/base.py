@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pickle
 from abc import ABC, abstractmethod
-from concurrent.futures import Future
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from types import TracebackType
 from typing import IO, Any
 
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 from optisense.errors import OptiSenseError, SearchError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
+
+TICK = 0.2
+"""Interval between checks of the clock while trials are scored, s; short for a smooth display."""
 
 
 class Runner(ABC):
@@ -67,6 +71,34 @@ def outcome_of(done: Future[Outcome]) -> Outcome:
         raise error
     why = str(error) or type(error).__name__
     raise SearchError(f"a trial could not be scored: {why}") from error
+
+
+def run_jobs(
+    runner: Runner,
+    jobs: Sequence[tuple[int, NDArray[np.float64], int]],
+    finished: Callable[[int, Outcome], None],
+    waiting: Callable[[], None] = lambda: None,
+) -> None:
+    """Keep an executor busy with jobs (number, point, seed), and pass on each outcome.
+
+    Args:
+        finished: function that is called with the number of each job and its outcome.
+        waiting: function that is called every `TICK` seconds while jobs run.
+
+    Raises:
+        OptiSenseError: no trial can be scored.
+    """
+    left = list(reversed(jobs))
+    running: dict[Future[Outcome], int] = {}
+    while left or running:
+        while left and len(running) < runner.window:
+            number, vector, seed = left.pop()
+            running[runner.submit(vector, seed)] = number
+        done, _ = wait(running, TICK, FIRST_COMPLETED)
+        for future in sorted(done, key=running.__getitem__):
+            finished(running.pop(future), outcome_of(future))
+        if not done:
+            waiting()
 
 
 def pickled(evaluator: Evaluator) -> bytes:

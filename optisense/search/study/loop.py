@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import queue
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -15,7 +13,7 @@ import numpy as np
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
-from optisense.search.executors.base import outcome_of
+from optisense.search.executors.base import TICK, run_jobs
 from optisense.search.methods import Method, Problem, make
 from optisense.search.study._evaluators import evaluators
 from optisense.search.study._promotion import promote
@@ -43,10 +41,6 @@ SAME_POINT = 1e-9
 """Largest difference, as a share of the range, between proposals that count as the same point;
 releases of libraries differ in rounding.
 """
-
-TICK = 0.2
-"""Interval between checks of the clock while trials are scored, s; short for a smooth display."""
-
 
 MakeRunner = Callable[[Evaluator], Runner]
 
@@ -90,7 +84,6 @@ class StudyRun:
         self._make_runner = make_runner
         self._progress = progress or (lambda progress: None)
         self._notes: list[str] = []
-        self._finished: queue.SimpleQueue[tuple[int, Future[Outcome]]] = queue.SimpleQueue()
         self._tally = Tally(study.objective)
         self._watch = ReadingWatch(study, self._tally, usual)
         self._last_report = time.monotonic()
@@ -216,7 +209,7 @@ class StudyRun:
                 jobs.append((row.number, row.vector, self.study.settings.seed))
             else:
                 finished(row.number, replace(known, seconds=0.0))
-        self._run_jobs(runner, jobs, finished)
+        run_jobs(runner, jobs, finished, self._report)
 
     def _score_fresh(
         self, runner: Runner, jobs: Sequence[tuple[Trial, int]], more: int
@@ -235,35 +228,8 @@ class StudyRun:
             self._report(now=True)
 
         numbered = [(k, trial.vector, seed) for k, (trial, seed) in enumerate(jobs)]
-        self._run_jobs(runner, numbered, finished)
+        run_jobs(runner, numbered, finished, self._report)
         return [found[number] for number in range(len(jobs))]
-
-    def _run_jobs(
-        self,
-        runner: Runner,
-        jobs: Sequence[tuple[int, np.ndarray, int]],
-        finished: Callable[[int, Outcome], None],
-    ) -> None:
-        """Keep the workers busy with jobs (number, point, seed), and pass on each outcome."""
-        waiting = list(reversed(jobs))
-        open_jobs = 0
-        while waiting or open_jobs:
-            while waiting and open_jobs < runner.window:
-                number, vector, seed = waiting.pop()
-                future = runner.submit(vector, seed)
-                open_jobs += 1
-                future.add_done_callback(partial(self._enqueue, number))
-            try:
-                number, done = self._finished.get(timeout=TICK)
-            except queue.Empty:
-                self._report()
-                continue
-            open_jobs -= 1
-            finished(number, outcome_of(done))
-
-    def _enqueue(self, number: int, done: Future[Outcome]) -> None:
-        """Queue a finished trial; it is called in the thread where the trial finished."""
-        self._finished.put((number, done))
 
     def _check_proposals(self, asked: np.ndarray, rows: Sequence[Row]) -> None:
         """Note if the method proposes other points than it did before."""

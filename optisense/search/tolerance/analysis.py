@@ -6,7 +6,6 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -20,6 +19,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
 from optisense.search.executors import Runner, SerialRunner, Workers, create_runner
+from optisense.search.executors.base import run_jobs
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.study.failures import cause_of
 from optisense.search.study.rescoring import fresh_seeds
@@ -269,27 +269,19 @@ def _work(
 ) -> tuple[list[Outcome | None], bool]:
     """Return the outcome of each job, None for jobs after Ctrl-C, and whether it was pressed."""
     found: list[Outcome | None] = [None] * len(jobs)
-    running: dict[Future[Outcome], int] = {}
     done = 0
 
-    def collect() -> None:
+    def finished(number: int, outcome: Outcome) -> None:
         nonlocal done
-        finished, _ = wait(running, return_when=FIRST_COMPLETED)
-        for future in finished:
-            found[running.pop(future)] = future.result()
-            done += 1
+        found[number] = outcome
+        done += 1
         progress(done, len(jobs), "")
 
     progress(0, len(jobs), "")
     if isinstance(runner, SerialRunner):
         runner.report_progress_to(lambda part, doing: progress(done, len(jobs), doing))
     try:
-        for number, (point, seed) in enumerate(jobs):
-            running[runner.submit(point, seed)] = number
-            while len(running) >= runner.window:
-                collect()
-        while running:
-            collect()
+        run_jobs(runner, [(number, *job) for number, job in enumerate(jobs)], finished)
     except KeyboardInterrupt:
         return found, True
     return found, False
