@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from optisense.array_types import FloatArray
 from optisense.errors import SearchError
@@ -65,6 +64,8 @@ class Pareto(Method):
     def ask(self) -> FloatArray:
         """Return the next generation, (population, n)."""
         if not len(self._genes):
+            from scipy.stats import qmc  # takes half a second to load
+
             cube = qmc.LatinHypercube(self.space.size, seed=self._random)
             self._children = cube.random(self.population)
             self._children[0] = self.space.unit_of(self.space.start)

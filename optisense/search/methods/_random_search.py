@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scipy.stats import qmc
-
 from optisense.array_types import FloatArray
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods.base import Method, Problem
@@ -25,6 +23,8 @@ class Random(Method):
     accepts_coarse_scores = True
 
     def __init__(self, problem: Problem) -> None:
+        from scipy.stats import qmc  # takes half a second to load
+
         super().__init__(problem)
         self._points = qmc.Sobol(problem.space.size, seed=problem.random(self.name))
 
