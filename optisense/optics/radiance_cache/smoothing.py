@@ -273,14 +273,16 @@ def distances_within(cells: SurfaceCells, radii: FloatingArray) -> csr_matrix:
 def product(matrix: csr_matrix, table: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return the product (m, k) of a sparse matrix (m, n) and a table (n, k).
 
-    Threads, as many as the renderer uses, share the rows of a large product, or blocks of its
-    columns if the rows of the table that make one row of the result are too large for the
-    processor's cache. The result does not depend on their number. For a table in which most bins of
-    directions are empty, as those of few photons are, this takes half the time of a loop of Dr.Jit
-    on the same processors, which gathers numbers one by one.
+    Blocks of columns are multiplied one by one if the rows of the table that make one row of the
+    result are too large for the processor's cache. Threads, as many as the renderer uses, share the
+    blocks or the rows of a large product. The result does not depend on their number. For a table
+    in which most bins of directions are empty, as those of few photons are, this takes half the
+    time of a loop of Dr.Jit on the same processors, which gathers numbers one by one.
     """
     threads = min(dr.thread_count(), matrix.shape[0])
-    if threads < 2 or matrix.nnz * table.shape[1] < LEAST_SHARED_PRODUCT:
+    shared = threads > 1 and matrix.nnz * table.shape[1] >= LEAST_SHARED_PRODUCT
+    in_blocks = matrix.nnz / matrix.shape[0] * table.shape[1] * table.itemsize > CACHED_BYTES
+    if not (shared or in_blocks):
         return np.asarray(matrix @ table)
     out = np.empty((matrix.shape[0], table.shape[1]), dtype=np.float32)
 
@@ -290,7 +292,7 @@ def product(matrix: csr_matrix, table: NDArray[np.float32]) -> NDArray[np.float3
     def multiply_columns(columns: slice) -> None:
         out[:, columns] = matrix @ np.ascontiguousarray(table[:, columns])
 
-    if matrix.nnz / matrix.shape[0] * table.shape[1] * table.itemsize > CACHED_BYTES:
+    if in_blocks:
         work: Callable[[slice], None] = multiply_columns
         starts = np.append(np.arange(0, table.shape[1], BLOCK_COLUMNS), table.shape[1])
     else:
@@ -298,6 +300,6 @@ def product(matrix: csr_matrix, table: NDArray[np.float32]) -> NDArray[np.float3
         # Each thread gets about as many weights as the others.
         starts = np.searchsorted(matrix.indptr, np.linspace(0, matrix.nnz, threads + 1))
         starts[0], starts[-1] = 0, matrix.shape[0]
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads if shared else 1) as pool:
         list(pool.map(work, map(slice, starts[:-1], starts[1:])))
     return out
