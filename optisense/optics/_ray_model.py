@@ -14,7 +14,7 @@ from optisense.optics._skin_view import SkinView, ray_camera
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import keep_freed_memory
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.assembly import assemble
+from optisense.optics.scene.assembly import Assembly, assemble
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.sensor_scenes import SensorScenes
@@ -29,6 +29,12 @@ from optisense.optics.transport.chief_rays import (
 
 if TYPE_CHECKING:
     from optisense.optics.transport.ray_gradient import DifferentiableRays
+
+MOST_RECENT = 4
+"""Number of designs whose assemblies are kept for further models. They take a few MB each."""
+_recent: dict[str, Assembly] = {}
+"""The assemblies of the latest models, by the names of their designs. Another model of such a
+design, or of a similar one of that name, takes over the shapes that have the same meshes."""
 
 
 class RayModel:
@@ -66,11 +72,21 @@ class RayModel:
         keep_freed_memory()
         self.design = design.copy()
         known = None if before is None else before.scenes
-        shapes = None if known is None else known.assembly
-        assembly = assemble(self.design, shapes, self.bends_media)
+        assembly = self._assembled(None if known is None else known.assembly)
         self.scenes: SensorScenes = SensorScenes(assembly, self.design.coating, known)
         self._view = self.view_type(self.design, self.scenes)
         self._chain: PictureChain | None = None
+
+    def _assembled(self, before: Assembly | None) -> Assembly:
+        """Return the assembly of the design, with unchanged shapes of the one before."""
+        if self.bends_media:  # its shapes are approximate
+            return assemble(self.design, before, True)
+        name = self.design.name
+        assembly = assemble(self.design, _recent.pop(name, None) if before is None else before)
+        _recent[name] = assembly
+        while len(_recent) > MOST_RECENT:
+            del _recent[next(iter(_recent))]
+        return assembly
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
         """Adopt a design with its scenes and its view."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 from optisense import library
@@ -45,7 +46,16 @@ def build(name: str) -> SensorDesign:
     Raises:
         DesignError: there is no such sensor; the message suggests a similar name.
     """
-    return SENSORS.find(name)()
+    builder = SENSORS.find(name)
+    if builder.__module__.startswith("optisense.sensors."):
+        return _built(builder).copy()
+    return builder()
+
+
+@cache
+def _built(builder: Callable[[], SensorDesign]) -> SensorDesign:
+    """Return a sensor of this package, always the same one, so that its copies share its meshes."""
+    return builder()
 
 
 def load(name_or_folder: str | Path) -> SensorDesign:
