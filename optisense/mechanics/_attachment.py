@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from optisense.design import SensorDesign
 from optisense.design.parts import Role
 from optisense.errors import ContactError
@@ -43,6 +45,7 @@ def refuse_loose_gel(design: SensorDesign) -> None:
         )
 
 
+@lru_cache(maxsize=64)
 def _hold_each_other(gel: TriangleMesh, other: TriangleMesh) -> bool:
     if not boxes_overlap(gel, other, -GLUE):
         return False
