@@ -40,7 +40,6 @@ USUAL = (0.24, 1.0)
     draw=_figures.draw_aoap,
     beside=("coverage",),
     range=bounds,
-    needs=f"{LEAST_PIXELS} pixels that see the surface",
     rays_only=True,
     usual=USUAL,
     numbers=(

@@ -13,8 +13,6 @@ from optisense.array_types import FloatArray
 from optisense.objectives import _figures
 from optisense.objectives._reader import (
     CAMERA_NOISE,
-    LEAST_PIXELS,
-    LEAST_PRESSES,
     NUMBERS,
     ReadPress,
     pixels_to_read,
@@ -36,7 +34,6 @@ if TYPE_CHECKING:
     beside=("reading_nothing", "worst_place"),
     reads=pixels_to_read,
     range=(0.0, math.inf),
-    needs=f"{LEAST_PRESSES} presses or more, each seen, with {LEAST_PIXELS} pixels",
     unit="mm",
     lower_is_better=True,
     numbers=NUMBERS,

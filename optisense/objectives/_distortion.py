@@ -45,7 +45,6 @@ USUAL = (1.24, 1.01)
     draw=_figures.draw_distortion,
     beside=("area_variation",),
     range=(1.0, MOST_ANISOTROPY),
-    needs=f"{LEAST_FOOTPRINTS} footprints of pixels on the surface",
     lower_is_better=True,
     rays_only=True,
     usual=USUAL,

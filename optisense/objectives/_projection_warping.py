@@ -60,7 +60,6 @@ USUAL = (1.2, 60.0)
     draw=_figures.draw_projection_warping,
     beside=("mean_area",),
     range=(0.0, 1.0 / MOST_EVEN),
-    needs=f"{LEAST_TRIANGLES} triangles between pixels on the surface",
     rays_only=True,
     usual=USUAL,
     numbers=(

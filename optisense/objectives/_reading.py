@@ -9,8 +9,6 @@ import numpy as np
 from optisense.objectives import _figures
 from optisense.objectives._reader import (
     CAMERA_NOISE,
-    LEAST_PIXELS,
-    LEAST_PRESSES,
     NUMBERS,
     pixels_to_read,
     read_presses,
@@ -34,7 +32,6 @@ USUAL = (25.0, 2.8)
     beside=("reading_nothing", "worst_place"),
     reads=pixels_to_read,
     range=(0.0, 180.0),
-    needs=f"{LEAST_PRESSES} presses or more, each seen, with {LEAST_PIXELS} pixels",
     unit="degrees",
     lower_is_better=True,
     usual=USUAL,

@@ -31,7 +31,6 @@ and several times the noise of an image's light."""
     beside=COLOURS,
     reads=no_pixels,
     range=(0.0, 1.0),
-    needs="light on the skin beside the contacts",
     lower_is_better=True,
     numbers=COLOURS,
 )

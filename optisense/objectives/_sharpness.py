@@ -9,7 +9,7 @@ import numpy as np
 
 from optisense.design.lenses.film import PictureWindow
 from optisense.objectives import _figures
-from optisense.objectives._distortion import LEAST_FOOTPRINTS, seen_footprints
+from optisense.objectives._distortion import seen_footprints
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ USUAL = (0.27, 0.059)
     draw=_figures.draw_sharpness,
     beside=("pixel", "blur"),
     range=(0.0, math.inf),
-    needs=f"{LEAST_FOOTPRINTS} footprints of pixels on the surface",
     unit="mm",
     lower_is_better=True,
     rays_only=True,

@@ -30,7 +30,6 @@ COLOURS = ("red", "green", "blue")
     beside=COLOURS,
     reads=no_pixels,
     range=(0.0, 1.0),
-    needs="light on the skin",
     numbers=COLOURS,
 )
 def uniformity(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:

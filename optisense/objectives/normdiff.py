@@ -114,7 +114,6 @@ designs in docs/experiments.md."""
     beside=("theta_range", "phi_range"),
     reads=sample_shares,
     range=bounds,
-    needs=f"each press seen, with {LEAST_PIXELS} indented pixels",
     usual=USUAL,
     numbers=("theta_range", "phi_range"),
 )

@@ -71,8 +71,6 @@ class Objective:
             read.
         range: the lowest and the highest value that it can return, or a function of the settings
             (keyword arguments) that returns both; a value outside counts as a failure.
-        needs: description of the smallest data that it scores, in addition to the needs of every
-            score (`Settings.least_skin` and `Settings.least_picture`).
         unit: unit of the value, such as "mm"; empty for a plain number.
         lower_is_better: whether a lower value is better, as for an error. A search maximises the
             negative value of such an objective.
@@ -90,7 +88,6 @@ class Objective:
     beside: tuple[str, ...] = ()
     reads: Callable[..., Any] | None = None
     range: Range = UNBOUNDED
-    needs: str = ""
     unit: str = ""
     lower_is_better: bool = False
     rays_only: bool = False
@@ -193,7 +190,6 @@ def objective(
     beside: tuple[str, ...] = (),
     reads: Callable[..., Any] | None = None,
     range: Range = UNBOUNDED,
-    needs: str = "",
     unit: str = "",
     lower_is_better: bool = False,
     rays_only: bool = False,
@@ -210,7 +206,6 @@ def objective(
         reads: function that gives the pixels of a press that are read, if not all one by one (see
             `Objective`).
         range: the lowest and the highest value, as in `Objective`; any number by default.
-        needs: description of the smallest data that it scores.
         unit: unit of the value.
         lower_is_better: whether a lower value is better.
         rays_only: whether it traces chief rays only and needs no light.
@@ -231,7 +226,6 @@ def objective(
             beside,
             no_pixels if rays_only and reads is None else reads,
             range,
-            needs,
             unit,
             lower_is_better,
             rays_only,

@@ -84,7 +84,6 @@ docs/experiments.md, and DIGIT."""
     beside=("worst_line",),
     reads=on_lines,
     range=(0.0, 1.0),
-    needs=f"each press seen, with {LEAST_PIXELS} pixels on each line",
     usual=USUAL,
     numbers=("worst_line",),
 )

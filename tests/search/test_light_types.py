@@ -36,7 +36,7 @@ def drive(
     method = make("types", Problem(space, ("score",), budget, seed=1))
     tried = []
     while len(points := method.ask()):
-        stage = method.describe()["stage"]
+        stage = method.stage  # type: ignore[attr-defined]
         tried += [(stage, point) for point in points]
         method.tell(points, [Outcome({"score": score(point)}) for point in points])
     return tried

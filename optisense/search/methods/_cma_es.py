@@ -119,14 +119,6 @@ class CmaEs(Method):
         with self._own_randomness():
             self._strategy.tell(solutions, (-values).tolist())
 
-    def describe(self) -> dict[str, Any]:
-        """Return the spread of the current generation, the number of restarts, the population."""
-        return {
-            "sigma": float(self._strategy.sigma),
-            "restarts": self.restarted,
-            "population": self.population,
-        }
-
     def _most(self) -> int:
         """Return the largest population of a restart."""
         return min(MOST_POPULATION, self.problem.budget + self.problem.budget % 2)

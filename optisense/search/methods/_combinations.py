@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import islice, product
-from typing import Any
 
 import numpy as np
 
@@ -34,6 +33,7 @@ class Combinations(Method):
     Attributes:
         levels: coordinates that each parameter may take.
         size: number of combinations.
+        stage: name of the stage of the plan whose combinations were asked for last.
     """
 
     def __init__(self, problem: Problem, levels: Sequence[Sequence[float]]) -> None:
@@ -47,7 +47,7 @@ class Combinations(Method):
         self._left = problem.budget
         self._random = problem.random(self.name)
         self._stages = self.plan()
-        self._stage = ""
+        self.stage = ""
 
     @abstractmethod
     def plan(self) -> Iterator[Stage]:
@@ -60,7 +60,7 @@ class Combinations(Method):
             for stage, wanted in self._stages:
                 new = [each for each in dict.fromkeys(wanted) if each not in self._known]
                 if new:
-                    self._stage, self._asked = stage, new[: self._left]
+                    self.stage, self._asked = stage, new[: self._left]
                     self._left -= len(self._asked)
                     break
         return np.array(
@@ -75,10 +75,6 @@ class Combinations(Method):
         for key, outcome in zip(self._asked, outcomes, strict=True):
             rank = rank_of(outcome, self.problem.objectives[0])
             self._known[key] = FAILED if outcome.failed else rank
-
-    def describe(self) -> dict[str, Any]:
-        """Return the current stage under the key "stage"."""
-        return {"stage": self._stage}
 
     def everything(self, stage: str) -> Iterator[Stage]:
         """Yield all combinations; the last parameter changes fastest."""

@@ -9,7 +9,6 @@ parent and mutate to any other value.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,10 +88,6 @@ class Pareto(Method):
         rank = ranks(scores, broken)
         best = np.lexsort((-crowding(scores, rank), rank))[: self.population]
         self._genes, self._values, self._broken = everyone[best], scores[best], broken[best]
-
-    def describe(self) -> dict[str, Any]:
-        """Return the size of a generation."""
-        return {"population": self.population}
 
     def _offspring(self) -> FloatArray:
         rank = ranks(self._values, self._broken)

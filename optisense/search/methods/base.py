@@ -12,7 +12,7 @@ import zlib
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -93,10 +93,6 @@ class Method(ABC):
     def evaluator(self, usual: DesignEvaluator) -> Evaluator:
         """Return the evaluator of the points; a method with a faster or richer one overrides it."""
         return usual
-
-    def describe(self) -> dict[str, Any]:
-        """Return facts about the state for progress and reports, ready for JSON."""
-        return {}
 
     def notes(self) -> list[str]:
         """Return notes for the user at the end of the search."""

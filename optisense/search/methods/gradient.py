@@ -28,7 +28,6 @@ jumps, so that no gradient is valid.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -128,7 +127,6 @@ class Gradient(Method):
         span = self.space.upper - self.space.lower
         self._start_unit = np.clip((self.space.start - self.space.lower) / span, 0.0, 1.0)
         self._known: dict[bytes, Outcome] = {}
-        self._message = ""
         self._region: FeasibleRegion | None = None
         self._places: dict[bytes, FeasiblePoint] = {}
 
@@ -256,7 +254,7 @@ class Gradient(Method):
                 best, at = value, placed.point
             return -value, -placed.along(gradient)
 
-        found = minimize(
+        minimize(
             downhill,
             start,
             jac=True,
@@ -269,7 +267,6 @@ class Gradient(Method):
                 "maxfun": 100_000,
             },
         )
-        self._message = str(found.message)
         return best, at
 
     def _around(self, point: FloatArray) -> LocalValues | None:
@@ -313,27 +310,15 @@ class Gradient(Method):
         for vector, outcome in zip(vectors, outcomes, strict=True):
             self._known[np.asarray(vector, dtype=np.float64).tobytes()] = outcome
 
-    def describe(self) -> dict[str, Any]:
-        """Return the number of known gradients, of those made of differences, of those that were
-        checked and are invalid because the score has jumps, and the reason why the ascent ended.
-        """
-        found = [o.parts[self.objective] for o in self._known.values() if o.gradient is not None]
-        checked = [parts for parts in found if GRADIENT_HOLDS in parts]
-        unsteady = [parts for parts in checked if not parts[GRADIENT_HOLDS]]
-        return {
-            "slopes": len(found),
-            "by_differences": sum(parts[GRADIENT_BY] == DIFFERENCES for parts in found),
-            "checked": len(checked),
-            "unsteady": len(unsteady),
-            "unsteady_by_rays": sum(parts[GRADIENT_BY] == RAYS for parts in unsteady),
-            "ended": self._message,
-        }
-
     def notes(self) -> list[str]:
         """Return notes on where gradients are differences, where scores have none, and why."""
-        facts = self.describe()
+        found = [o.parts[self.objective] for o in self._known.values() if o.gradient is not None]
+        by_differences = sum(parts[GRADIENT_BY] == DIFFERENCES for parts in found)
+        checked = [parts for parts in found if GRADIENT_HOLDS in parts]
+        unsteady = [parts for parts in checked if not parts[GRADIENT_HOLDS]]
+        by_rays = sum(parts[GRADIENT_BY] == RAYS for parts in unsteady)
         notes = []
-        if facts["by_differences"]:
+        if by_differences:
             why = (
                 f"with at most {FEW_PARAMETERS} parameters they cost no more than ray derivatives"
                 if self.space.size <= FEW_PARAMETERS
@@ -341,18 +326,18 @@ class Gradient(Method):
                 "none"
             )
             notes.append(
-                f"the gradients at {facts['by_differences']} of {facts['slopes']} points are "
+                f"the gradients at {by_differences} of {len(found)} points are "
                 f"differences of scores over {STEP:.0%} of the ranges: {why}"
             )
-        if facts["unsteady"]:
+        if unsteady:
             notes.append(
-                f"{self.objective} has no steady derivative at {facts['unsteady']} of "
-                f"{facts['checked']} points where that was checked: its rate of change over "
+                f"{self.objective} has no steady derivative at {len(unsteady)} of "
+                f"{len(checked)} points where that was checked: its rate of change over "
                 f"{STEP / 2:.1%} of the ranges is more than {TOLERANCE:.0%} off that over "
                 f"{STEP:.0%}, because rows of pixels or triangles come into view at once, an edge "
                 "reaches the picture's border, or single rays change their path. The "
-                f"gradients used there ({facts['unsteady_by_rays']} of the smoothed score, by "
-                f"rays; {facts['unsteady'] - facts['unsteady_by_rays']} by differences) show the "
+                f"gradients used there ({by_rays} of the smoothed score, by "
+                f"rays; {len(unsteady) - by_rays} by differences) show the "
                 "direction of ascent only roughly; --method cma-es needs no gradient"
             )
         return notes

@@ -284,7 +284,6 @@ class StudyRun:
                 start=tally.start,
                 trials_per_hour=self._trials_an_hour,
                 seconds_left=self._time_left.seconds_left,
-                facts=self.method.describe(),
                 doing=self._doing,
             )
         )

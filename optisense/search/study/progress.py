@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
 
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
@@ -34,7 +33,6 @@ class SearchProgress:
         start: score of the start.
         trials_per_hour: rate of the last trials; 0 before it is known.
         seconds_left: time until the end of the stage, s; NaN if not known yet.
-        facts: facts that the method reports about its state.
         doing: stage of the current trial, if it is scored in this process.
     """
 
@@ -46,7 +44,6 @@ class SearchProgress:
     start: float
     trials_per_hour: float
     seconds_left: float
-    facts: dict[str, Any] = field(default_factory=dict)
     doing: str = ""
     broken: int = 0
     nearest: str = ""
