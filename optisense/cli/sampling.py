@@ -46,12 +46,14 @@ def sample_progress(
         model: model of the sensor, which reports the progress of its light.
         after: text of the work after the samples.
     """
+    from optisense.optics.backend.stages import Stage
+
     line.begin(f"{name}: tracing light")
     first: list[int] = []
     in_light = True
 
     def light(progress: RenderProgress) -> None:
-        if in_light:
+        if in_light and progress.stage is not Stage.DONE:
             line.advance(progress.fraction)
             line.say(f"{name}: {progress.stage.value}")
 

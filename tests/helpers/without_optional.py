@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 
-OPTIONAL = ("OCP", "dask", "distributed", "lxml", "networkx", "pyarrow", "pyluxcore", "pyte")
+OPTIONAL = ("OCP", "dask", "distributed", "lxml", "networkx", "pyarrow", "pyluxcore")
 """Top-level modules of the extras `step`, `parquet`, `dask` and `bench`, and of the tests' own
 readers."""
 
