@@ -133,7 +133,5 @@ def average_pixels(
             if values.any():
                 mean = around(values * counts) * share
                 if deblurred:
-                    mean = 2 * mean - around(mean * counts) * share
-                    if not __import__("os").environ.get("REACH"):
-                        mean = np.maximum(mean, 0)
+                    mean = np.maximum(2 * mean - around(mean * counts) * share, 0)
                 layer[*part, k] = np.where(where, mean, values)
