@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import mitsuba as mi
 import numpy as np
 import pytest
 
+from benchmarks.light_tracing import FilmMap
 from benchmarks.patch_references import ray_offset_shift
 from benchmarks.patches import PatchCase, compare
 from optisense import OpticalModel
@@ -43,3 +45,17 @@ def test_the_path_tracer_sees_the_skin_behind_mirrors_shifted(sensor: str, shift
     model = OpticalModel(case.design(), "llvm")
     seen = model.chief_rays(case.resolution, [case.contact(model)], "conforming").contact_mask
     assert ray_offset_shift(model, seen) == pytest.approx((shift, 0.0), abs=0.002)
+
+
+def test_light_tracing_keeps_the_photons_on_the_tip_of_a_ball() -> None:
+    case = PatchCase("gelsight-mini-ideal-cylindrical", 0.0, depth=0.3)
+    model = OpticalModel(case.design(), "llvm")
+    contact = case.contact(model)
+    rays = model.chief_rays(case.resolution, [contact], "conforming")
+    points = rays.points[case.reference(model).window].reshape(-1, 3)
+    vertices = model.place(contact).vertices
+    tip = vertices[vertices[:, 2].argmin()]
+    # The tip lies between the points that the middles of pixels see, beyond all of them.
+    assert tip[2] < points[:, 2].min() - 0.001
+    film = FilmMap.fit(points, np.zeros((len(points), 2)))
+    assert all(film.contains(mi.Point3f(*map(float, tip))))
