@@ -135,6 +135,11 @@ def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
         except typer.Exit:
             raise
         except Exception as error:
+            # Compiled packages return with Ctrl-C still to be raised, of which Python makes another
+            # error.
+            if isinstance(error.__cause__, KeyboardInterrupt):
+                messages.print("interrupted")
+                raise typer.Exit(EXIT_INTERRUPTED) from None
             # Typer prints usage errors itself; every other error is a defect.
             if type(error).__module__.split(".")[0] in ("click", "typer"):
                 raise

@@ -79,6 +79,25 @@ stopping.install_handlers()
 run_and_leave(app)
 """
 
+RETURNING = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from optisense.cli import stopping
+from optisense.cli.console import handles_errors
+from optisense.cli.leaving import run_and_leave
+import typer
+
+app = typer.Typer(add_completion=False)
+
+@app.command()
+@handles_errors
+def import_a_package():
+    raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+stopping.install_handlers()
+run_and_leave(app)
+"""
+
 LEAVING = """
 import atexit, signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -200,6 +219,13 @@ def test_sigterm_amid_an_import_is_not_lost_where_ctrl_c_is_ignored() -> None:
     child = ended(in_the_background(program))
     assert child.stderr == "interrupted\n"
     assert child.returncode == 143
+
+
+def test_ctrl_c_that_compiled_code_did_not_raise_ends_the_command_in_a_word() -> None:
+    """As Python reports it for a compiled function that returned although Ctrl-C was pressed."""
+    child = ended(RETURNING)
+    assert child.stderr == "interrupted\n"
+    assert child.returncode == 130
 
 
 def test_ctrl_c_in_code_that_is_executed_gives_the_usual_code() -> None:
