@@ -10,6 +10,7 @@ from optisense.optics.radiance_cache._irradiance import vector_sum
 from optisense.optics.radiance_cache.angular_variance import (
     angular_variance,
     broadened_coating,
+    coating_with_broadened_tail,
     sample_direction,
 )
 from optisense.optics.radiance_cache.beams import Beams
@@ -28,19 +29,21 @@ def sum_beams(
     beams: Beams,
     groups: int,
     at: ShadingPoints,
+    axis: mi.Vector3f,
 ) -> list[mi.Color3f]:
     """Return the radiance (3, n) towards the camera due to all beams, for points on the undeformed
     surface, for each light group.
+
+    Args:
+        axis: unit vector, the axis of the direction bins.
     """
     totals = [mi.Color3f(0) for _ in range(groups)]
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
-    while dr.hint(j < end, exclude=[beams, groups, at, end]):
+    while dr.hint(j < end, exclude=[beams, groups, at, end, axis]):
         towards, cosine, flux, tag = beam_at(beams, j)
         group = tag & GROUP_MASK
-        reflected = flux * evaluate_coating(
-            broadened_coating(at.coating, cosine), at.seen.normal, towards, at.seen.towards_eye
-        )
+        reflected = flux * _reflected(beams, j, at, axis, towards, cosine)
         for g in range(groups):
             totals[g] += dr.select(group == g, reflected, 0)
         j += 1
@@ -97,9 +100,7 @@ def sum_hidden(
     ):
         towards, cosine, flux, tag = beam_at(beams, j)
         group = tag & GROUP_MASK
-        reflected = flux * evaluate_coating(
-            broadened_coating(at.coating, cosine), at.seen.normal, towards, at.seen.towards_eye
-        )
+        reflected = flux * _reflected(beams, j, at, axis, towards, cosine)
         step = mi.Float(MIN_STEP)
         for g in range(groups):
             step = dr.select(group == g, steps[g], step)
@@ -136,6 +137,26 @@ def sum_hidden(
             times -= 1
         j += 1
     return hidden
+
+
+def _reflected(
+    beams: Beams,
+    number: mi.UInt32,
+    at: ShadingPoints,
+    axis: mi.Vector3f,
+    towards: mi.Vector3f,
+    cosine: mi.Float,
+) -> mi.Color3f:
+    """Return the radiance (3, n) that coatings reflect towards the camera of beams of unit flux
+    density.
+    """
+    if at.coating.only_tail:
+        height = dr.gather(mi.Float, beams.heights, number)
+        light = angular_variance(axis, towards, cosine, height)
+        coating = coating_with_broadened_tail(at.coating, light, cosine)
+    else:
+        coating = broadened_coating(at.coating, cosine)
+    return evaluate_coating(coating, at.seen.normal, towards, at.seen.towards_eye)
 
 
 def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:

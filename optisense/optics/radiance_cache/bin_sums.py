@@ -16,6 +16,7 @@ from optisense.optics.radiance_cache.angular_variance import (
     AngularVariance,
     angular_variance,
     broadened_coating,
+    coating_with_broadened_tail,
     cosine_half_width,
     mean_direction,
     mirrored_above,
@@ -189,6 +190,11 @@ def _reflected(
         coating = broadened_coating(at.coating, mean_cosine)
         return evaluate_coating(coating, points.normal, towards, points.towards_eye, half_width)
 
+    if at.coating.only_tail:
+        coating = coating_with_broadened_tail(at.coating, beam, cosine)
+        return evaluate_coating(
+            coating, points.normal, beam.towards, points.towards_eye, half_width
+        )
     if not light.narrow_lobes:
         return of_disc(beam.towards, cosine)
     one, other, within = two_discs(beam)

@@ -30,6 +30,7 @@ from optisense.optics.radiance_cache.shading_points import ShadingPoints, interp
 from optisense.optics.scene.bsdf import coating_of, sample_coating, surface_kind, surface_region
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
+from optisense.optics.scene.surface_cells import bin_axis
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, follow, generator
 from optisense.optics.transport.interact import RayKind
@@ -154,7 +155,8 @@ def _radiance_differences(
     )
     coating = coating_of(scenes.full.table, behind.surface, behind.valid)
     flat = ShadingPoints(skin, coating, base, cell, shift, found & behind.valid, mi.Bool(False))
-    without = sum_beams(cache.beams, cache.binned.groups, flat)
+    axis = bin_axis(cache.binned.cells, 2)
+    without = sum_beams(cache.beams, cache.binned.groups, flat, axis)
     places = shading_points(cache, scenes, SecondaryHits(seen, mi.Bool(seen.valid), cell))
     lit = light_of(cache, scenes, places)
     if cache.binned.narrow_lobes:

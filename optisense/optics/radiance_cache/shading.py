@@ -156,9 +156,10 @@ def shade(
     coating.only_tail = cache.traced_lobes
     at = ShadingPoints(points, coating, start, cell, shift, active, mi.Bool(False))
     indenters = scenes.indenters
+    axis = bin_axis(cache.binned.cells, 2)
     totals: list[mi.Color3f]
     if cache.metallic or cache.binned.coloured:
-        totals = sum_beams(cache.beams, cache.binned.groups, at)
+        totals = sum_beams(cache.beams, cache.binned.groups, at, axis)
     else:
         totals = [mi.Color3f(0) for _ in range(cache.binned.groups)]
         for k in range(effort.cells):
@@ -174,7 +175,6 @@ def shade(
         return totals
     rays = REFLECTED_SHADOW_RAYS if reflected else effort.shadow_rays
     shadow_rays = dr.opaque(mi.Float, rays)
-    axis = bin_axis(cache.binned.cells, 2)
     hidden = sum_hidden(culled_beams, totals, indenters, at, axis, shadow_rays)
     # Where all light is occluded, rounding may make the sum of the shares exceed the total.
     return [dr.maximum(one - other, 0) for one, other in zip(totals, hidden, strict=True)]

@@ -35,7 +35,7 @@ from optisense.optics.scene.bsdf import (
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
-from optisense.optics.scene.surface_cells import cell_at
+from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, follow, generator
 from optisense.optics.transport.interact import RayKind
@@ -256,7 +256,7 @@ class LobeTracer:
         at = ShadingPoints(
             points, coating, flat.point, cell, mi.Vector3f(0), mi.Bool(flat.valid), mi.Bool(False)
         )
-        sums = sum_beams(self.cache.beams, light.groups, at)
+        sums = sum_beams(self.cache.beams, light.groups, at, bin_axis(light.cells, 2))
         self._add(found, [each * flat.weight / share for each in sums], lane, flat.valid)
         return on_skin
 
