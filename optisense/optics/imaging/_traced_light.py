@@ -46,9 +46,14 @@ BESIDE_RANGE = 0.1
 """Distance from contacts as a fraction of the image width: 2 mm on GelSight Mini. The interfaces
 and the skin mirror contacts to the skin within it."""
 SKIN_RAYS = 0.4
-"""Number of rays from all other pixels that see the skin for each photon of the cache. Nineteen of
-twenty leave GelSight Mini through the glass, so that each takes a third of the time of a ray from a
-contact."""
+"""Number of rays in one pass from all other pixels that see the skin for each photon of the
+cache."""
+SKIN_SEGMENTS = 1.0
+"""Number of segments of these rays for each photon, up to which there are further passes. On
+GelSight Mini, nineteen of twenty rays leave through the glass, so that three passes take a third of
+the time of the one pass on GelSight Svelte, whose mirrors return most rays."""
+MOST_PASSES = 4
+"""Largest number of these passes."""
 CONTACT_REACH = 1
 """Distance (pixels) in rows and columns up to which pixels in contacts share their rays. In a
 contact of GelSight Mini at 160x120 pixels, this reduces the noise of pixels from 21 to 16 %. A
@@ -81,12 +86,15 @@ class LobeSamples:
         count: number of camera samples of each pixel.
         directions: number of rays from each sample.
         reach: distance (pixels) in rows and columns up to which they share their rays.
+        segments: number of segments of rays, from coating to coating, up to which there are further
+            passes; 0 for one pass.
     """
 
     pixels: NDArray[np.bool_]
     count: int
     directions: int
     reach: int = 0
+    segments: float = 0
 
     @classmethod
     def of_contacts(cls, pixels: NDArray[np.bool_], count: int, rays: float) -> LobeSamples:
@@ -94,9 +102,9 @@ class LobeSamples:
         return cls(pixels, count, _directions(rays, pixels, count), CONTACT_REACH)
 
     @classmethod
-    def of_skin(cls, pixels: NDArray[np.bool_], rays: float) -> LobeSamples:
+    def of_skin(cls, pixels: NDArray[np.bool_], rays: float, segments: float = 0) -> LobeSamples:
         """Return the samples of pixels outside contacts, which draw a number of rays together."""
-        return cls(pixels, 1, _directions(rays, pixels, 1))
+        return cls(pixels, 1, _directions(rays, pixels, 1), segments=segments)
 
 
 def _directions(rays: float, pixels: NDArray[np.bool_], count: int) -> int:
@@ -126,7 +134,7 @@ def lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> lis
     hit = regions.rays.hit
     samples = [
         LobeSamples.of_skin(beside & hit, BESIDE_RAYS * photons),
-        LobeSamples.of_skin(~(inside | beside) & hit, SKIN_RAYS * photons),
+        LobeSamples.of_skin(~(inside | beside) & hit, SKIN_RAYS * photons, SKIN_SEGMENTS * photons),
         LobeSamples(~(inside | hit), count=1, directions=1),
     ]
     if tiers:
@@ -157,32 +165,15 @@ def traced_layers(
     """
     width, height = camera.width, camera.height
     film = Film(width * height, cache.binned.groups)
-    lamps = lamp_radiance(emitters)
+    image = _Image(cache, scenes, camera, lamp_radiance(emitters), film, seed)
     for each in samples:
         if not each.pixels.any():
             continue
-        pixel, number = repeated(each.pixels, each.count)
-        count = dr.opaque(mi.UInt32, each.count, dr.width(pixel))
-        dr.eval(pixel, number, count)
-        film.count(pixel)
-        spots = film_samples(pixel, width, number, seed_of(seed, 3), count)
-        for channel in scenes.full.channels:
-            points, mirrored = find_visible_points(
-                scenes.full, camera, pixel, number, spots, seed_of(seed, 13), channel=channel
-            )
-            tracer = LobeTracer(cache, scenes, lamps, channel)
-            rays = tracer.trace(points, each.directions)
-            if each.reach > 0:
-                seen = _Seen.of(points, scenes.full.table, each.pixels)
-                _add_shared(film, rays, seen, each.reach, 1 / each.directions)
-            else:
-                _add_own(film, rays, points, scenes.full.table, 1 / each.directions)
-            dr.eval(film.sums)
-            if mirrored is not None:
-                directions = max(1, round(MIRRORED_SHARE * each.directions))
-                rays = tracer.trace(mirrored, directions)
-                _add_own(film, rays, mirrored, scenes.full.table, 1 / directions)
-                dr.eval(film.sums)
+        segments = 0
+        for number in range(MOST_PASSES):
+            segments += image.add(each, number)
+            if segments >= each.segments:
+                break
     layers = film.layers(width, height)
     reach = round(SKIN_WIDTH * width) | 1
     for region, spread in smooth:
@@ -191,6 +182,54 @@ def traced_layers(
                 layers = without_specks(layers, np.zeros_like(region), region, SKIN_SPECK_WIDTH)
             average_pixels(layers, region.astype(np.float32), region, reach, False)
     return layers
+
+
+@dataclass(frozen=True)
+class _Image:
+    """An image to whose film the light of rays is added; the arguments of `traced_layers`."""
+
+    cache: RadianceCache
+    scenes: ContactScenes
+    camera: RayCamera
+    lamps: tuple[mi.Float, mi.UInt32]
+    film: Film
+    seed: int
+
+    def add(self, samples: LobeSamples, earlier: int) -> int:
+        """Add one pass of samples, and return the number of segments of the rays that start there.
+
+        Args:
+            earlier: number of earlier passes.
+        """
+        scene, film, seed = self.scenes.full, self.film, self.seed
+        pixel, number = repeated(samples.pixels, samples.count)
+        number += dr.opaque(mi.UInt32, earlier * samples.count)
+        # The samples of several passes are spread over the pixel without a known number.
+        known = samples.segments == 0
+        count = dr.opaque(mi.UInt32, samples.count, dr.width(pixel)) if known else None
+        dr.eval(pixel, number, count)
+        film.count(pixel)
+        spots = film_samples(pixel, self.camera.width, number, seed_of(seed, 3), count)
+        segments = 0
+        for channel in scene.channels:
+            points, mirrored = find_visible_points(
+                scene, self.camera, pixel, number, spots, seed_of(seed, 13), channel=channel
+            )
+            tracer = LobeTracer(self.cache, self.scenes, self.lamps, channel)
+            rays = tracer.trace(points, samples.directions)
+            segments += rays.segments
+            if samples.reach > 0:
+                seen = _Seen.of(points, scene.table, samples.pixels)
+                _add_shared(film, rays, seen, samples.reach, 1 / samples.directions)
+            else:
+                _add_own(film, rays, points, scene.table, 1 / samples.directions)
+            dr.eval(film.sums)
+            if mirrored is not None:
+                directions = max(1, round(MIRRORED_SHARE * samples.directions))
+                rays = tracer.trace(mirrored, directions)
+                _add_own(film, rays, mirrored, scene.table, 1 / directions)
+                dr.eval(film.sums)
+        return segments
 
 
 def _lit_rays(rays: LobeRays, groups: int) -> mi.UInt32:

@@ -73,6 +73,7 @@ class LobeRays:
         light: radiance, 1/(mm^2 sr) for lights of 1 mW, that arrives along each ray: three channels
             of each light group, (3 groups n,).
         distance: (n,) length (mm) of the way to the first lamp or coating.
+        segments: number of all segments of rays from coating to coating.
     """
 
     owner: mi.UInt32
@@ -81,6 +82,7 @@ class LobeRays:
     whole: mi.Bool
     light: mi.Float
     distance: mi.Float
+    segments: int = 0
 
 
 @dataclass(frozen=True)
@@ -171,6 +173,7 @@ class LobeTracer:
                 ray.absorption = mi.Color3f(0) if clear else self.scenes.absorption
             if self.channel is not None:
                 ray.channel = dr.opaque(mi.UInt32, self.channel, dr.width(lane))
+            found.segments += dr.width(lane)
             end, _, _ = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION)
             dr.eval(end)
             if reflections == 0:
