@@ -26,6 +26,7 @@ from optisense.optics.imaging._density_estimation import build_grid, estimate_ra
 from optisense.optics.imaging._film import Film
 from optisense.optics.scene.bsdf import coating_of, evaluate_coating
 from optisense.optics.scene.emitters import EmitterTable
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surface_cells import build_cells, cells_near
 from optisense.optics.transport.camera_paths import (
@@ -261,5 +262,5 @@ def _reflected(
     grid = build_grid(photons, *scene.bounds, REFLECTED_RADIUS)
     radius = dr.opaque(mi.Float, REFLECTED_RADIUS)
     image.add(points, estimate_radiance(grid, scene.table, points, radius, table.groups))
-    image.add_light(points, table.emitters)
+    image.add_light(points, LampWindows.of(table.emitters))
     return image.layers(width, height)

@@ -149,7 +149,7 @@ class OpticalModel(RayModel):
         if self._lamps is None:
             scenes = self.scenes
             groups = scenes.emitter_table.groups
-            self._lamps = LampImages(scenes.full, scenes.assembly.emitters, groups)
+            self._lamps = LampImages(scenes.full, scenes.lamp_windows, groups)
         return self._lamps
 
     def guide(self) -> EmissionGuide:
@@ -233,7 +233,7 @@ class OpticalModel(RayModel):
                 view.scenes,
                 camera,
                 view.rays,
-                store.emitters,
+                self.scenes.lamp_windows,
                 seed,
                 SamplingPlan(only_contacts, pixel_importance, self.is_draft),
                 view.known if self.is_draft else None,

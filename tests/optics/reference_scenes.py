@@ -26,6 +26,7 @@ from optisense.optics.scene.emitters import (
     EmitterTable,
     emitter_table,
 )
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
@@ -106,7 +107,9 @@ class ReferenceScene:
         )
         fixed = RayScene([self.pieces[i] for i in opaque], opaque, scene.table)
         scenes = ContactScenes(scene, fixed, None, mi.Float())
-        layers = render_cached(light, scenes, self.camera, rays, self.emitters, seed)
+        layers = render_cached(
+            light, scenes, self.camera, rays, LampWindows.of(self.emitters), seed
+        )
         return self._scaled(layers.radiance)
 
     def path(self, samples: int, seed: int = 0, max_depth: int = PATH_DEPTH) -> FloatArray:

@@ -7,10 +7,13 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
+from optisense.design.emitters import Intensity
+from optisense.optics.backend.sequences import sequence_4d
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film
 from optisense.optics.scene.assembly import window
-from optisense.optics.scene.emitters import Emitter, EmitterShape
+from optisense.optics.scene.emitters import Emitter, EmitterShape, emit, emitter_table
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import find_visible_points
 
@@ -20,14 +23,30 @@ PIXELS = 256
 """Width and height of the image."""
 FOV = 10.0
 """Field of view, degrees; the lamp fills two thirds of it."""
+PHOTONS = 200_000
+SHARE_ERROR = 0.002
+"""Largest error of the share of a part: its largest share is 0.05, which the samples give with a
+noise of 0.0005, and the inverse tables that photons are drawn from are linear between cells."""
+LOPSIDED = Intensity(
+    np.array([0.0, 20.0, 45.0, 80.0]),
+    np.array([0.0, 90.0, 180.0, 270.0, 360.0]),
+    np.array([[5, 6, 3, 0.2], [5, 2, 4, 0.5], [5, 7, 1, 0.1], [5, 3, 2, 1], [5, 6, 3, 0.2]]),
+)
 NOISE = 0.005
 """Relative error of an area that is counted in pixels, some 20,000 of them."""
 
 
 @pytest.mark.parametrize("shape", [EmitterShape.RECTANGLE, EmitterShape.DISC])
-def test_a_window_sends_its_power_to_a_distant_camera(shape: EmitterShape) -> None:
-    """A Lambertian lamp of 1 mW has a radiant intensity of 1/pi mW/sr along its axis."""
-    lamp = Emitter(0, (0, 0, DISTANCE), (0, 0, -1), (0, 1, 0), shape, (2.4, 2.4))
+@pytest.mark.parametrize("exponent", [1.0, 4.0])
+@pytest.mark.parametrize("turned", [0.0, 0.6])
+def test_a_window_sends_its_power_to_a_distant_camera(
+    shape: EmitterShape, exponent: float, turned: float
+) -> None:
+    """A lamp of 1 mW with a profile cos^m has a radiant intensity of (m + 1) / (2 pi) cos^m
+    mW/sr; ``turned`` is the angle (radians) of its axis with the direction to the camera.
+    """
+    axis = (0.0, float(np.sin(turned)), -float(np.cos(turned)))
+    lamp = Emitter(0, (0, 0, DISTANCE), axis, (1, 0, 0), shape, (2.4, 2.4), exponent)
     scene = RayScene([window(0, lamp)])
     camera = RayCamera((0, 0, 0), (0, 0, 1), (0, 1, 0), FOV, PIXELS, PIXELS)
     pixel = dr.arange(mi.UInt32, PIXELS * PIXELS)
@@ -37,7 +56,41 @@ def test_a_window_sends_its_power_to_a_distant_camera(shape: EmitterShape) -> No
     )
     film = Film(PIXELS * PIXELS, 1)
     film.count(pixel)
-    film.add_light(points, [lamp])
+    film.add_light(points, LampWindows.of([lamp]))
     radiance = film.layers(PIXELS, PIXELS)[0, ..., 0]
     side = 2 * np.tan(np.radians(FOV / 2)) / PIXELS
-    assert radiance.sum() * side**2 * DISTANCE**2 == pytest.approx(1 / np.pi, rel=NOISE)
+    intensity = (exponent + 1) / (2 * np.pi) * np.cos(turned) ** exponent
+    assert radiance.sum() * side**2 * DISTANCE**2 == pytest.approx(intensity, rel=NOISE)
+
+
+def test_a_tabulated_window_shows_the_light_that_photons_carry_away() -> None:
+    """Shares of the power in 48 parts of the hemisphere: of drawn photons, and of the radiance
+    times the projected area. A second lamp has another profile and another group.
+    """
+    size = (2.0, 0.5)
+    first = Emitter(1, (0, 0, 0), (0, 0, 1), (0, 1, 0), EmitterShape.RECTANGLE, size)
+    lamp = Emitter(
+        2, (1, 2, 3), (0.2, 0.1, 1), (0, 1, 0.3), EmitterShape.RECTANGLE, size, intensity=LOPSIDED
+    )
+    table = emitter_table([first, lamp], 3)
+    u = sequence_4d(dr.arange(mi.UInt32, PHOTONS), mi.UInt32(1), mi.UInt32(1))
+    places = mi.Point2f(u[0], u[1]), mi.Point2f(u[2], u[3])
+    _, ways, _ = emit(table, mi.UInt32(1), *places)
+    width, height, axis = lamp.frame
+    polar, turn = (np.arange(600) + 0.5) * np.pi / 1200, (np.arange(720) + 0.5) * np.pi / 360
+    theta, phi = (each.ravel() for each in np.meshgrid(polar, turn, indexing="ij"))
+    sine = np.sin(theta)
+    grid = np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)]).T @ lamp.frame
+    radiance, group, lit = LampWindows.of([first, lamp]).radiance(mi.UInt32(2), mi.Vector3f(grid.T))
+    assert np.all(np.asarray(lit)) and np.all(np.asarray(group) == 2)
+    power = np.asarray(radiance) * np.cos(theta) * lamp.window_area * sine
+    power *= (np.pi / 1200) * (np.pi / 360)
+
+    def shares(directions: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        x, y, z = directions @ width, directions @ height, directions @ axis
+        limits = [np.linspace(0, np.pi / 2, 7), np.linspace(-np.pi, np.pi, 9)]
+        return np.histogram2d(np.arccos(z), np.arctan2(y, x), limits, weights=weights)[0]
+
+    drawn = shares(np.asarray(ways).T, np.full(PHOTONS, 1 / PHOTONS))
+    assert drawn == pytest.approx(shares(grid, power), abs=SHARE_ERROR)
+    assert power.sum() == pytest.approx(1.0, abs=SHARE_ERROR)

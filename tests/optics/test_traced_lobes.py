@@ -19,7 +19,7 @@ NOISE = 0.03
 """Relative error of the mean of a contact: three times its noise with 300,000 photons."""
 
 
-def test_peaks_of_narrow_lobes_are_traced_to_lambertian_windows() -> None:
+def test_peaks_of_narrow_lobes_are_traced_to_windows() -> None:
     scenes = ots.OpticalModel(METAL).scenes
     lit = LitScene.of(scenes)
     assert lit.traced_lobes and lit.roughness == TAIL_ROUGHNESS
@@ -27,8 +27,9 @@ def test_peaks_of_narrow_lobes_are_traced_to_lambertian_windows() -> None:
     broader = ots.OpticalModel(ots.set_value(METAL, "coating.specularity", 0.8)).scenes
     assert not LitScene.of(broader).traced_lobes
     lamp, *others = scenes.assembly.emitters
-    beamed = replace(scenes.assembly, emitters=[replace(lamp, exponent=3.0), *others])
-    assert not LitScene.of(SensorScenes(beamed, METAL.coating)).traced_lobes
+    for change, traced in (({"exponent": 3.0}, True), ({"size": (0.0, 0.0)}, False)):
+        changed = replace(scenes.assembly, emitters=[replace(lamp, **change), *others])
+        assert LitScene.of(SensorScenes(changed, METAL.coating)).traced_lobes == traced
 
 
 def test_shared_rays_change_no_mean(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.radiance_cache.tracing_limits import TracingLimits
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.emitters import Emitter, EmitterShape, emitter_table
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface
 from optisense.optics.transport.chief_rays import ChiefRays, trace_chief_rays
@@ -115,7 +116,9 @@ def picture(
     guide = rays if guided_by is None else trace_chief_rays(full, guided_by)
     light = store(fixed, LAMP, guide.points[guide.hit])
     cache = light.radiance_cache(0, TracingLimits(photons), lambda *told: None)
-    return render_cached(cache, scenes, camera, rays, [LAMP], 0).radiance[0, ..., 0], rays
+    return render_cached(cache, scenes, camera, rays, LampWindows.of([LAMP]), 0).radiance[
+        0, ..., 0
+    ], rays
 
 
 @pytest.mark.parametrize("camera", [CAMERA, OBLIQUE])

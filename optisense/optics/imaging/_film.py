@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from optisense.optics.backend.arrays import padded
-from optisense.optics.scene.emitters import Emitter, lamp_radiance
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.transport.camera_paths import VisiblePoints
 
 REFERENCE_WIDTH = 320
@@ -47,14 +47,9 @@ class Film:
             for k in range(3):
                 dr.scatter_add(total, weighted[k], points.pixel * 3 + k, points.valid)
 
-    def add_light(self, points: VisiblePoints, emitters: list[Emitter]) -> None:
-        """Add the windows of flat lights that are seen directly; a Lambertian window of 1 mW and
-        area A (that of the face that rays meet) has radiance 1 / (pi A).
-        """
-        values, groups = lamp_radiance(emitters)
-        seen = points.light > 0
-        value = dr.gather(mi.Float, values, points.light, seen)
-        group = dr.gather(mi.UInt32, groups, points.light, seen)
+    def add_light(self, points: VisiblePoints, lamps: LampWindows) -> None:
+        """Add the windows of lamps that are seen directly."""
+        value, group, seen = lamps.radiance(points.light, points.towards_eye)
         for number, total in enumerate(self.sums):
             for k in range(3):
                 dr.scatter_add(

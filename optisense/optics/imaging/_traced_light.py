@@ -26,7 +26,7 @@ from optisense.optics.scene.bsdf import (
     peak_share,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.emitters import Emitter, lamp_radiance
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.transport.camera_paths import (
     VisiblePoints,
     film_samples,
@@ -146,7 +146,7 @@ def traced_layers(
     cache: RadianceCache,
     scenes: ContactScenes,
     camera: RayCamera,
-    emitters: list[Emitter],
+    lamps: LampWindows,
     samples: list[LobeSamples],
     smooth: list[tuple[NDArray[np.bool_], bool]],
     seed: int,
@@ -157,7 +157,7 @@ def traced_layers(
     Args:
         cache: the radiance cache, which holds the light in the tails of these lobes.
         scenes: the scenes of the image.
-        emitters: the lights.
+        lamps: the windows of the lights.
         samples: the samples of the image.
         smooth: masks (h, w) of regions in each of which the light is averaged, and whether that of
             lone bright pixels is spread over the region before.
@@ -165,7 +165,7 @@ def traced_layers(
     """
     width, height = camera.width, camera.height
     film = Film(width * height, cache.binned.groups)
-    image = _Image(cache, scenes, camera, lamp_radiance(emitters), film, seed)
+    image = _Image(cache, scenes, camera, lamps, film, seed)
     for each in samples:
         if not each.pixels.any():
             continue
@@ -191,7 +191,7 @@ class _Image:
     cache: RadianceCache
     scenes: ContactScenes
     camera: RayCamera
-    lamps: tuple[mi.Float, mi.UInt32]
+    lamps: LampWindows
     film: Film
     seed: int
 

@@ -34,7 +34,7 @@ from optisense.optics.radiance_cache.shading import (
     shade_in_contacts,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
-from optisense.optics.scene.emitters import Emitter
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import (
     VisiblePoints,
@@ -74,7 +74,7 @@ def render_cached(
     scenes: ContactScenes,
     camera: RayCamera,
     rays: ChiefRays,
-    emitters: list[Emitter],
+    windows: LampWindows,
     seed: int,
     plan: SamplingPlan = FULL_SAMPLING,
     known: KnownView | None = None,
@@ -86,7 +86,7 @@ def render_cached(
         light: the cache, and whether Ctrl-C ended its photon tracing early.
         scenes: the sensor with its contacts.
         rays: chief rays through the same scene and camera.
-        emitters: the lights, whose windows may be in view.
+        windows: the windows of the lights, which may be in view.
         plan: the pixels that are shaded, and their samples.
         known: parts of an earlier draft that are reused, to which those that are missing are added.
         lamps: mirror images of lamps, which are added to the image; none by default.
@@ -94,7 +94,7 @@ def render_cached(
     began = time.perf_counter()
     cache, interrupted = light
     regions = PixelRegions.of(rays)
-    image = _Shading(cache, scenes, camera, emitters, regions, seed, plan, known)
+    image = _Shading(cache, scenes, camera, windows, regions, seed, plan, known)
     samples = [1]
     if regions.near.any():
         image.sample_near()
@@ -148,13 +148,13 @@ class _Shading:
         cache: RadianceCache,
         scenes: ContactScenes,
         camera: RayCamera,
-        emitters: list[Emitter],
+        windows: LampWindows,
         regions: PixelRegions,
         seed: int,
         plan: SamplingPlan,
         known: KnownView | None,
     ) -> None:
-        self.cache, self.scenes, self.camera, self.emitters = cache, scenes, camera, emitters
+        self.cache, self.scenes, self.camera, self.windows = cache, scenes, camera, windows
         self.regions, self.seed, self.plan, self.known = regions, seed, plan, known
         self.size = camera.width, camera.height
         self.faint_known = known is not None and known.faint is not None
@@ -191,7 +191,7 @@ class _Shading:
             far = outside & ~regions.near
             smooth = [(outside & ~far, False), (far & hit, True), (far & ~hit, True)]
         return traced_layers(
-            self.cache, self.scenes, self.camera, self.emitters, samples, smooth, self.seed
+            self.cache, self.scenes, self.camera, self.windows, samples, smooth, self.seed
         )
 
     def interreflection(self) -> NDArray[np.float32]:
@@ -242,7 +242,7 @@ class _Shading:
                     self.between.add(main, exchanged)
             else:
                 self.film.add(main, self._shade(main, False))
-            self.film.add_light(main, self.emitters)
+            self.film.add_light(main, self.windows)
             if reflected is not None:
                 self.mirrored.add(reflected, self._shade(reflected, True))
 

@@ -12,7 +12,7 @@ from scipy import ndimage
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film, repeated
-from optisense.optics.scene.emitters import Emitter
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
 
@@ -53,13 +53,13 @@ class LampImages:
     over the pixels around them.
     """
 
-    def __init__(self, scene: RayScene, emitters: list[Emitter], groups: int) -> None:
+    def __init__(self, scene: RayScene, windows: LampWindows, groups: int) -> None:
         """Prepare the mirror images.
 
         Args:
             groups: number of light groups.
         """
-        self._scene, self._emitters, self._groups = scene, emitters, groups
+        self._scene, self._windows, self._groups = scene, windows, groups
         self._kept: tuple[tuple[int, int, int], NDArray[np.float32]] | None = None
         self._found: bool | None = None
 
@@ -71,7 +71,7 @@ class LampImages:
         """
         if self._found is None:
             self._found = False
-            if not any(emitter.area > 0 for emitter in self._emitters):
+            if not self._windows.exist:
                 return None  # no lamp has a window
             height = max(1, round(SEARCH_WIDTH * camera.height / camera.width))
             small = replace(camera, width=SEARCH_WIDTH, height=height)
@@ -120,7 +120,7 @@ class LampImages:
                 self._scene, camera, pixel, number, spots, seed_of(seed, 1), channel=channel
             )
             if points is not None:
-                film.add_light(points, self._emitters)
+                film.add_light(points, self._windows)
                 lit = np.asarray(points.light) > 0
                 meetings += np.bincount(np.asarray(points.pixel), lit, pixels.size)
         layers = film.layers(camera.width, camera.height)

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._density_estimation import build_grid, estimate_radiance
 from optisense.optics.imaging._film import Film
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
 from optisense.optics.transport.photons import Emission, trace_photons
@@ -68,6 +69,7 @@ def render_sppm(
             returns True.
     """
     table, seed = emission.table, emission.seed
+    windows = LampWindows.of(table.emitters)
     width, height = camera.width, camera.height
     pixel = dr.arange(mi.UInt32, width * height)
     halves = np.zeros((2, table.groups, height, width, 3), dtype=np.float64)
@@ -91,7 +93,7 @@ def render_sppm(
                     grid, scene.table, points, dr.opaque(mi.Float, gather_radius), table.groups
                 )
                 image.add(points, light)
-                image.add_light(points, table.emitters)
+                image.add_light(points, windows)
         halves[number % 2] += image.layers(width, height)
         done, emitted = number + 1, emitted + photons.emitted
         if stop is not None and stop(done):

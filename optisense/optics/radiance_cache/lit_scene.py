@@ -50,14 +50,14 @@ class LitScene:
 
         Args:
             may_trace_lobes: whether the peaks of lobes narrower than `TRACED_ROUGHNESS` are traced,
-                if all lights have Lambertian windows, which rays can meet.
+                if all lights have windows, which rays can meet.
         """
         roughness = scenes.roughness
         traced = (
             may_trace_lobes
             and roughness is not None
             and roughness < TRACED_ROUGHNESS
-            and all(emitter.has_lambertian_window for emitter in scenes.assembly.emitters)
+            and all(emitter.area > 0 for emitter in scenes.assembly.emitters)
         )
         return cls(
             scenes.full,

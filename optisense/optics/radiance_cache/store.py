@@ -23,7 +23,6 @@ from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.radiance_cache.tally import DENSE, CacheTally
 from optisense.optics.radiance_cache.tracing_limits import Passes, TracingLimits
-from optisense.optics.scene.emitters import Emitter
 from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near
 from optisense.optics.transport.emission_guide import EmissionGuide, learn_guide, uniform_guide
 from optisense.optics.transport.photons import (
@@ -124,11 +123,6 @@ class CacheStore:
         if lit.coloured != self._lit.coloured or other._directions != self._directions:
             other._cells = other._above = other._kernels = None
         return other
-
-    @property
-    def emitters(self) -> list[Emitter]:
-        """The lights."""
-        return self._lit.table.emitters
 
     @property
     def _directions(self) -> DirectionBins:

@@ -34,6 +34,7 @@ from optisense.optics.scene.bsdf import (
     surface_region,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.scene.surfaces import Region, SurfaceKind
@@ -92,13 +93,13 @@ class LobeTracer:
     Attributes:
         cache: the radiance cache.
         scenes: the scenes of the image.
-        lamps: radiance and light group of the lamps (`lamp_radiance`).
+        lamps: the windows of the lamps.
         channel: channel of the light that the rays carry, 0 to 2; None for all channels.
     """
 
     cache: RadianceCache
     scenes: ContactScenes
-    lamps: tuple[mi.Float, mi.UInt32]
+    lamps: LampWindows
     channel: int | None
 
     def trace(self, points: VisiblePoints, directions: int) -> LobeRays:
@@ -205,10 +206,7 @@ class LobeTracer:
 
     def _add_lamps(self, found: LobeRays, end: PathEnd, lane: mi.UInt32) -> None:
         """Add the light of the lamps that rays meet."""
-        radiance, numbers = self.lamps
-        lit = end.light > 0
-        value = dr.gather(mi.Float, radiance, end.light, lit)
-        group = dr.gather(mi.UInt32, numbers, end.light, lit)
+        value, group, lit = self.lamps.radiance(end.light, end.towards_eye)
         for k in range(3):
             entry = (lane * self.cache.binned.groups + group) * 3 + k
             dr.scatter_add(found.light, end.weight[k] * value, entry, lit)

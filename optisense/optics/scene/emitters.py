@@ -19,7 +19,7 @@ import numpy as np
 
 from optisense.array_types import FloatingArray
 from optisense.design.emitters import Intensity
-from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, RGB
 
 POLAR_CELLS = 512
@@ -79,11 +79,6 @@ class Emitter:
             EmitterShape.DISC: np.pi / 4,
         }[self.shape]
         return float(self.size[0] * self.size[1] * filled)
-
-    @property
-    def has_lambertian_window(self) -> bool:
-        """Whether the face shows the same radiance from all directions."""
-        return self.area > 0 and self.exponent == 1 and self.intensity is None
 
     @property
     def window_area(self) -> float:
@@ -209,17 +204,6 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
         absorption=floats(np.array([e.absorption for e in emitters])),
         emitters=list(emitters),
     )
-
-
-def lamp_radiance(emitters: list[Emitter]) -> tuple[mi.Float, mi.UInt32]:
-    """Return the radiance (n + 1,), 1/(mm^2 sr), of the windows of n lights of 1 mW, and their
-    light groups; the first entry stands for no light.
-
-    A Lambertian window of area A (that of the face that rays meet) has the radiance 1 / (pi A).
-    """
-    areas = [emitter.window_area for emitter in emitters]
-    radiance = [1 / (np.pi * area) if area > 0 else 0.0 for area in areas]
-    return floats(np.array([0.0, *radiance])), indices(np.array([0, *(e.group for e in emitters)]))
 
 
 def profile_direction(

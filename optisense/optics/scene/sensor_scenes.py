@@ -24,6 +24,7 @@ from optisense.optics.scene.contact_scenes import (
     bounding_ball,
 )
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
+from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 
@@ -189,6 +190,11 @@ class SensorScenes:
     def emitter_table(self) -> EmitterTable:
         """The lights, on the device."""
         return emitter_table(self.assembly.emitters, len(self.assembly.groups))
+
+    @cached_property
+    def lamp_windows(self) -> LampWindows:
+        """The emitting faces of the lights."""
+        return LampWindows.of(self.assembly.emitters)
 
     def with_indenters(self, placed: Sequence[TriangleMesh]) -> RayScene:
         """Return the sensor with every triangle of its sensing surface, and coated indenters.
