@@ -63,8 +63,8 @@ demo: setup
 
 # Each of these runs whatever becomes of the others, several at a time; a summary at the end says
 # what failed. Those that take longest begin first.
-CHECKS := pytest-rest pytest-tasks pytest-optics pytest-docs pytest-search studio-tests \
-    pytest-sensors types docs bare-pytest lint import-rules
+CHECKS := pytest-tasks pytest-rest pytest-optics pytest-docs pytest-search pytest-pages \
+    pytest-sensors studio-tests types docs bare-pytest lint import-rules
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
@@ -94,8 +94,9 @@ pytest: setup
 
 # The same in lots, which `make test` runs side by side. A lot is one process: its folders share
 # imports, and the first renderings, which load the kernels.
-LOTS := optics search sensors tasks
+LOTS := optics pages search sensors tasks
 LOT_optics := optics
+LOT_pages := browser report paper
 LOT_search := search
 LOT_sensors := sensors objectives
 LOT_tasks := tasks calibration cli
