@@ -13,6 +13,7 @@ from optisense.optics.backend.arrays import padded
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film, average_pixels, repeated
+from optisense.optics.imaging._grain import OUTLINE_SAMPLES, outline
 from optisense.optics.imaging.lamp_images import without_specks
 from optisense.optics.imaging.sampling import PixelRegions, SamplingPlan
 from optisense.optics.radiance_cache.cache import RadianceCache
@@ -132,10 +133,15 @@ def lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> lis
     inside = tiers[0][0] if tiers else np.zeros_like(regions.near)
     beside = (regions.near | regions.within(BESIDE_RANGE)) & ~inside
     hit = regions.rays.hit
+    skin = LobeSamples.of_skin(
+        ~(inside | beside) & hit, SKIN_RAYS * photons, SKIN_SEGMENTS * photons
+    )
+    edge = outline(hit) & ~(inside | hit)
     samples = [
         LobeSamples.of_skin(beside & hit, BESIDE_RAYS * photons),
-        LobeSamples.of_skin(~(inside | beside) & hit, SKIN_RAYS * photons, SKIN_SEGMENTS * photons),
-        LobeSamples(~(inside | hit), count=1, directions=1),
+        skin,
+        LobeSamples(edge, OUTLINE_SAMPLES, skin.directions),
+        LobeSamples(~(inside | hit | edge), count=1, directions=1),
     ]
     if tiers:
         samples.append(LobeSamples.of_contacts(*tiers[0], rays))

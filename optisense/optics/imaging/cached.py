@@ -189,7 +189,9 @@ class _Shading:
         if not self.plan.only_contacts:
             outside = regions.distance > 1.0
             far = outside & ~regions.near
-            smooth = [(outside & ~far, False), (far & hit, True), (far & ~hit, True)]
+            # Pixels at the outline of the skin, whose middles do not see it, keep their own light.
+            beyond = far & ~hit & ~outline(hit)
+            smooth = [(outside & ~far, False), (far & hit, True), (beyond, True)]
         return traced_layers(
             self.cache, self.scenes, self.camera, self.windows, samples, smooth, self.seed
         )
