@@ -71,6 +71,9 @@ SKIN_SPECK_WIDTH = 1 / 16
 """Width over which the light of lone bright pixels outside contacts is spread, as a fraction of the
 image width. Over twice this width, it would lighten the skin between the lamps in the corner of
 GelSight Mini's view, by an error of 6.5 %."""
+BESIDE_SPECK_WIDTH = 1 / 40
+"""The same within `BESIDE_RANGE` of contacts, which are bright: over a sixteenth of the width, the
+green light of GelBelt's skin within 1 mm of a contact would be 5 % too dark."""
 NO_PLACE = 0xFFFFFFFF
 """Marker of pixels without samples: a number of all one bits, which no index reaches."""
 LEAST_DENSITY = 1e-6
@@ -154,7 +157,7 @@ def traced_layers(
     camera: RayCamera,
     lamps: LampWindows,
     samples: list[LobeSamples],
-    smooth: list[tuple[NDArray[np.bool_], bool]],
+    smooth: list[tuple[NDArray[np.bool_], float]],
     seed: int,
 ) -> NDArray[np.float32]:
     """Return the radiance (groups, h, w, 3), mW/(mm^2 sr) for lights of 1 mW, of the light in
@@ -165,8 +168,9 @@ def traced_layers(
         scenes: the scenes of the image.
         lamps: the windows of the lights.
         samples: the samples of the image.
-        smooth: masks (h, w) of regions in each of which the light is averaged, and whether that of
-            lone bright pixels is spread over the region before.
+        smooth: masks (h, w) of regions in each of which the light is averaged, and the width over
+            which that of lone bright pixels is spread within the region before, as a fraction of
+            the image width; 0 if it is not.
         seed: seed of the image.
     """
     width, height = camera.width, camera.height
@@ -184,8 +188,8 @@ def traced_layers(
     reach = round(SKIN_WIDTH * width) | 1
     for region, spread in smooth:
         if region.any():
-            if spread:
-                layers = without_specks(layers, np.zeros_like(region), region, SKIN_SPECK_WIDTH)
+            if spread > 0:
+                layers = without_specks(layers, np.zeros_like(region), region, spread)
             average_pixels(layers, region.astype(np.float32), region, reach, False)
     return layers
 

@@ -20,7 +20,12 @@ from optisense.optics.imaging._contact_light import (
 from optisense.optics.imaging._film import Film, repeated
 from optisense.optics.imaging._grain import GRAIN_SAMPLES, OUTLINE_SAMPLES, grainy, outline
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
-from optisense.optics.imaging._traced_light import lobe_samples, traced_layers
+from optisense.optics.imaging._traced_light import (
+    BESIDE_SPECK_WIDTH,
+    SKIN_SPECK_WIDTH,
+    lobe_samples,
+    traced_layers,
+)
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.lamp_images import LampImages
@@ -185,13 +190,16 @@ class _Shading:
         """Return the layers of the light in the peaks of narrow lobes."""
         regions, hit = self.regions, self.regions.rays.hit
         samples = lobe_samples(self.plan, regions, self.cache.photons)
-        smooth: list[tuple[NDArray[np.bool_], bool]] = []
+        smooth: list[tuple[NDArray[np.bool_], float]] = []
         if not self.plan.only_contacts:
             outside = regions.distance > 1.0
-            far = outside & ~regions.near
+            near = outside & regions.near
+            beside = outside & regions.within(BESIDE_RANGE) & hit & ~near
+            far = outside & ~(near | beside)
             # Pixels at the outline of the skin, whose middles do not see it, keep their own light.
             beyond = far & ~hit & ~outline(hit)
-            smooth = [(outside & ~far, False), (far & hit, True), (beyond, True)]
+            wide = SKIN_SPECK_WIDTH
+            smooth = [(near, 0), (beside, BESIDE_SPECK_WIDTH), (far & hit, wide), (beyond, wide)]
         return traced_layers(
             self.cache, self.scenes, self.camera, self.windows, samples, smooth, self.seed
         )
