@@ -36,14 +36,22 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 @handles_errors
-def wait():
-    print("ready", flush=True)
-    while True:
-        signal.pause()
+def command():
+    {body}
 
 stopping.install_handlers()
 run_and_leave(app)
 """
+
+WAITING = COMMAND.format(body='print("ready", flush=True)\n    while True: signal.pause()')
+
+EXECUTING = COMMAND.format(
+    body='exec("import signal; signal.raise_signal(signal.SIGINT)\\nfor _ in range(9): pass")'
+)
+
+RETURNING = COMMAND.format(
+    body='raise SystemError("returned a result with an exception set") from KeyboardInterrupt()'
+)
 
 IMPORTING = """
 import signal, sys
@@ -58,44 +66,6 @@ sys.meta_path.insert(0, Presses())
 sys.argv[1:] = {words}
 from optisense.__main__ import main
 main()
-"""
-
-EXECUTING = """
-import signal, sys
-signal.signal(signal.SIGINT, signal.default_int_handler)
-from optisense.cli import stopping
-from optisense.cli.console import handles_errors
-from optisense.cli.leaving import run_and_leave
-import typer
-
-app = typer.Typer(add_completion=False)
-
-@app.command()
-@handles_errors
-def make_a_class():
-    exec("import signal; signal.raise_signal(signal.SIGINT)\\nfor _ in range(9): pass")
-
-stopping.install_handlers()
-run_and_leave(app)
-"""
-
-RETURNING = """
-import signal, sys
-signal.signal(signal.SIGINT, signal.default_int_handler)
-from optisense.cli import stopping
-from optisense.cli.console import handles_errors
-from optisense.cli.leaving import run_and_leave
-import typer
-
-app = typer.Typer(add_completion=False)
-
-@app.command()
-@handles_errors
-def import_a_package():
-    raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
-
-stopping.install_handlers()
-run_and_leave(app)
 """
 
 LEAVING = """
@@ -158,7 +128,7 @@ def test_without_a_wait_silence_is_broken() -> None:
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_command_ends_with_the_code_of_its_signal(number: signal.Signals, code: int) -> None:
-    with ready(COMMAND) as child:
+    with ready(WAITING) as child:
         child.send_signal(number)
         assert child.wait() == code
         assert child.stderr is not None
@@ -171,7 +141,7 @@ def in_the_background(program: str) -> str:
 
 
 def test_where_ctrl_c_is_ignored_sigterm_ends_a_command_and_ctrl_c_does_not() -> None:
-    with ready(in_the_background(COMMAND)) as child:
+    with ready(in_the_background(WAITING)) as child:
         child.send_signal(signal.SIGINT)
         with pytest.raises(subprocess.TimeoutExpired):
             child.wait(0.3)
