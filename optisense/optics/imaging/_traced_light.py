@@ -117,7 +117,7 @@ def _directions(rays: float, pixels: NDArray[np.bool_], count: int) -> int:
     return max(1, round(min(rays, MOST_RAYS) / samples))
 
 
-def lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> list[LobeSamples]:
+def _lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> list[LobeSamples]:
     """Return the samples of an image.
 
     Args:
@@ -152,13 +152,38 @@ def lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> lis
     return samples
 
 
+def _smoothed_regions(
+    plan: SamplingPlan, regions: PixelRegions
+) -> list[tuple[NDArray[np.bool_], float]]:
+    """Return the masks (h, w) of regions in each of which the light of traced peaks is averaged.
+
+    Each comes with the width over which the light of lone bright pixels is spread within the region
+    before, as a fraction of the image width; 0 if it is not.
+    """
+    if plan.only_contacts:
+        return []
+    hit = regions.rays.hit
+    outside = regions.distance > 1.0
+    near = outside & regions.near
+    beside = outside & regions.within(BESIDE_RANGE) & hit & ~near
+    far = outside & ~(near | beside)
+    # Pixels at the outline of the skin, whose middles do not see it, keep their own light.
+    beyond = far & ~hit & ~outline(hit)
+    return [
+        (near, 0),
+        (beside, BESIDE_SPECK_WIDTH),
+        (far & hit, SKIN_SPECK_WIDTH),
+        (beyond, SKIN_SPECK_WIDTH),
+    ]
+
+
 def traced_layers(
     cache: RadianceCache,
     scenes: ContactScenes,
     camera: RayCamera,
     lamps: LampWindows,
-    samples: list[LobeSamples],
-    smooth: list[tuple[NDArray[np.bool_], float]],
+    plan: SamplingPlan,
+    regions: PixelRegions,
     seed: int,
 ) -> NDArray[np.float32]:
     """Return the radiance (groups, h, w, 3), mW/(mm^2 sr) for lights of 1 mW, of the light in
@@ -168,16 +193,14 @@ def traced_layers(
         cache: the radiance cache, which holds the light in the tails of these lobes.
         scenes: the scenes of the image.
         lamps: the windows of the lights.
-        samples: the samples of the image.
-        smooth: masks (h, w) of regions in each of which the light is averaged, and the width over
-            which that of lone bright pixels is spread within the region before, as a fraction of
-            the image width; 0 if it is not.
+        plan: the pixels that are shaded, and their camera samples.
+        regions: the pixels in contacts, around them, and far from them.
         seed: seed of the image.
     """
     width, height = camera.width, camera.height
     film = Film(width * height, cache.binned.groups)
     image = _Image(cache, scenes, camera, lamps, film, seed)
-    for each in samples:
+    for each in _lobe_samples(plan, regions, cache.photons):
         if not each.pixels.any():
             continue
         segments = 0
@@ -187,7 +210,7 @@ def traced_layers(
                 break
     layers = film.layers(width, height)
     reach = round(SKIN_WIDTH * width) | 1
-    for region, spread in smooth:
+    for region, spread in _smoothed_regions(plan, regions):
         if region.any():
             if spread > 0:
                 layers = without_specks(layers, np.zeros_like(region), region, spread)

@@ -20,12 +20,7 @@ from optisense.optics.imaging._contact_light import (
 from optisense.optics.imaging._film import Film, repeated
 from optisense.optics.imaging._grain import GRAIN_SAMPLES, OUTLINE_SAMPLES, grainy, outline
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
-from optisense.optics.imaging._traced_light import (
-    BESIDE_SPECK_WIDTH,
-    SKIN_SPECK_WIDTH,
-    lobe_samples,
-    traced_layers,
-)
+from optisense.optics.imaging._traced_light import traced_layers
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.lamp_images import LampImages
@@ -111,7 +106,7 @@ def render_cached(
         layers, reflections = image.sample_far()
     main = layers - reflections if known is not None else None
     if cache.traced_lobes:
-        layers = layers + image.traced()
+        layers = layers + traced_layers(cache, scenes, camera, windows, plan, regions, seed)
     elif regions.near.any() and not image.faint_known:
         layers = layers + image.interreflection()
     if known is not None and main is not None:
@@ -185,24 +180,6 @@ class _Shading:
         if self.faint_known:
             return np.zeros((len(self.film.sums), *self.size[::-1], 3), dtype=np.float32)
         return self.mirrored.layers(*self.size)
-
-    def traced(self) -> NDArray[np.float32]:
-        """Return the layers of the light in the peaks of narrow lobes."""
-        regions, hit = self.regions, self.regions.rays.hit
-        samples = lobe_samples(self.plan, regions, self.cache.photons)
-        smooth: list[tuple[NDArray[np.bool_], float]] = []
-        if not self.plan.only_contacts:
-            outside = regions.distance > 1.0
-            near = outside & regions.near
-            beside = outside & regions.within(BESIDE_RANGE) & hit & ~near
-            far = outside & ~(near | beside)
-            # Pixels at the outline of the skin, whose middles do not see it, keep their own light.
-            beyond = far & ~hit & ~outline(hit)
-            wide = SKIN_SPECK_WIDTH
-            smooth = [(near, 0), (beside, BESIDE_SPECK_WIDTH), (far & hit, wide), (beyond, wide)]
-        return traced_layers(
-            self.cache, self.scenes, self.camera, self.windows, samples, smooth, self.seed
-        )
 
     def interreflection(self) -> NDArray[np.float32]:
         """Return the layers of the light that skin and contacts reflect to contacts."""
