@@ -32,6 +32,23 @@ def shine(evaluation):
     return -abs(design.coating.specularity - 0.5) + 0.01 * design.camera.position[2]
 """
 
+TICKETS = """
+import contextlib
+import time
+from pathlib import Path
+
+FOLDER = Path(__file__).with_name("tickets")
+
+def shine(evaluation):
+    '''Renders nothing, and waits for a ticket while the folder of tickets is there.'''
+    while FOLDER.exists():
+        with contextlib.suppress(FileNotFoundError):
+            next(FOLDER.iterdir(), FOLDER / "none").unlink()
+            break
+        time.sleep(0.02)
+    return -abs(evaluation.design.coating.specularity - 0.5)
+"""
+
 
 @pytest.fixture
 def goal(tmp_path: Path) -> str:
@@ -200,23 +217,31 @@ def test_a_cancelled_search_keeps_its_trials_and_goes_on_later(
 
 
 def test_what_a_search_does_before_and_after_its_trials_is_said(
-    engine: Any, tmp_path: Path, goal: str, hold: Path
+    engine: Any, tmp_path: Path
 ) -> None:
+    """The search goes on to its next step when the present one has been said."""
+    file = tmp_path / "goal.py"
+    file.write_text(TICKETS)
+    tickets = tmp_path / "tickets"
+    tickets.mkdir()
     number = engine.send(
         "search",
         design="gelsight-mini-ideal",
         study=str(tmp_path / "study"),
         vary=["coating.specularity=0:1:2"],
-        objectives=[goal],
+        objectives=[f"{file}:shine"],
         method="grid",
     )
-    for text in ("scoring this sensor", "of 2 trials", "scoring the best again"):
+    steps = (("scoring this sensor", 1), ("of 2 trials", 2), ("scoring the best again", 0))
+    for text, scores in steps:
         engine.until(
             lambda m, text=text: (
                 m["id"] == number and m.get("event") == "progress" and text in m["text"]
             )
         )
-    hold.unlink()
+        for score in range(scores):
+            (tickets / f"{text}-{score}").touch()
+    tickets.rename(tmp_path / "needless")
     assert engine.result(number)["done"] == 2
 
 
