@@ -158,8 +158,10 @@ def _have_one_skin(models: tuple[OpticalModel, OpticalModel]) -> bool:
     """Return whether each sensing surface lies within `ONE_SKIN` of the other."""
     meshes = [model.surface.mesh for model in models]
     for here, there in (meshes, meshes[::-1]):
-        step = max(1, len(here.vertices) // SAMPLED)
-        for vertex in here.vertices[::step]:
+        sampled = here.vertices[:: max(1, len(here.vertices) // SAMPLED)]
+        # A vertex near one of the other surface is near that surface.
+        away, _ = cKDTree(there.vertices).query(sampled)
+        for vertex in sampled[away > ONE_SKIN]:
             near = closest_points(there, vertex)
             if np.nanmin(np.linalg.norm(near - vertex, axis=1)) > ONE_SKIN:
                 return False
