@@ -1,4 +1,7 @@
-"""STEP files: shapes, places, names and units; and what happens without the extra."""
+"""STEP files: shapes, places, names and units; and what happens without the extra.
+
+Most files are read in this process: another one imports Open CASCADE, half a second of a processor.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ import pytest
 from step_extra import needs_step
 
 from optisense.errors import MeshError, SetupError
-from optisense.geometry.step import no_step, read_step
+from optisense.geometry.step import bodies_of, no_step, read_step
 
 
 def write_step(path: Path, parts: dict[str, tuple[Any, float]], unit: str = "MM") -> Path:
@@ -57,7 +60,7 @@ def box_and_ball() -> dict[str, tuple[Any, float]]:
 @needs_step
 @pytest.mark.parametrize("unit", ["MM", "INCH", "M"])
 def test_solids_come_in_millimetres_at_their_places(tmp_path: Path, unit: str) -> None:
-    gel, ball = read_step(write_step(tmp_path / "sensor.step", box_and_ball(), unit))
+    gel, ball = bodies_of(write_step(tmp_path / "sensor.step", box_and_ball(), unit))
     assert (gel.name, gel.solid, ball.name, ball.solid) == ("gel", True, "ball", True)
     assert gel.mesh.is_closed and ball.mesh.is_closed
     assert gel.mesh.volume == pytest.approx(320.0)
@@ -80,7 +83,7 @@ def test_a_surface_without_a_solid_is_an_open_body(tmp_path: Path) -> None:
     from OCP.gp import gp_Pln
 
     face = BRepBuilderAPI_MakeFace(gp_Pln(), -2.0, 2.0, -1.0, 1.0).Face()
-    (sheet,) = read_step(write_step(tmp_path / "sheet.stp", {"skin": (face, 0.0)}))
+    (sheet,) = bodies_of(write_step(tmp_path / "sheet.stp", {"skin": (face, 0.0)}))
     assert (sheet.name, sheet.solid) == ("skin", False)
     assert sheet.mesh.area == pytest.approx(8.0)
 
@@ -91,7 +94,7 @@ def test_parts_used_twice_get_numbers(tmp_path: Path) -> None:
 
     led = BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape()
     other = BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape()
-    bodies = read_step(write_step(tmp_path / "a.step", {"led": (led, 0.0)}))
+    bodies = bodies_of(write_step(tmp_path / "a.step", {"led": (led, 0.0)}))
     assert [body.name for body in bodies] == ["led"]
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound
@@ -100,7 +103,7 @@ def test_parts_used_twice_get_numbers(tmp_path: Path) -> None:
     builder.MakeCompound(compound)
     builder.Add(compound, led)
     builder.Add(compound, other)
-    bodies = read_step(write_step(tmp_path / "b.step", {"led": (compound, 0.0)}))
+    bodies = bodies_of(write_step(tmp_path / "b.step", {"led": (compound, 0.0)}))
     assert [body.name for body in bodies] == ["led", "led-2"]
 
 
