@@ -7,7 +7,6 @@ import json
 import os
 import queue
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -15,17 +14,21 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from warm_python import programs
 
 
 class Client:
-    """Starts an engine; reads all that it says in a thread."""
+    """Starts an engine; reads all that it says in a thread.
 
-    def __init__(self, folder: Path, hello: bool = True) -> None:
+    Engines, and the searches that they start, are forks of one process unless a Python is given.
+    """
+
+    def __init__(self, folder: Path, hello: bool = True, python: str | None = None) -> None:
         self.folder = folder
         folder.mkdir(parents=True, exist_ok=True)
         self.log = folder / "log.txt"
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "optisense.cli", "engine"],
+            [python or programs() / "python", "-m", "optisense.cli", "engine"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=self.log.open("ab"),
@@ -159,8 +162,8 @@ def start(tmp_path: Path) -> Iterator[Callable[..., Client]]:
     """Starter of engines that one test uses alone."""
     clients: list[Client] = []
 
-    def begin(hello: bool = True) -> Client:
-        clients.append(Client(tmp_path / f"engine{len(clients)}", hello))
+    def begin(hello: bool = True, python: str | None = None) -> Client:
+        clients.append(Client(tmp_path / f"engine{len(clients)}", hello, python))
         return clients[-1]
 
     yield begin

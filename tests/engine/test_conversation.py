@@ -19,11 +19,12 @@ from optisense.engine.requests import find, names
 from optisense.engine.server import AT_ONCE
 
 
-def test_hello_tells_the_versions(engine: Any) -> None:
-    greeting = engine.greeting
-    assert greeting["protocol"] == 1
-    assert greeting["version"] == optisense.__version__
-    assert greeting["pid"] == engine.process.pid
+def test_hello_tells_the_versions_and_the_process(start: Callable[..., Any]) -> None:
+    client = start(python=sys.executable)
+    assert client.greeting["protocol"] == 1
+    assert client.greeting["version"] == optisense.__version__
+    assert client.greeting["pid"] == client.process.pid
+    assert client.leave() == 0
 
 
 def test_every_request_is_documented() -> None:

@@ -4,6 +4,7 @@ A process that renders spends half of its time on imports and on the renderer's 
 process does this once and forks for each program that is run; a program in a folder of its own asks
 it to. The fork has the caller's folder, environment, arguments and standard streams, hears its
 signals and gives it its exit code. What a process does before its first line is not tested so.
+Python that such a program starts by `sys.executable` is a fork, too.
 """
 
 from __future__ import annotations
@@ -147,6 +148,7 @@ def serve(address: str) -> None:
             caller, _ = asked.accept()
             if os.fork() == 0:
                 asked.close()
+                sys.executable = str(Path(address).with_name("python"))
                 handle(caller)
             caller.close()
 
