@@ -94,14 +94,22 @@ atexit.register(_shared.close)
 
 
 @cache
-def programs() -> Path:
+def programs(python: str = sys.executable) -> Path:
     """Return a folder with the programs `python` and `optisense`, which all tests of a run share.
 
     They are the real ones where a process cannot fork.
+
+    Args:
+        python: that of the environment that `optisense` is installed in.
     """
     if not can_fork():
-        return Path(sys.executable).parent
-    return _shared.enter_context(warm_python(dict(os.environ)))
+        return Path(python).parent
+    return _shared.enter_context(warm_python(dict(os.environ), python=python))
+
+
+def end_programs() -> None:
+    """End the processes of `programs`, for a run whose process leaves without its own end."""
+    _shared.close()
 
 
 def import_all() -> None:

@@ -1,6 +1,7 @@
 """Tests of the Blender extension run inside Blender's Python module: `make studio-tests`.
 
-They use the engine of the project's own environment, as a child process like any user's.
+They use the engine of the project's own environment, as a child process like any user's. Engines
+and their searches are forks of one process that has imported everything.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from warm_python import end_programs, programs
 
 ROOT = Path(__file__).parents[2]
 
@@ -26,10 +28,10 @@ if importlib.util.find_spec("bpy") is None:
 else:
     import bpy  # noqa: F401  (bmesh and mathutils can be imported only after it)
 
-    os.environ.setdefault(
-        "OPTISENSE_ENGINE",
-        shlex.join([str(ROOT / ".venv" / "bin" / "python"), "-m", "optisense.cli", "engine"]),
-    )
+    if "OPTISENSE_ENGINE" not in os.environ:
+        python = programs(str(ROOT / ".venv" / "bin" / "python")) / "python"
+        command = [str(python), "-m", "optisense.cli", "engine"]
+        os.environ["OPTISENSE_ENGINE"] = shlex.join(command)
 
 
 @pytest.hookimpl(trylast=True)
@@ -38,6 +40,7 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if "bpy" in sys.modules and _status is not None:
         sys.stdout.flush()
         sys.stderr.flush()
+        end_programs()
         os._exit(_status)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shlex
 from pathlib import Path
 from typing import Any
@@ -58,7 +57,9 @@ def with_lamp(tmp_path: Path, mini: Any, monkeypatch: pytest.MonkeyPatch) -> Any
         "[optisense.emitters]\ncosine-power = our_lamps:CosinePower\n"
     )
     # An engine is started without the PYTHONPATH of Blender; this one has a package more.
-    started = ["env", f"PYTHONPATH={tmp_path}", *shlex.split(os.environ["OPTISENSE_ENGINE"])]
+    # A fork of a warm Python would not see the package.
+    python = Path(__file__).parents[2] / ".venv" / "bin" / "python"
+    started = ["env", f"PYTHONPATH={tmp_path}", str(python), "-m", "optisense.cli", "engine"]
     monkeypatch.setenv("OPTISENSE_ENGINE", shlex.join(started))
     session.restart()
     schema.learn({})

@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 import pytest
 
-from studio.core.engine import EngineError
+from studio.core.engine import PROTOCOL, EngineError
 from studio.engine import session
 from studio.engine.preferences import engine_command
 from studio.scene.paths import absolute, suggested
@@ -105,15 +105,16 @@ def test_a_new_engine_knows_no_picture_of_the_one_before(mini: Any, tmp_path: Pa
 
 
 def test_blender_does_not_wait_for_an_engine_that_hangs(
-    mini: Any, monkeypatch: pytest.MonkeyPatch
+    mini: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    running = session.engine()
-    os.kill(running.pid, signal.SIGSTOP)
+    hello = {"protocol": PROTOCOL, "client": "a test", "folder": str(tmp_path)}
+    running = session.ask_and_wait("hello", **hello)["pid"]
+    os.kill(running, signal.SIGSTOP)
     try:
         with monkeypatch.context() as impatient:
             impatient.setattr(session, "PATIENCE", 0.2)
             with pytest.raises(EngineError, match="has not answered 'entry'"):
                 session.ask_and_wait("entry", kind="camera", entry="gelsight-mini")
     finally:
-        os.kill(running.pid, signal.SIGCONT)
+        os.kill(running, signal.SIGCONT)
     assert session.ask_and_wait("entry", kind="camera", entry="gelsight-mini")["entry"]
