@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 
 from optisense.objectives.expressions import Expression
-from optisense.objectives.registry import find, names
+from optisense.objectives.registry import OBJECTIVES, find
 
 _ARITHMETIC = re.compile(r"[-+*/().,'\"\s]")
 """Characters that occur in every expression with an operation, and in no name."""
@@ -18,7 +18,7 @@ def is_plain(text: str) -> bool:
     return (
         file.endswith(".py")
         or _ARITHMETIC.search(text.strip()) is None
-        or text.strip().lower() in names()
+        or text.strip().lower() in OBJECTIVES
     )
 
 

@@ -20,7 +20,7 @@ from optisense.near import suggestion
 from optisense.objectives.combined import objective_of
 from optisense.objectives.expressions import Expression, marked
 from optisense.objectives.named import named_in
-from optisense.objectives.registry import Objective, names
+from optisense.objectives.registry import OBJECTIVES, Objective
 
 ROUNDING = 1e-9
 """Relative tolerance for limits: a value that misses its limit by less than this share of the limit
@@ -95,9 +95,9 @@ class Requirement:
         """
         try:
             for name in named_in([self.quantity]):
-                if name not in names():
+                if name not in OBJECTIVES:
                     problem = f"there is no objective '{name}', which the condition '{self}' names"
-                    raise SearchError(problem, hint=suggestion(name, names()))
+                    raise SearchError(problem, hint=suggestion(name, OBJECTIVES.names()))
             return objective_of(self.quantity)
         except ObjectiveError as error:
             raise SearchError(error.message, where=str(self), hint=error.hint) from None
