@@ -41,6 +41,9 @@ pixels: without the spreading, its picture of 160x120 pixels differs by 6 % (RMS
 SPECK_WIDTH = 1.0 / 8.0
 """Width over which that excess is spread, as a fraction of the image width; a speck of 50 times the
 light around it then adds 3 % to its middle."""
+BALANCING_STEPS = 5
+"""Number of steps in which the kernel of the spreading is balanced within a region (Sinkhorn and
+Knopp 1967). Even light in a square twice as wide as the kernel then varies by 1.3 %."""
 
 
 class LampImages:
@@ -151,8 +154,13 @@ def without_specks(
             image = ndimage.uniform_filter(image, side, mode="constant")
         return image
 
-    near = around(region.astype(np.float64))
-    share = np.divide(1.0, near, out=np.zeros_like(near), where=region)
+    # With these factors (h, w) on both sides of the kernel, its sum is 1 for the light that leaves
+    # a pixel, and nearly so for the light that arrives: even light stays even at an edge.
+    arriving = leaving = region.astype(np.float64)
+    for _ in range(BALANCING_STEPS):
+        arriving = np.sqrt(arriving * leaving)
+        near = around(arriving)
+        leaving = np.divide(1.0, near, out=np.zeros_like(near), where=region)
     spread = np.zeros_like(layers)
     for layer, found in zip(layers, spread, strict=True):
         bright = layer.sum(axis=-1)
@@ -163,7 +171,7 @@ def without_specks(
             found[...] = layer
             continue
         for k in range(3):
-            found[..., k] = around(lone[..., k].astype(np.float64) * share) * region
+            found[..., k] = around(lone[..., k].astype(np.float64) * leaving) * arriving
         np.maximum(found, 0.0, out=found)  # rounding gives -1e-17
         found += layer * kept
     return spread
