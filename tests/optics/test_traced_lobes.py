@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
+import drjit as dr
+import mitsuba as mi
 import numpy as np
 import pytest
 
@@ -11,12 +14,18 @@ import optisense as ots
 from optisense.mechanics import CONFORMING
 from optisense.optics.imaging import _traced_light
 from optisense.optics.imaging.lamp_images import without_specks
+from optisense.optics.radiance_cache import _ray_resampling, traced_lobes
 from optisense.optics.radiance_cache.lit_scene import TAIL_ROUGHNESS, LitScene
+from optisense.optics.radiance_cache.lobe_guide import LobeGuide
 from optisense.optics.scene.sensor_scenes import SensorScenes
 
 METAL = ots.set_value(ots.load("gelsight-mini-ideal"), "coating.specularity", 1.0)
 NOISE = 0.03
 """Relative error of the mean of a contact: three times its noise with 300,000 photons."""
+
+
+SKIN_NOISE = 0.03
+"""The same of the mean of the skin, of which the cache holds the larger part."""
 
 
 def test_peaks_of_narrow_lobes_are_traced_to_windows() -> None:
@@ -43,6 +52,79 @@ def test_shared_rays_change_no_mean(monkeypatch: pytest.MonkeyPatch) -> None:
     assert means[1] == pytest.approx(means[0], rel=NOISE)
 
 
+def test_rays_that_end_on_the_skin_and_guided_rays_change_no_mean(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    model = ots.OpticalModel(METAL)
+    ball = [ots.Contact(ots.Sphere(3.0), at=(0.5, 0.3), depth=0.8)]
+
+    def skin() -> np.ndarray:
+        image = model.render(ball, resolution=(64, 48), photons=300_000, skin=CONFORMING)
+        inside = np.zeros_like(image.contact_mask)
+        inside[8:-8, 8:-8] = True
+        return image.radiance[inside & ~image.contact_mask].mean(axis=0)
+
+    usual = skin()
+    monkeypatch.setattr(traced_lobes, "GUIDED_SHARE", 0.7)
+    guided = skin()
+    of_skin = _traced_light.LobeSamples.of_skin
+    monkeypatch.setattr(
+        _traced_light.LobeSamples,
+        "of_skin",
+        lambda *arguments: replace(of_skin(*arguments), gathers=False),
+    )
+    followed = skin()
+
+    assert guided == pytest.approx(usual, rel=SKIN_NOISE)
+    assert followed == pytest.approx(usual, rel=SKIN_NOISE)
+
+
+def test_directions_of_the_guide_have_its_density(monkeypatch: pytest.MonkeyPatch) -> None:
+    found: list[LobeGuide] = []
+
+    def kept(*arguments: Any) -> LobeGuide:
+        found.append(of(*arguments))
+        return found[-1]
+
+    of = LobeGuide.of
+    monkeypatch.setattr(LobeGuide, "of", kept)
+    model = ots.OpticalModel(METAL)
+    model.render(
+        [ots.Contact(ots.Sphere(3.0))], resolution=(32, 24), photons=100_000, skin=CONFORMING
+    )
+    guide = found[0]
+    points = np.flatnonzero(np.asarray(guide.found))
+    assert len(points) > 30
+    random = np.random.default_rng(0)
+    count = 5_000_000
+    for point in points[:: len(points) // 3]:
+        number = dr.full(mi.UInt32, int(point), count)
+        u, v, w = (mi.Float(random.random(count, dtype=np.float32)) for _ in range(3))
+        anywhere = mi.warp.square_to_uniform_sphere(mi.Point2f(u, v))
+        density = np.asarray(guide.density(number, anywhere))
+        assert 4 * np.pi * density.mean() == pytest.approx(1.0, rel=0.06)
+        # The mean inverse density of directions is the solid angle in which they are drawn.
+        drawn = guide.sample(number, w, mi.Point2f(u, v))
+        found_again = np.asarray(guide.density(number, drawn))
+        inside = found_again > 0  # rounding puts a few at the edge of an ellipse outside of it
+        assert inside.mean() > 0.999
+        assert (1 / found_again[inside]).mean() == pytest.approx(
+            4 * np.pi * (density > 0).mean(), rel=0.06
+        )
+
+
+def test_places_are_drawn_in_proportion_to_their_light(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_ray_resampling, "MOST_CACHED", 1000)
+    random = np.random.default_rng(0)
+    wanted, weight = random.random(5000) < 0.8, random.random(5000).astype(np.float32)
+    bits = mi.UInt32(random.integers(0, 2**32, 5000, dtype=np.uint32))
+    kept, times = _ray_resampling.drawn(mi.Bool(wanted), mi.Float(weight), bits)
+    kept, times = np.asarray(kept), np.asarray(times)
+    assert len(kept) == 1000 and wanted[kept].all()
+    assert (1 / times).sum() == pytest.approx(wanted.sum(), rel=0.1)
+    assert weight[kept] / times == pytest.approx(weight[wanted].sum() / 1000, rel=1e-3)
+
+
 def test_specks_are_spread_within_their_region() -> None:
     layers = np.zeros((1, 40, 40, 3), dtype=np.float32)
     layers[0, 20, 10], layers[0, 20, 30] = 1.0, 1.0
@@ -52,3 +134,15 @@ def test_specks_are_spread_within_their_region() -> None:
     assert found[:, :20].sum() == pytest.approx(1.0, rel=1e-5)
     assert found[20, 10] < 0.1
     assert found[20, 30] == 1.0 and found[:, 20:].sum() == 1.0
+
+
+def test_even_light_of_specks_stays_even_at_the_edge_of_a_region() -> None:
+    layers = np.zeros((1, 40, 80, 3), dtype=np.float32)
+    layers[0, 2::5, 2::5] = 1.0
+    region = np.zeros((40, 80), dtype=bool)
+    region[:, :40] = True
+    found = without_specks(layers, np.zeros_like(region), region, 1 / 4)[0, ..., 0]
+    assert found[:, :40].sum() == pytest.approx(64.0, rel=1e-3)
+    # Squares of five pixels with one speck each.
+    squares = found[:, :40].reshape(8, 5, 8, 5).sum(axis=(1, 3))
+    assert squares == pytest.approx(1.0, abs=0.03)

@@ -49,10 +49,9 @@ and the skin mirror contacts to the skin within it."""
 SKIN_RAYS = 0.4
 """Number of rays in one pass from all other pixels that see the skin for each photon of the
 cache."""
-SKIN_SEGMENTS = 1.0
+SKIN_SEGMENTS = 0.7
 """Number of segments of these rays for each photon, up to which there are further passes. On
-GelSight Mini, nineteen of twenty rays leave through the glass, so that three passes take a third of
-the time of the one pass on GelSight Svelte, whose mirrors return most rays."""
+GelSight Mini, whose rays mostly leave through the glass, there are two passes."""
 MOST_PASSES = 4
 """Largest number of these passes."""
 CONTACT_REACH = 1
@@ -63,10 +62,13 @@ MIRRORED_SHARE = 0.25
 """Number of rays from a point that the camera sees by reflection at an interface, as a share of
 those from a point that it sees directly. On the skin around a contact of GelSight Svelte of
 specularity 1, a tenth of the light comes from such points."""
-SKIN_WIDTH = 1 / 64
+SKIN_WIDTH = 1 / 32
 """Width over which the light of traced peaks is averaged outside contacts, as a fraction of the
-image width: 5 pixels of 320. Single rays that meet a lamp are bright: without the average, pixels
-of GelSight Svelte's skin of specularity 1 have a noise of 50 % with two million photons."""
+image width: 0.6 mm on GelSight Mini, of whose lamps the lobes of flat skin show images that are
+blurred over 1 mm and more. Single rays that meet a lamp are bright: without the average, pixels of
+GelSight Svelte's skin of specularity 1 have a noise of 50 % with two million photons."""
+BESIDE_WIDTH = 1 / 64
+"""The same within `BESIDE_RANGE` of contacts, where the skin is curved and shows them."""
 SKIN_SPECK_WIDTH = 1 / 16
 """Width over which the light of lone bright pixels outside contacts is spread, as a fraction of the
 image width. Over twice this width, it would lighten the skin between the lamps in the corner of
@@ -90,6 +92,7 @@ class LobeSamples:
         pixels: (h, w) mask of the pixels.
         count: number of camera samples of each pixel.
         directions: number of rays from each sample.
+        gathers: whether the rays end on the skin that they meet (see `LobeTracer.trace`).
         reach: distance (pixels) in rows and columns up to which they share their rays.
         segments: number of segments of rays, from coating to coating, up to which there are further
             passes; 0 for one pass.
@@ -98,13 +101,14 @@ class LobeSamples:
     pixels: NDArray[np.bool_]
     count: int
     directions: int
+    gathers: bool = True
     reach: int = 0
     segments: float = 0
 
     @classmethod
     def of_contacts(cls, pixels: NDArray[np.bool_], count: int, rays: float) -> LobeSamples:
         """Return the samples of pixels in contacts, which draw a number of rays together."""
-        return cls(pixels, count, _directions(rays, pixels, count), CONTACT_REACH)
+        return cls(pixels, count, _directions(rays, pixels, count), False, CONTACT_REACH)
 
     @classmethod
     def of_skin(cls, pixels: NDArray[np.bool_], rays: float, segments: float = 0) -> LobeSamples:
@@ -152,28 +156,55 @@ def _lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> li
     return samples
 
 
-def _smoothed_regions(
-    plan: SamplingPlan, regions: PixelRegions
-) -> list[tuple[NDArray[np.bool_], float]]:
-    """Return the masks (h, w) of regions in each of which the light of traced peaks is averaged.
+@dataclass(frozen=True)
+class _SmoothedRegion:
+    """A region in which the light of traced peaks is averaged.
 
-    Each comes with the width over which the light of lone bright pixels is spread within the region
-    before, as a fraction of the image width; 0 if it is not.
+    Attributes:
+        pixels: (h, w) mask of the region.
+        weight: (h, w) weight of the averaged light; the weights of all regions add up to 1, and
+            where there is none, light is not averaged.
+        spread: width over which the light of lone bright pixels is spread within the region before,
+            as a fraction of the image width; 0 if it is not.
+        averaged: width over which all light is averaged, as a fraction of the image width.
     """
+
+    pixels: NDArray[np.bool_]
+    weight: NDArray[np.floating]
+    spread: float
+    averaged: float
+
+    def smoothed(self, layers: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Return averaged layers (groups, h, w, 3)."""
+        if self.spread > 0:
+            layers = without_specks(layers, np.zeros_like(self.pixels), self.pixels, self.spread)
+        else:
+            layers = layers.copy()
+        reach = round(self.averaged * layers.shape[2]) | 1
+        average_pixels(layers, self.pixels.astype(np.float32), self.pixels, reach, False)
+        return layers
+
+
+def _smoothed_regions(plan: SamplingPlan, regions: PixelRegions) -> list[_SmoothedRegion]:
+    """Return the regions in each of which the light of traced peaks is averaged."""
     if plan.only_contacts:
         return []
     hit = regions.rays.hit
     outside = regions.distance > 1.0
     near = outside & regions.near
-    beside = outside & regions.within(BESIDE_RANGE) & hit & ~near
-    far = outside & ~(near | beside)
+    skin = outside & hit & ~near
+    beside = skin & regions.within(BESIDE_RANGE)
+    # Two regions overlap, so that no edge shows between them.
+    far = skin & ~regions.within(BESIDE_RANGE / 2)
+    x = np.clip(2 * regions.distance / (BESIDE_RANGE * regions.width) - 1, 0, 1)
+    farness = np.where(skin, x * x * (3 - 2 * x), 0)
     # Pixels at the outline of the skin, whose middles do not see it, keep their own light.
-    beyond = far & ~hit & ~outline(hit)
+    beyond = outside & ~(near | hit | outline(hit))
     return [
-        (near, 0),
-        (beside, BESIDE_SPECK_WIDTH),
-        (far & hit, SKIN_SPECK_WIDTH),
-        (beyond, SKIN_SPECK_WIDTH),
+        _SmoothedRegion(near, near.astype(float), 0, BESIDE_WIDTH),
+        _SmoothedRegion(beside, np.where(beside, 1 - farness, 0), BESIDE_SPECK_WIDTH, BESIDE_WIDTH),
+        _SmoothedRegion(far, farness, SKIN_SPECK_WIDTH, SKIN_WIDTH),
+        _SmoothedRegion(beyond, beyond.astype(float), SKIN_SPECK_WIDTH, BESIDE_WIDTH),
     ]
 
 
@@ -209,13 +240,14 @@ def traced_layers(
             if segments >= each.segments:
                 break
     layers = film.layers(width, height)
-    reach = round(SKIN_WIDTH * width) | 1
-    for region, spread in _smoothed_regions(plan, regions):
-        if region.any():
-            if spread > 0:
-                layers = without_specks(layers, np.zeros_like(region), region, spread)
-            average_pixels(layers, region.astype(np.float32), region, reach, False)
-    return layers
+    smooth = np.zeros_like(layers)
+    total = np.zeros((height, width, 1), dtype=np.float32)
+    for region in _smoothed_regions(plan, regions):
+        if region.pixels.any():
+            weight = region.weight[..., None].astype(np.float32)
+            smooth += weight * region.smoothed(layers)
+            total += weight
+    return smooth + (1 - total) * layers
 
 
 @dataclass(frozen=True)
@@ -250,7 +282,7 @@ class _Image:
                 scene, self.camera, pixel, number, spots, seed_of(seed, 13), channel=channel
             )
             tracer = LobeTracer(self.cache, self.scenes, self.lamps, channel)
-            rays = tracer.trace(points, samples.directions)
+            rays = tracer.trace(points, samples.directions, samples.gathers)
             segments += rays.segments
             if samples.reach > 0:
                 seen = _Seen.of(points, scene.table, samples.pixels)
@@ -260,7 +292,7 @@ class _Image:
             dr.eval(film.sums)
             if mirrored is not None:
                 directions = max(1, round(MIRRORED_SHARE * samples.directions))
-                rays = tracer.trace(mirrored, directions)
+                rays = tracer.trace(mirrored, directions, samples.gathers)
                 _add_own(film, rays, mirrored, scene.table, 1 / directions)
                 dr.eval(film.sums)
         return segments

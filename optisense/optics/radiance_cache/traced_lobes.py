@@ -2,9 +2,9 @@
 
 A lobe that is narrower than a lamp shows the lamp's outline, which a radiance cache only knows as
 discs of the same mean direction and variance. Rays are therefore drawn from such lobes and followed
-from surface to surface until they meet a lamp. Only the peak of a lobe is traced: in its tail, rays
-would meet lamps rarely, while the tail is smooth, so that the cache serves it (see
-`CoatingBsdf.only_tail`).
+from surface to surface until they meet a lamp, or other skin whose light the cache holds. Only the
+peak of a lobe is traced: in its tail, rays would meet lamps rarely, while the tail is smooth, so
+that the cache serves it (see `CoatingBsdf.only_tail`).
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.arrays import gathered
+from optisense.optics.backend.arrays import gathered, joined
 from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache._irradiance import irradiance
+from optisense.optics.radiance_cache._ray_resampling import drawn, split
 from optisense.optics.radiance_cache.beam_sums import sum_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
+from optisense.optics.radiance_cache.lobe_guide import LobeGuide
 from optisense.optics.radiance_cache.shading_points import (
     ShadingPoints,
     interpolating_cell,
@@ -35,7 +37,7 @@ from optisense.optics.scene.bsdf import (
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.lamp_windows import LampWindows
-from optisense.optics.scene.ray_scene import Ray, leave
+from optisense.optics.scene.ray_scene import Ray, RayScene, leave
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, follow, generator
@@ -47,16 +49,10 @@ with four, the light in a contact of GelSight Mini of specularity 1 would be 2 %
 FEWEST_RAYS = 2
 """Number of rays below which they are dropped, as Dr.Jit compiles other kernels for arrays of one
 entry."""
-SPLIT_SHARE = 1 / 16
-"""Share of all rays up to which those that meet an indenter first are split into several. Few rays
-from the skin do, and the contact is bright: on the skin around a contact of GelSight Mini of
-specularity 1, splitting reduces the noise from 17 to 10 %."""
-MOST_CACHED = 40_000
-"""Largest number of places on the skin whose cached light is summed at each reflection; if rays end
-at more, a part of them is drawn. The sum takes as long as the ray on GelSight Mini, and ten times
-as long on GelSight360 with its nine light groups."""
-MOST_COPIES = 16
-"""Largest number of rays into which a ray is split; with 64, the noise is the same."""
+GUIDED_SHARE = 0.3
+"""Share of the rays from the skin that are drawn from the beams of the cache. With 0.3, the noise
+of the skin of GelSight Mini of specularity 1 is 12 instead of 15 %; with 0.7, it is larger again,
+as light that the beams do not describe is found by fewer rays."""
 
 
 @dataclass
@@ -102,8 +98,14 @@ class LobeTracer:
     lamps: LampWindows
     channel: int | None
 
-    def trace(self, points: VisiblePoints, directions: int) -> LobeRays:
-        """Return a number of rays from each visible point, and their light."""
+    def trace(self, points: VisiblePoints, directions: int, gathers: bool) -> LobeRays:
+        """Return a number of rays from each visible point, and their light.
+
+        Args:
+            gathers: whether rays end on the skin that they meet, whose light is read from the cache
+                (final gathering, Jensen 1996), instead of going on in the peaks of its lobes. They
+                are then also drawn from the beams of the cache.
+        """
         table = self.scenes.full.table
         count = dr.width(points.pixel) * directions
         lane = dr.arange(mi.UInt32, count)
@@ -115,16 +117,24 @@ class LobeTracer:
         u = unit_float(first.series + number * STEPS_2D[0])
         v = unit_float(first.series * 277803737 + number * STEPS_2D[1])
         pick = unit_float(first.series * 69069 + number * GOLDEN_BITS)
-        way, weight = sample_coating(
-            coating, first.normal, -first.towards_eye, pick, mi.Point2f(u, v)
-        )
+        guide, share = None, mi.Float(0)
+        if gathers:
+            guide = self._guide(points)
+            share = dr.select(dr.gather(mi.Bool, guide.found, owner), GUIDED_SHARE, 0)
+        guided = pick < share
+        pick = dr.select(guided, pick / GUIDED_SHARE, (pick - share) / (1 - share))
+        way, _ = sample_coating(coating, first.normal, -first.towards_eye, pick, mi.Point2f(u, v))
+        density = (1 - share) * coating_density(coating, first.normal, way, first.towards_eye)
+        if guide is not None:
+            way = dr.select(guided, guide.sample(owner, pick, mi.Point2f(u, v)), way)
+            density = (1 - share) * coating_density(coating, first.normal, way, first.towards_eye)
+            density += share * guide.density(owner, way)
         ray = Ray(leave(first.point, first.face_normal, way), way, first.valid)
-        ray.active &= (dr.max(weight) > 0) & (coating.specularity > 0)
-        ray.active &= dr.dot(way, first.face_normal) > 0
+        ray.active &= (coating.specularity > 0) & (density > 0)
+        ray.active &= (dr.dot(way, first.face_normal) > 0) & (dr.dot(way, first.normal) > 0)
         whole = self._is_uncached(first, ray)
         cos_m = half_vector_cosine(first.normal, way, first.towards_eye)
         ray.active &= whole | (peak_share(cos_m) > 0)
-        density = coating_density(coating, first.normal, way, first.towards_eye)
         found = LobeRays(
             owner,
             way,
@@ -135,8 +145,17 @@ class LobeTracer:
         )
         bits = next_random((first.random ^ (number * GOLDEN_BITS)) * 69069)
         dr.eval(found, ray, bits)
-        self._follow(found, ray, bits)
+        self._follow(found, ray, bits, gathers)
         return found
+
+    def _guide(self, points: VisiblePoints) -> LobeGuide:
+        light, table = self.cache.binned, self.scenes.full.table
+        cell, shift, known = interpolating_cell(
+            light.cells, points.point, points.valid, points.series, points.number
+        )
+        coating = coating_of(table, points.surface, points.valid)
+        at = ShadingPoints(points, coating, points.point, cell, shift, known, mi.Bool(False))
+        return LobeGuide.of(self.cache.beams, light.groups, at, bin_axis(light.cells, 2))
 
     def _is_uncached(self, first: VisiblePoints, ray: Ray) -> mi.Bool:
         """Return a mask of the rays that meet a coating before any interface, from which no light
@@ -155,17 +174,21 @@ class LobeTracer:
         held &= ~raised | scenes.fixed.occluded(ray.origin, -ray.direction, held & raised)
         return straight & ~held
 
-    def _follow(self, found: LobeRays, ray: Ray, bits: mi.UInt32) -> None:
+    def _follow(self, found: LobeRays, ray: Ray, bits: mi.UInt32, gathers: bool) -> None:
         """Add the light that arrives along rays to ``found``.
 
         Args:
             bits: random bits (n,) of each ray.
+            gathers: as in `trace`. Rays whose light is read on the skin go on, in the whole lobe,
+                but only the light of indenters that they meet is added, which the cache does not
+                hold.
         """
         scene = self.scenes.full
         lane = dr.compress(ray.active)
         count = dr.width(lane)
         ray, bits = gathered(ray, lane), dr.gather(mi.UInt32, bits, lane)
         weight = dr.full(mi.Color3f, 1, count)
+        read = dr.full(mi.Bool, False, count)
         for reflections in range(MAX_REFLECTIONS):
             if dr.width(lane) < FEWEST_RAYS:
                 return
@@ -174,53 +197,76 @@ class LobeTracer:
                 ray.absorption = mi.Color3f(0) if clear else self.scenes.absorption
             if self.channel is not None:
                 ray.channel = dr.opaque(mi.UInt32, self.channel, dr.width(lane))
+            if gathers and reflections == 0:
+                end, kept = _both_ways(scene, ray, weight, bits)
+            else:
+                end, _, _ = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION)
+                dr.eval(end)
+                kept = dr.compress(end.valid | (end.light > 0))
+                end = gathered(end, kept)
             found.segments += dr.width(lane)
-            end, _, _ = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION)
-            dr.eval(end)
+            if dr.width(kept) < FEWEST_RAYS:
+                return
+            lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
             if reflections == 0:
-                dr.scatter(found.distance, end.distance, lane, end.valid | (end.light > 0))
-            self._add_lamps(found, end, lane)
+                dr.scatter(found.distance, end.distance, lane)
+            self._add_lamps(found, end, lane, ~read)
             kept = dr.compress(end.valid)
             if dr.width(kept) < FEWEST_RAYS:
                 return
-            end, lane = dr.gather(PathEnd, end, kept), dr.gather(mi.UInt32, lane, kept)
-            bits = next_random(dr.gather(mi.UInt32, bits, kept) ^ GOLDEN_BITS)
-            on_skin = self._add_cached(found, end, lane, bits)
+            end = gathered(end, kept)
+            lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
+            bits = next_random(bits ^ GOLDEN_BITS)
+            on_skin, raised = self._add_cached(found, end, lane, bits, read, not gathers)
+            if gathers:
+                if self.scenes.indenters is None:
+                    return
+                read = (read | on_skin) & ~raised
             if reflections == 0:
-                chosen, copies = _split(on_skin, count)
+                chosen, copies = split(on_skin, count)
                 if copies > 1:
                     end.weight *= dr.select(on_skin, 1, 1 / copies)
                     dr.eval(end, bits)
-                    end, on_skin = (
-                        dr.gather(PathEnd, end, chosen),
-                        dr.gather(mi.Bool, on_skin, chosen),
+                    end = gathered(end, chosen)
+                    lane, bits, read, on_skin = (
+                        dr.gather(type(each), each, chosen) for each in (lane, bits, read, on_skin)
                     )
-                    lane = dr.gather(mi.UInt32, lane, chosen)
-                    bits = dr.gather(mi.UInt32, bits, chosen)
                     bits = mi.sample_tea_32(bits, dr.arange(mi.UInt32, dr.width(chosen)))[0]
-            ray, weight = _reflected(scene.table, end, on_skin, bits)
-            dr.eval(ray, weight, bits)
+            only_peak = mi.Bool(False) if gathers else on_skin
+            ray, weight = _reflected(scene.table, end, only_peak, bits)
+            dr.eval(ray, weight, bits, read)
             kept = dr.compress(ray.active)
             ray, weight = gathered(ray, kept), dr.gather(mi.Color3f, weight, kept)
-            lane, bits = dr.gather(mi.UInt32, lane, kept), dr.gather(mi.UInt32, bits, kept)
+            lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
 
-    def _add_lamps(self, found: LobeRays, end: PathEnd, lane: mi.UInt32) -> None:
-        """Add the light of the lamps that rays meet."""
+    def _add_lamps(self, found: LobeRays, end: PathEnd, lane: mi.UInt32, counts: mi.Bool) -> None:
+        """Add the light of the lamps that rays meet, of those rays that the mask ``counts``."""
         value, group, lit = self.lamps.radiance(end.light, end.towards_eye)
         for k in range(3):
             entry = (lane * self.cache.binned.groups + group) * 3 + k
-            dr.scatter_add(found.light, end.weight[k] * value, entry, lit)
+            dr.scatter_add(found.light, end.weight[k] * value, entry, lit & counts)
 
     def _add_cached(
-        self, found: LobeRays, end: PathEnd, lane: mi.UInt32, bits: mi.UInt32
-    ) -> mi.Bool:
+        self,
+        found: LobeRays,
+        end: PathEnd,
+        lane: mi.UInt32,
+        bits: mi.UInt32,
+        read: mi.Bool,
+        only_tail: bool,
+    ) -> tuple[mi.Bool, mi.Bool]:
         """Add the light of the cache that coatings reflect.
 
-        The undeformed skin reflects it with its diffuse lobe and the tail of its metallic lobe;
-        indenters reflect it with their diffuse lobe, and as though it fell on the skin below.
+        The undeformed skin reflects it with its diffuse lobe and with its metallic lobe, or the
+        tail of it; indenters reflect it with their diffuse lobe, and as though it fell on the skin
+        below.
+
+        Args:
+            read: mask of the rays to which the skin adds nothing.
+            only_tail: whether the peaks of the metallic lobes of the skin are left out.
 
         Returns:
-            A mask of the rays that end on undeformed skin.
+            Masks of the rays that end on undeformed skin, and of those that end on indenters.
         """
         light, table = self.cache.binned, self.scenes.full.table
         raised = surface_region(table, end.surface, end.valid) >= int(Region.INDENTER)
@@ -235,31 +281,21 @@ class LobeTracer:
             diffuse.append(weight * falling)
         self._add(found, diffuse, lane, raised & known)
         on_skin = known & ~raised
-        dr.eval(cell, on_skin)
-        kept = dr.compress(on_skin)
-        count = dr.width(kept)
-        if count < FEWEST_RAYS:
-            return on_skin
-        share = 1.0
-        if count > MOST_CACHED:
-            share = MOST_CACHED / count
-            shift = unit_float(dr.gather(mi.UInt32, bits, kept[0]))
-            drawn = mi.UInt32((dr.arange(mi.Float, MOST_CACHED) + shift) / share)
-            kept = dr.gather(mi.UInt32, kept, dr.minimum(drawn, count - 1))
-        flat, cell, lane = (
-            dr.gather(PathEnd, end, kept),
-            dr.gather(mi.UInt32, cell, kept),
-            dr.gather(mi.UInt32, lane, kept),
-        )
+        dr.eval(cell, on_skin, raised)
+        kept, share = drawn(on_skin & ~read, dr.max(end.weight), bits)
+        if dr.width(kept) < FEWEST_RAYS:
+            return on_skin, raised
+        flat = gathered(end, kept)
+        cell, lane = dr.gather(mi.UInt32, cell, kept), dr.gather(mi.UInt32, lane, kept)
         coating = coating_of(table, flat.surface, flat.valid)
-        coating.only_tail = True
+        coating.only_tail = only_tail
         points = VisiblePoints(**vars(flat), pixel=lane, random=lane, series=lane, number=lane)
         at = ShadingPoints(
             points, coating, flat.point, cell, mi.Vector3f(0), mi.Bool(flat.valid), mi.Bool(False)
         )
         sums = sum_beams(self.cache.beams, light.groups, at, bin_axis(light.cells, 2))
         self._add(found, [each * flat.weight / share for each in sums], lane, flat.valid)
-        return on_skin
+        return on_skin, raised
 
     def _add(
         self, found: LobeRays, light: list[mi.Color3f], lane: mi.UInt32, active: mi.Bool
@@ -271,34 +307,60 @@ class LobeTracer:
                 dr.scatter_add(found.light, value[k], entry, active)
 
 
-def _split(on_skin: mi.Bool, count: int) -> tuple[mi.UInt32, int]:
-    """Return numbers of rays, in which those that are not ``on_skin`` occur several times, and how
-    often they do.
+def _both_ways(
+    scene: RayScene, ray: Ray, weight: mi.Color3f, bits: mi.UInt32
+) -> tuple[PathEnd, mi.UInt32]:
+    """Follow rays through interfaces and, as rays of their own, one of the reflections of each.
+
+    Little light is reflected at an interface, but from the skin of GelSight Mini only the reflected
+    light meets other skin.
 
     Args:
-        count: number of rays that were traced.
+        weight: factor (3, n) on the radiance at the rays' beginnings.
+        bits: random bits (n,) of each ray.
+
+    Returns:
+        The ends of those rays that meet a lamp or a coating, and the numbers of the rays that they
+        belong to.
     """
-    raised = dr.compress(~on_skin)
-    few = int(SPLIT_SHARE * count)
-    copies = min(MOST_COPIES, max(1, few // max(1, dr.width(raised))))
-    every = dr.arange(mi.UInt32, dr.width(on_skin))
-    if copies == 1 or dr.width(raised) == 0:
-        return every, 1
-    return dr.concat([every, dr.repeat(raised, copies - 1)]), copies
+    through, branch, share = follow(scene, ray, weight, generator(bits), RayKind.CAMERA)
+    dr.eval(through, branch, share)
+    parts = [(through, dr.arange(mi.UInt32, dr.width(bits)))]
+    turned = dr.compress(branch.active)
+    if dr.width(turned) >= FEWEST_RAYS:
+        other = dr.gather(mi.UInt32, bits, turned) ^ GOLDEN_BITS
+        back, _, _ = follow(
+            scene,
+            gathered(branch, turned),
+            dr.gather(mi.Color3f, share, turned),
+            generator(other),
+            RayKind.REFLECTION,
+        )
+        parts.append((back, turned))
+    ends, numbers = [], []
+    for end, number in parts:
+        dr.eval(end)
+        kept = dr.compress(end.valid | (end.light > 0))
+        if dr.width(kept) > 0:
+            ends.append(gathered(end, kept))
+            numbers.append(dr.gather(mi.UInt32, number, kept))
+    if len(ends) == 2:
+        return joined(*ends), joined(*numbers)
+    return (ends[0], numbers[0]) if ends else (through, dr.zeros(mi.UInt32, 0))
 
 
 def _reflected(
-    table: mi.Float, end: PathEnd, on_skin: mi.Bool, bits: mi.UInt32
+    table: mi.Float, end: PathEnd, only_peak: mi.Bool, bits: mi.UInt32
 ) -> tuple[Ray, mi.Color3f]:
     """Return rays that go on in the metallic lobes of coatings, and their weights (3, n).
 
-    Where the cache serves the tail of a lobe (``on_skin``), only its peak counts.
+    Where the cache serves the tail of a lobe (``only_peak``), only its peak counts.
     """
     coating = coating_of(table, end.surface, end.valid)
     place = mi.Point2f(unit_float(bits * 277803737), unit_float((bits ^ GOLDEN_BITS) * 69069))
     way, share = sample_coating(coating, end.normal, -end.towards_eye, mi.Float(0), place)
     weight = end.weight * share * coating.specularity
     cos_m = half_vector_cosine(end.normal, way, end.towards_eye)
-    weight *= dr.select(on_skin, peak_share(cos_m), 1)
+    weight *= dr.select(only_peak, peak_share(cos_m), 1)
     goes_on = (dr.max(weight) > 0) & (dr.dot(way, end.face_normal) > 0)
     return Ray(leave(end.point, end.face_normal, way), way, goes_on), weight

@@ -225,6 +225,19 @@ def _ggx_of_disc(
     return dr.inv_pi * dr.select(q > 0, 2 * a2 / (h * (h + q)), (h - q) / (2 * rho2 * h))
 
 
+def _facet_density(
+    coating: CoatingBsdf, normal: mi.Vector3f, half: mi.Vector3f, towards_light: mi.Vector3f
+) -> mi.Float:
+    """Return the GGX distribution at half vectors, averaged over the disc of light if there is
+    one.
+    """
+    cos_m = dr.dot(half, normal)
+    if coating.light_radius2 is None:
+        return _ggx(cos_m, coating.alpha)
+    cos_h = dr.dot(half, towards_light)
+    return _ggx_of_disc(cos_m, cos_h, coating.alpha, coating.light_radius2)
+
+
 def _half_vector_disc(cos_m: mi.Float, cos_d: mi.Float, light_radius2: mi.Float) -> mi.Float:
     """Return the squared radius (n,) of a disc of half vectors, seen along the normal; see
     `_ggx_of_disc`.
@@ -295,14 +308,10 @@ def evaluate_coating(
     if not coating.metallic:
         return diffuse
     half = dr.normalize(towards_light + towards_eye)
-    cos_m = dr.dot(half, normal)
     if coating.only_tail:
         density = _ggx_tail(normal, towards_light, towards_eye, coating.alpha, coating.light_axes)
-    elif coating.light_radius2 is None:
-        density = _ggx(cos_m, coating.alpha)
     else:
-        cos_h = dr.dot(half, towards_light)
-        density = _ggx_of_disc(cos_m, cos_h, coating.alpha, coating.light_radius2)
+        density = _facet_density(coating, normal, half, towards_light)
     lobe = density * _smith(cos_i, coating.alpha) * _smith(cos_o, coating.alpha) / (4 * cos_o)
     metal = fresnel_metal(dr.abs(dr.dot(half, towards_light)), coating.metal_eta, coating.metal_k)
     shiny = dr.select(lit, metal * (coating.specularity * lobe), 0.0)
@@ -329,15 +338,17 @@ def coating_density(
     coating: CoatingBsdf, normal: mi.Vector3f, towards_light: mi.Vector3f, towards_eye: mi.Vector3f
 ) -> mi.Float:
     """Return the density (n,), 1/sr, of the directions that `sample_coating` draws with random
-    picks; 0 below the surface.
+    picks; 0 below the surface. For light of a disc (`CoatingBsdf.light_radius2`), the lobe is
+    averaged over it.
 
     Args:
         normal: unit normals.
         towards_light, towards_eye: unit directions away from the surface.
     """
     cos_i, cos_o = dr.dot(normal, towards_light), dr.dot(normal, towards_eye)
-    cos_m = half_vector_cosine(normal, towards_light, towards_eye)
-    lobe = _ggx(cos_m, coating.alpha) * _smith(cos_o, coating.alpha) / (4 * cos_o)
+    half = dr.normalize(towards_light + towards_eye)
+    facets = _facet_density(coating, normal, half, towards_light)
+    lobe = facets * _smith(cos_o, coating.alpha) / (4 * cos_o)
     density = lobe * coating.specularity + cos_i * (dr.inv_pi * (1 - coating.specularity))
     return dr.select((cos_i > 0) & (cos_o > 0), density, 0.0)
 

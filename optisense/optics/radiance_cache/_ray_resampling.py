@@ -1,0 +1,58 @@
+"""The choice of the rays that are followed on: a part of many, or several copies of few."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from optisense.optics.backend.sequences import unit_float
+
+SPLIT_SHARE = 1 / 16
+"""Share of all rays up to which those that meet an indenter first are split into several. Few rays
+from the skin do, and the contact is bright: on the skin around a contact of GelSight Mini of
+specularity 1, splitting reduces the noise from 17 to 10 %."""
+MOST_CACHED = 40_000
+"""Largest number of places on the skin whose cached light is summed at each reflection; if rays end
+at more, a part of them is drawn. The sum takes as long as the ray on GelSight Mini, and ten times
+as long on GelSight360 with its nine light groups."""
+MOST_COPIES = 16
+"""Largest number of rays into which a ray is split; with 64, the noise is the same."""
+
+
+def drawn(wanted: mi.Bool, weight: mi.Float, bits: mi.UInt32) -> tuple[mi.UInt32, mi.Float]:
+    """Return numbers of the ``wanted`` rays, and the mean number of times that each occurs.
+
+    If there are more than `MOST_CACHED`, they are drawn in proportion to their weights.
+
+    Args:
+        weight: weight (n,) of each ray.
+        bits: random bits (n,) of each ray.
+    """
+    kept = dr.compress(wanted)
+    count = dr.width(kept)
+    if count <= MOST_CACHED:
+        return kept, dr.full(mi.Float, 1, count)
+    weight = dr.gather(mi.Float, weight, kept)
+    until = dr.cumsum(weight)
+    total = dr.gather(mi.Float, until, mi.UInt32(count - 1))
+    shift = unit_float(dr.gather(mi.UInt32, bits, kept[0]))
+    step = total / MOST_CACHED
+    places = (dr.arange(mi.Float, MOST_CACHED) + shift) * step
+    place = dr.binary_search(0, count - 1, lambda i: dr.gather(mi.Float, until, i) <= places)
+    return dr.gather(mi.UInt32, kept, place), dr.gather(mi.Float, weight, place) / step
+
+
+def split(on_skin: mi.Bool, count: int) -> tuple[mi.UInt32, int]:
+    """Return numbers of rays, in which those that are not ``on_skin`` occur several times, and how
+    often they do.
+
+    Args:
+        count: number of rays that were traced.
+    """
+    raised = dr.compress(~on_skin)
+    few = int(SPLIT_SHARE * count)
+    copies = min(MOST_COPIES, max(1, few // max(1, dr.width(raised))))
+    every = dr.arange(mi.UInt32, dr.width(on_skin))
+    if copies == 1 or dr.width(raised) == 0:
+        return every, 1
+    return dr.concat([every, dr.repeat(raised, copies - 1)]), copies
