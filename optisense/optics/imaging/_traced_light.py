@@ -172,7 +172,8 @@ class _SmoothedRegion:
             where there is none, light is not averaged.
         spread: width over which the light of lone bright pixels is spread within the region before,
             as a fraction of the image width; 0 if it is not.
-        averaged: width over which all light is averaged, as a fraction of the image width.
+        averaged: width over which all light is averaged, as a fraction of the image width; 0 if it
+            is not.
     """
 
     pixels: NDArray[np.bool_]
@@ -204,12 +205,15 @@ def _smoothed_regions(plan: SamplingPlan, regions: PixelRegions) -> list[_Smooth
     far = skin & ~regions.within(BESIDE_RANGE / 2)
     x = np.clip(2 * regions.distance / (BESIDE_RANGE * regions.width) - 1, 0, 1)
     farness = np.where(skin, x * x * (3 - 2 * x), 0)
-    # Pixels at the outline of the skin, whose middles do not see it, keep their own light.
-    beyond = outside & ~(near | hit | outline(hit))
+    # Pixels at the outline of the skin see different parts of it, and are not averaged.
+    beyond = outside & ~(near | hit)
+    edge = beyond & outline(hit)
+    beyond &= ~edge
     return [
         _SmoothedRegion(near, near.astype(float), 0, BESIDE_WIDTH),
         _SmoothedRegion(beside, np.where(beside, 1 - farness, 0), BESIDE_SPECK_WIDTH, BESIDE_WIDTH),
         _SmoothedRegion(far, farness, SKIN_SPECK_WIDTH, SKIN_WIDTH),
+        _SmoothedRegion(edge, edge.astype(float), SKIN_SPECK_WIDTH, 0),
         _SmoothedRegion(beyond, beyond.astype(float), SKIN_SPECK_WIDTH, BESIDE_WIDTH),
     ]
 
