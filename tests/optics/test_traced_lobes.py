@@ -15,8 +15,8 @@ from optisense.mechanics import CONFORMING
 from optisense.optics.imaging import _traced_light
 from optisense.optics.imaging.lamp_images import without_specks
 from optisense.optics.radiance_cache import _ray_resampling, traced_lobes
+from optisense.optics.radiance_cache._lobe_guide import LobeGuide
 from optisense.optics.radiance_cache.lit_scene import TAIL_ROUGHNESS, LitScene
-from optisense.optics.radiance_cache.lobe_guide import LobeGuide
 from optisense.optics.scene.sensor_scenes import SensorScenes
 
 METAL = ots.set_value(ots.load("gelsight-mini-ideal"), "coating.specularity", 1.0)

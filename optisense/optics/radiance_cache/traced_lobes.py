@@ -17,10 +17,10 @@ import mitsuba as mi
 from optisense.optics.backend.arrays import gathered, joined
 from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache._irradiance import irradiance
+from optisense.optics.radiance_cache._lobe_guide import LobeGuide
 from optisense.optics.radiance_cache._ray_resampling import drawn, split
 from optisense.optics.radiance_cache.beam_sums import sum_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.lobe_guide import LobeGuide
 from optisense.optics.radiance_cache.shading_points import (
     ShadingPoints,
     interpolating_cell,
