@@ -124,12 +124,11 @@ def test_directions_of_the_guide_have_its_density(monkeypatch: pytest.MonkeyPatc
         )
 
 
-def test_places_are_drawn_in_proportion_to_their_light(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_ray_resampling, "MOST_CACHED", 1000)
+def test_places_are_drawn_in_proportion_to_their_light() -> None:
     random = np.random.default_rng(0)
     wanted, weight = random.random(5000) < 0.8, random.random(5000).astype(np.float32)
     bits = mi.UInt32(random.integers(0, 2**32, 5000, dtype=np.uint32))
-    kept, times = _ray_resampling.drawn(mi.Bool(wanted), mi.Float(weight), bits)
+    kept, times = _ray_resampling.drawn(mi.Bool(wanted), mi.Float(weight), bits, 1000)
     kept, times = np.asarray(kept), np.asarray(times)
     assert len(kept) == 1000 and wanted[kept].all()
     assert (1 / times).sum() == pytest.approx(wanted.sum(), rel=0.1)

@@ -12,9 +12,11 @@ TRACED_ROUGHNESS = 0.15
 """GGX alpha of metallic lobes below which their peaks are traced. At 0.2, beams of two discs leave
 an error of 1.3 % in a contact of GelSight Mini, and a million photons give its pixels a noise of 5
 %; with traced peaks, the noise is 36 % at 0.05."""
-TAIL_ROUGHNESS = 0.4
-"""GGX alpha of the lobe whose direction bins serve the tails of lobes with traced peaks. With the
-finer bins of 0.2, errors in contacts of GelSight Mini and Svelte of specularity 1 are the same."""
+TAIL_ROUGHNESS = 0.3
+"""GGX alpha of the lobe whose direction bins serve the tails of lobes with traced peaks, and the
+skin on which rays end. With the coarser bins of 0.4, the error of the skin in the corner of
+GelSight Mini's view is 4.0 instead of 2.8 % at a specularity of 1, in 0.87 times the time. With the
+finer bins of 0.1, it is 3.0 %."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,12 @@ from optisense.optics.backend.arrays import gathered, joined
 from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache._irradiance import irradiance
 from optisense.optics.radiance_cache._lobe_guide import LobeGuide
-from optisense.optics.radiance_cache._ray_resampling import drawn, split
+from optisense.optics.radiance_cache._ray_resampling import (
+    MOST_CACHED,
+    MOST_GATHERED,
+    drawn,
+    split,
+)
 from optisense.optics.radiance_cache.beam_sums import sum_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.shading_points import (
@@ -282,7 +287,8 @@ class LobeTracer:
         self._add(found, diffuse, lane, raised & known)
         on_skin = known & ~raised
         dr.eval(cell, on_skin, raised)
-        kept, share = drawn(on_skin & ~read, dr.max(end.weight), bits)
+        most = MOST_CACHED if only_tail else MOST_GATHERED
+        kept, share = drawn(on_skin & ~read, dr.max(end.weight), bits, most)
         if dr.width(kept) < FEWEST_RAYS:
             return on_skin, raised
         flat = gathered(end, kept)
@@ -293,7 +299,8 @@ class LobeTracer:
         at = ShadingPoints(
             points, coating, flat.point, cell, mi.Vector3f(0), mi.Bool(flat.valid), mi.Bool(False)
         )
-        sums = sum_beams(self.cache.beams, light.groups, at, bin_axis(light.cells, 2))
+        axis = bin_axis(light.cells, 2)
+        sums = sum_beams(self.cache.beams, light.groups, at, axis, elongated=not only_tail)
         self._add(found, [each * flat.weight / share for each in sums], lane, flat.valid)
         return on_skin, raised
 
