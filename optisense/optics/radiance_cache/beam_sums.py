@@ -12,7 +12,6 @@ from optisense.optics.radiance_cache.angular_variance import (
     broadened_coating,
     coating_with_broadened_tail,
     sample_direction,
-    two_discs,
 )
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
@@ -31,23 +30,20 @@ def sum_beams(
     groups: int,
     at: ShadingPoints,
     axis: mi.Vector3f,
-    elongated: bool = False,
 ) -> list[mi.Color3f]:
     """Return the radiance (3, n) towards the camera due to all beams, for points on the undeformed
     surface, for each light group.
 
     Args:
         axis: unit vector, the axis of the direction bins.
-        elongated: whether metallic lobes see each beam as two discs that have its variances along
-            two axes, instead of one.
     """
     totals = [mi.Color3f(0) for _ in range(groups)]
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, at.active)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, at.active)
-    while dr.hint(j < end, exclude=[beams, groups, at, end, axis, elongated]):
+    while dr.hint(j < end, exclude=[beams, groups, at, end, axis]):
         towards, cosine, flux, tag = beam_at(beams, j)
         group = tag & GROUP_MASK
-        reflected = flux * _reflected(beams, j, at, axis, towards, cosine, elongated)
+        reflected = flux * _reflected(beams, j, at, axis, towards, cosine)
         for g in range(groups):
             totals[g] += dr.select(group == g, reflected, 0)
         j += 1
@@ -150,23 +146,17 @@ def _reflected(
     axis: mi.Vector3f,
     towards: mi.Vector3f,
     cosine: mi.Float,
-    elongated: bool = False,
 ) -> mi.Color3f:
     """Return the radiance (3, n) that coatings reflect towards the camera of beams of unit flux
-    density; ``elongated`` as in `sum_beams`.
+    density.
     """
-    coating, normal, towards_eye = at.coating, at.seen.normal, at.seen.towards_eye
-    if not (coating.only_tail or elongated):
-        return evaluate_coating(broadened_coating(coating, cosine), normal, towards, towards_eye)
-    height = dr.gather(mi.Float, beams.heights, number)
-    light = angular_variance(axis, towards, cosine, height)
-    if coating.only_tail:
-        broadened = coating_with_broadened_tail(coating, light, cosine)
-        return evaluate_coating(broadened, normal, towards, towards_eye)
-    one, other, within = two_discs(light)
-    broadened = broadened_coating(coating, within)
-    total = evaluate_coating(broadened, normal, one, towards_eye)
-    return (total + evaluate_coating(broadened, normal, other, towards_eye)) * 0.5
+    if at.coating.only_tail:
+        height = dr.gather(mi.Float, beams.heights, number)
+        light = angular_variance(axis, towards, cosine, height)
+        coating = coating_with_broadened_tail(at.coating, light, cosine)
+    else:
+        coating = broadened_coating(at.coating, cosine)
+    return evaluate_coating(coating, at.seen.normal, towards, at.seen.towards_eye)
 
 
 def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:

@@ -300,7 +300,7 @@ class LobeTracer:
             points, coating, flat.point, cell, mi.Vector3f(0), mi.Bool(flat.valid), mi.Bool(False)
         )
         axis = bin_axis(light.cells, 2)
-        sums = sum_beams(self.cache.beams, light.groups, at, axis, elongated=not only_tail)
+        sums = sum_beams(self.cache.beams, light.groups, at, axis)
         self._add(found, [each * flat.weight / share for each in sums], lane, flat.valid)
         return on_skin, raised
 
