@@ -45,7 +45,13 @@ from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Ray, RayScene, leave
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.scene.surfaces import Region, SurfaceKind
-from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, follow, generator
+from optisense.optics.transport.camera_paths import (
+    PathEnd,
+    VisiblePoints,
+    follow,
+    follow_branches,
+    generator,
+)
 from optisense.optics.transport.interact import RayKind
 
 MAX_REFLECTIONS = 16
@@ -129,10 +135,10 @@ class LobeTracer:
         guided = pick < share
         pick = dr.select(guided, pick / GUIDED_SHARE, (pick - share) / (1 - share))
         way, _ = sample_coating(coating, first.normal, -first.towards_eye, pick, mi.Point2f(u, v))
-        density = (1 - share) * coating_density(coating, first.normal, way, first.towards_eye)
         if guide is not None:
             way = dr.select(guided, guide.sample(owner, pick, mi.Point2f(u, v)), way)
-            density = (1 - share) * coating_density(coating, first.normal, way, first.towards_eye)
+        density = (1 - share) * coating_density(coating, first.normal, way, first.towards_eye)
+        if guide is not None:
             density += share * guide.density(owner, way)
         ray = Ray(leave(first.point, first.face_normal, way), way, first.valid)
         ray.active &= (coating.specularity > 0) & (density > 0)
@@ -154,6 +160,7 @@ class LobeTracer:
         return found
 
     def _guide(self, points: VisiblePoints) -> LobeGuide:
+        """Return the guide of the lobes of points on the undeformed skin."""
         light, table = self.cache.binned, self.scenes.full.table
         cell, shift, known = interpolating_cell(
             light.cells, points.point, points.valid, points.series, points.number
@@ -336,14 +343,7 @@ def _both_ways(
     turned = dr.compress(branch.active)
     if dr.width(turned) >= FEWEST_RAYS:
         other = dr.gather(mi.UInt32, bits, turned) ^ GOLDEN_BITS
-        back, _, _ = follow(
-            scene,
-            gathered(branch, turned),
-            dr.gather(mi.Color3f, share, turned),
-            generator(other),
-            RayKind.REFLECTION,
-        )
-        parts.append((back, turned))
+        parts.append((follow_branches(scene, branch, share, turned, other), turned))
     ends, numbers = [], []
     for end, number in parts:
         dr.eval(end)

@@ -132,6 +132,21 @@ def follow(
     return end, branched, total
 
 
+def follow_branches(
+    scene: RayScene, branch: Ray, weight: mi.Color3f, paths: mi.UInt32, bits: mi.UInt32
+) -> PathEnd:
+    """Follow the reflections that `follow` has drawn of some paths from the camera to their ends.
+
+    Args:
+        branch: the reflections (n,) of all paths.
+        weight: sums (3, n) of the weights of their reflections.
+        paths: numbers (k,) of the paths whose reflections are followed.
+        bits: random bits (k,) of each of these.
+    """
+    ray, weight = gathered(branch, paths), dr.gather(mi.Color3f, weight, paths)
+    return follow(scene, ray, weight, generator(bits), RayKind.REFLECTION)[0]
+
+
 MAX_PIXEL_SAMPLES = 64
 """Largest number of camera samples that are spread over a pixel together: more than the samples of
 any pixel in practice, and few enough that the table of lattices is built at once."""
@@ -212,13 +227,7 @@ def find_visible_points(
     if dr.width(lanes) == 0:
         return main, None
     other, series, number = (dr.gather(mi.UInt32, each, lanes) for each in (other, series, number))
-    end, _, _ = follow(
-        scene,
-        gathered(branch, lanes),
-        dr.gather(mi.Color3f, total, lanes),
-        generator(other),
-        RayKind.REFLECTION,
-    )
+    end = follow_branches(scene, branch, total, lanes, other)
     dr.eval(end, other, series, number)
     kept = dr.compress(end.valid | (end.light > 0))
     if dr.width(kept) == 0:
