@@ -112,9 +112,9 @@ class LobeSamples:
     @classmethod
     def of_contacts(cls, pixels: NDArray[np.bool_], count: int, rays: float) -> LobeSamples:
         """Return the samples of pixels in contacts, which draw a number of rays together."""
-        passes = math.ceil(rays / MOST_RAYS)
+        passes = max(1, math.ceil(rays / MOST_RAYS))
         directions = _directions(rays / passes, pixels, count)
-        return cls(pixels, count, directions, False, CONTACT_REACH, passes)
+        return cls(pixels, count, directions, gathers=False, reach=CONTACT_REACH, passes=passes)
 
     @classmethod
     def of_skin(cls, pixels: NDArray[np.bool_], rays: float, segments: float = 0) -> LobeSamples:
