@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import gc
 import json
 import os
 import select
@@ -145,6 +146,8 @@ def serve(address: str) -> None:
     with socket.socket(socket.AF_UNIX) as asked:
         asked.bind(address)
         asked.listen()
+        gc.collect()
+        gc.freeze()  # else the collections of a fork would copy the pages of all objects
         os.write(1, b"ready\n")
         while True:
             ready, _, _ = select.select([asked, 0], [], [])
