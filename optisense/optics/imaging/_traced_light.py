@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import drjit as dr
 import mitsuba as mi
@@ -24,8 +24,7 @@ from optisense.optics.scene.bsdf import (
     coating_density,
     coating_of,
     evaluate_coating,
-    half_vector_cosine,
-    peak_share,
+    evaluate_peak,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.lamp_windows import LampWindows
@@ -316,7 +315,7 @@ def _lit_rays(rays: LobeRays, groups: int) -> mi.UInt32:
     total = mi.Float(0)
     for i in range(groups * 3):
         total += dr.gather(mi.Float, rays.light, first + i)
-    return dr.compress((total > 0) & (rays.density > 0))
+    return dr.compress((total != 0) & (rays.density > 0))
 
 
 @dataclass
@@ -473,8 +472,6 @@ def _reflected(
     """Return the BSDF times the cosine (3, n) of the peak of the lobe alone, or of the ``whole``
     coating, for light that arrives from unit directions.
     """
-    lobe = replace(coating, reflectance=mi.Color3f(0))
-    peak = evaluate_coating(lobe, points.normal, way, points.towards_eye)
-    peak *= peak_share(half_vector_cosine(points.normal, way, points.towards_eye))
+    peak = evaluate_peak(coating, points.normal, way, points.towards_eye)
     every = evaluate_coating(coating, points.normal, way, points.towards_eye)
     return dr.select(whole, every, peak)

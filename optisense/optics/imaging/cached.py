@@ -106,7 +106,9 @@ def render_cached(
         layers, reflections = image.sample_far()
     main = layers - reflections if known is not None else None
     if cache.traced_lobes:
-        layers = layers + traced_layers(cache, scenes, camera, windows, plan, regions, seed)
+        # Light of skin that mirrored contacts hide is subtracted, with noise.
+        traced = traced_layers(cache, scenes, camera, windows, plan, regions, seed)
+        layers = np.maximum(layers + traced, 0)
     elif regions.near.any() and not image.faint_known:
         layers = layers + image.interreflection()
     if known is not None and main is not None:

@@ -137,7 +137,7 @@ def without_specks(
     reach: float = SPECK_WIDTH,
 ) -> NDArray[np.float32]:
     """Return layers (groups, h, w, 3) with the light of lone bright pixels spread over the pixels
-    around them, so that its sum does not change.
+    around them, so that its sum does not change. Light that is subtracted is spread likewise.
 
     Args:
         steady: mask (h, w) of pixels that keep their light.
@@ -164,15 +164,17 @@ def without_specks(
     spread = np.zeros_like(layers)
     for layer, found in zip(layers, spread, strict=True):
         bright = layer.sum(axis=-1)
-        left = np.where(steady | ~region, bright, _left_of_lone(bright))
-        kept = np.divide(left, bright, out=np.ones_like(bright), where=bright > 0)[..., None]
+        left = _left_of_lone(np.maximum(bright, 0)) - _left_of_lone(np.maximum(-bright, 0))
+        left = np.where(steady | ~region, bright, left)
+        kept = np.divide(left, bright, out=np.ones_like(bright), where=bright != 0)[..., None]
         lone = layer * (1.0 - kept)
         if not lone.any():
             found[...] = layer
             continue
         for k in range(3):
             found[..., k] = around(lone[..., k].astype(np.float64) * leaving) * arriving
-        np.maximum(found, 0.0, out=found)  # rounding gives -1e-17
+        if layer.min() >= 0:
+            np.maximum(found, 0.0, out=found)  # rounding gives -1e-17
         found += layer * kept
     return spread
 

@@ -9,7 +9,7 @@ that the cache serves it (see `CoatingBsdf.only_tail`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -34,6 +34,8 @@ from optisense.optics.radiance_cache.shading_points import (
 from optisense.optics.scene.bsdf import (
     coating_density,
     coating_of,
+    evaluate_coating,
+    evaluate_peak,
     half_vector_cosine,
     peak_share,
     sample_coating,
@@ -144,8 +146,13 @@ class LobeTracer:
         ray.active &= (coating.specularity > 0) & (density > 0)
         ray.active &= (dr.dot(way, first.face_normal) > 0) & (dr.dot(way, first.normal) > 0)
         whole = self._is_uncached(first, ray)
-        cos_m = half_vector_cosine(first.normal, way, first.towards_eye)
-        ray.active &= whole | (peak_share(cos_m) > 0)
+        every = evaluate_coating(coating, first.normal, way, first.towards_eye)
+        peak = evaluate_peak(coating, first.normal, way, first.towards_eye)
+        traced = dr.select(whole, 1, dr.select(every > 0, peak / every, 0))
+        if gathers and self.scenes.indenters is not None:
+            whole = dr.full(mi.Bool, True, count)
+        else:
+            ray.active &= dr.max(traced) > 0
         found = LobeRays(
             owner,
             way,
@@ -155,8 +162,8 @@ class LobeTracer:
             dr.zeros(mi.Float, count),
         )
         bits = next_random((first.random ^ (number * GOLDEN_BITS)) * 69069)
-        dr.eval(found, ray, bits)
-        self._follow(found, ray, bits, gathers)
+        dr.eval(found, ray, bits, traced)
+        self._follow(found, ray, bits, traced, gathers)
         return found
 
     def _guide(self, points: VisiblePoints) -> LobeGuide:
@@ -186,11 +193,15 @@ class LobeTracer:
         held &= ~raised | scenes.fixed.occluded(ray.origin, -ray.direction, held & raised)
         return straight & ~held
 
-    def _follow(self, found: LobeRays, ray: Ray, bits: mi.UInt32, gathers: bool) -> None:
+    def _follow(
+        self, found: LobeRays, ray: Ray, bits: mi.UInt32, traced: mi.Color3f, gathers: bool
+    ) -> None:
         """Add the light that arrives along rays to ``found``.
 
         Args:
             bits: random bits (n,) of each ray.
+            traced: share (3, n) of the reflected light of each ray that the cache does not hold if
+                it comes from skin or lamps; 1 if it comes straight from an indenter.
             gathers: as in `trace`. Rays whose light is read on the skin go on, in the whole lobe,
                 but only the light of indenters that they meet is added, which the cache does not
                 hold.
@@ -222,6 +233,12 @@ class LobeTracer:
             lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
             if reflections == 0:
                 dr.scatter(found.distance, end.distance, lane)
+            if reflections == 0 and gathers and self.scenes.indenters is not None:
+                share = dr.gather(mi.Color3f, traced, lane)
+                mirrored = _on_indenter(scene.table, end)
+                self._subtract_skin_behind(found, end, lane, bits, 1 - share, mirrored)
+                end.weight *= dr.select(mirrored, 1, share)
+                end.valid &= dr.max(end.weight) > 0
             self._add_lamps(found, end, lane, ~read)
             kept = dr.compress(end.valid)
             if dr.width(kept) < FEWEST_RAYS:
@@ -250,6 +267,45 @@ class LobeTracer:
             kept = dr.compress(ray.active)
             ray, weight = gathered(ray, kept), dr.gather(mi.Color3f, weight, kept)
             lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
+
+    def _subtract_skin_behind(
+        self,
+        found: LobeRays,
+        end: PathEnd,
+        lane: mi.UInt32,
+        bits: mi.UInt32,
+        held: mi.Color3f,
+        mirrored: mi.Bool,
+    ) -> None:
+        """Subtract the light of the skin behind indenters that interfaces mirror.
+
+        The cache does not know of contacts: in place of the light of such an indenter, which rays
+        of the whole lobe bring, it holds that of the skin behind.
+
+        Args:
+            held: share (3, n) of the reflected light of each ray that the cache holds.
+            mirrored: mask of the rays that end on indenters.
+        """
+        kept = dr.compress(mirrored & (dr.max(held) > 0))
+        if dr.width(kept) < FEWEST_RAYS:
+            return
+        skin, weight = gathered(end, kept), dr.gather(mi.Color3f, held, kept)
+        away = -skin.towards_eye
+        behind = self.scenes.fixed.intersect(Ray(skin.point, away, mi.Bool(skin.valid)))
+        side = -dr.sign(dr.dot(away, behind.normal))
+        skin = replace(
+            skin,
+            valid=behind.valid,
+            weight=-skin.weight * weight,
+            point=behind.point,
+            normal=behind.shading_normal * side,
+            face_normal=behind.normal * side,
+            surface=behind.surface,
+        )
+        lane, bits = dr.gather(mi.UInt32, lane, kept), dr.gather(mi.UInt32, bits, kept)
+        dr.eval(skin, lane, bits)
+        read = dr.full(mi.Bool, False, dr.width(kept))
+        self._add_cached(found, skin, lane, bits, read, False)
 
     def _add_lamps(self, found: LobeRays, end: PathEnd, lane: mi.UInt32, counts: mi.Bool) -> None:
         """Add the light of the lamps that rays meet, of those rays that the mask ``counts``."""
@@ -295,7 +351,7 @@ class LobeTracer:
         on_skin = known & ~raised
         dr.eval(cell, on_skin, raised)
         most = MOST_CACHED if only_tail else MOST_GATHERED
-        kept, share = drawn(on_skin & ~read, dr.max(end.weight), bits, most)
+        kept, share = drawn(on_skin & ~read, dr.max(dr.abs(end.weight)), bits, most)
         if dr.width(kept) < FEWEST_RAYS:
             return on_skin, raised
         flat = gathered(end, kept)
@@ -319,6 +375,13 @@ class LobeTracer:
             for k in range(3):
                 entry = (lane * len(light) + g) * 3 + k
                 dr.scatter_add(found.light, value[k], entry, active)
+
+
+def _on_indenter(table: mi.Float, end: PathEnd) -> mi.Bool:
+    """Return a mask (n,) of the ends on indenters, without those on skin that is bent beside them,
+    whose light hardly differs from that of the skin at rest.
+    """
+    return end.valid & (surface_region(table, end.surface, end.valid) == int(Region.INDENTER))
 
 
 def _both_ways(

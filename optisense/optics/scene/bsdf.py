@@ -9,7 +9,7 @@ Heitz 2018) of its complex index.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import drjit as dr
 import mitsuba as mi
@@ -327,6 +327,15 @@ def peak_share(cos_m: mi.Float) -> mi.Float:
     first, last = PEAK_ANGLES
     x = dr.clip((math.cos(first) - cos_m) / (math.cos(first) - math.cos(last)), 0, 1)
     return 1 - x * x * (3 - 2 * x)
+
+
+def evaluate_peak(
+    coating: CoatingBsdf, normal: mi.Vector3f, towards_light: mi.Vector3f, towards_eye: mi.Vector3f
+) -> mi.Color3f:
+    """Return the part of `evaluate_coating` that belongs to the peaks of metallic lobes."""
+    lobe = replace(coating, reflectance=mi.Color3f(0))
+    value = evaluate_coating(lobe, normal, towards_light, towards_eye)
+    return value * peak_share(half_vector_cosine(normal, towards_light, towards_eye))
 
 
 def half_vector_cosine(normal: mi.Vector3f, one: mi.Vector3f, other: mi.Vector3f) -> mi.Float:
