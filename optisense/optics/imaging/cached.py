@@ -20,7 +20,7 @@ from optisense.optics.imaging._contact_light import (
 from optisense.optics.imaging._film import Film, repeated
 from optisense.optics.imaging._grain import GRAIN_SAMPLES, OUTLINE_SAMPLES, grainy, outline
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
-from optisense.optics.imaging._traced_light import traced_layers
+from optisense.optics.imaging._traced_light import NEAR_WIDTH, traced_layers
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.lamp_images import LampImages
@@ -173,7 +173,12 @@ class _Shading:
 
     def main_layers(self) -> NDArray[np.float32]:
         """Return the layers without reflections of interfaces and interreflection."""
-        return self.film.layers(*self.size)
+        smooth = []
+        if self.cache.traced_lobes:
+            # The tails of narrow lobes differ between the cells of the cache.
+            around = self.regions.near & (self.regions.distance > 1.0)
+            smooth = [(around, round(NEAR_WIDTH * self.camera.width) | 1)]
+        return self.film.averaged_layers(*self.size, smooth)
 
     def reflections(self) -> NDArray[np.float32]:
         """Return the layers of the light that interfaces reflect to the camera; zero if it is

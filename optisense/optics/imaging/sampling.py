@@ -138,6 +138,11 @@ class PixelRegions:
         return cls(rays, contacts, distance, around | (region == Region.BENT))
 
     @property
+    def bent(self) -> NDArray[np.bool_]:
+        """The mask (h, w) of the pixels that see elastic skin which is bent beside contacts."""
+        return self.rays.hit & (self.rays.region == Region.BENT)
+
+    @property
     def width(self) -> int:
         """The width of the image, pixels."""
         return int(self.contacts.shape[1])

@@ -78,8 +78,8 @@ class LobeRays:
         density: (n,) density (1/sr) with which each direction was drawn; 0 for rays that carry no
             light.
         whole: (n,) mask of the rays that the whole coating reflects, as the cache does not hold
-            their light, which comes straight from another coating; of the others, it is the peaks
-            of metallic lobes.
+            their light, which comes straight from another coating, or from an indenter that an
+            interface mirrors; of the others, it is the peaks of metallic lobes.
         light: radiance, 1/(mm^2 sr) for lights of 1 mW, that arrives along each ray: three channels
             of each light group, (3 groups n,).
         distance: (n,) length (mm) of the way to the first lamp or coating.
