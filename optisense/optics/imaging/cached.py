@@ -23,7 +23,7 @@ from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, 
 from optisense.optics.imaging._traced_light import NEAR_WIDTH, traced_layers
 from optisense.optics.imaging.image_layers import ImageLayers, masked
 from optisense.optics.imaging.known_view import KnownView
-from optisense.optics.imaging.lamp_images import LampImages
+from optisense.optics.imaging.lamp_images import LampImages, without_specks
 from optisense.optics.imaging.sampling import FULL_SAMPLING, PixelRegions, SamplingPlan
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
@@ -311,6 +311,11 @@ class _Shading:
             self.sample(pixel, number, False, count=count)
         reflections = self.reflections()
         if sparse:
+            # Where interfaces reflect to the camera is met by few samples, which show as dots.
+            shaded = (far & rays.hit)[::2, ::2]
+            reflections[:, ::2, ::2] = without_specks(
+                reflections[:, ::2, ::2], np.zeros_like(shaded), shaded
+            )
             fill(reflections, filled)
         layers = self.main_layers() + reflections
         step = 2 if sparse else 1
