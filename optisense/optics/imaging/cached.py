@@ -178,7 +178,7 @@ class _Shading:
             # The tails of narrow lobes differ between the cells of the cache.
             around = self.regions.near & (self.regions.distance > 1.0)
             smooth = [(around, round(NEAR_WIDTH * self.camera.width) | 1)]
-        return self.film.averaged_layers(*self.size, smooth)
+        return self.film.averaged_layers(*self.size, smooth, deblurred=True)
 
     def reflections(self) -> NDArray[np.float32]:
         """Return the layers of the light that interfaces reflect to the camera; zero if it is
