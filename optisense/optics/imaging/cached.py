@@ -311,7 +311,7 @@ class _Shading:
             self.sample(pixel, number, False, count=count)
         reflections = self.reflections()
         if sparse:
-            # Where interfaces reflect to the camera is met by few samples, which show as dots.
+            # Where few samples meet such reflections, each would show as a dot.
             shaded = (far & rays.hit)[::2, ::2]
             reflections[:, ::2, ::2] = without_specks(
                 reflections[:, ::2, ::2], np.zeros_like(shaded), shaded
