@@ -1,4 +1,4 @@
-"""The light in narrow metallic lobes: rays of `traced_lobes`, which neighbouring pixels share."""
+"""The light in narrow metallic lobes, which rays of `traced_lobes` bring."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.backend.arrays import padded
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film, average_pixels, repeated
@@ -21,7 +20,6 @@ from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.traced_lobes import FEWEST_RAYS, LobeRays, LobeTracer
 from optisense.optics.scene.bsdf import (
     CoatingBsdf,
-    coating_density,
     coating_of,
     evaluate_coating,
     evaluate_peak,
@@ -43,8 +41,8 @@ MOST_RAYS = 2_000_000
 """Largest number of rays that are traced together; their light takes up to 200 MB."""
 BENT_RAYS = 0.5
 """Number of rays from elastic skin that is bent beside contacts for each photon of the cache. Such
-skin shows lamps as contacts do: with half as many rays, which pixels do not share, its noise is 84
-to 129 instead of 21 to 35 % on GelSight Mini, with a million photons."""
+skin shows lamps as contacts do. With half as many rays, which end on the skin, its noise on
+GelSight Mini with a million photons is 84 to 129 instead of 31 to 45 %."""
 NEAR_RAYS = 0.15
 """Number of rays from other pixels around contacts (`PixelRegions.near`) for each photon. With a
 fifth as many, the means of quarters of the skin around a contact of GelSight360 have a noise of 9
@@ -66,10 +64,6 @@ SKIN_SEGMENTS = 0.7
 GelSight Mini, whose rays mostly leave through the glass, there are two passes."""
 MOST_PASSES = 4
 """Largest number of these passes."""
-CONTACT_REACH = 1
-"""Distance (pixels) in rows and columns up to which pixels in contacts share their rays. In a
-contact of GelSight Mini at 160x120 pixels, this reduces the noise of pixels from 21 to 16 %. A
-distance of 2 reduces it little more."""
 MIRRORED_SHARE = 0.25
 """Number of rays from a point that the camera sees by reflection at an interface, as a share of
 those from a point that it sees directly. On the skin around a contact of GelSight Svelte of
@@ -93,11 +87,6 @@ BESIDE_SPECK_WIDTH = 1 / 40
 """The same within `BESIDE_RANGE` of contacts, which are bright and show in the skin around them.
 Over a sixteenth of the width, the error of GelBelt's skin within 1 mm of a contact is 3.1 instead
 of 2.8 %; without spreading, single rays are spots of five pixels."""
-NO_PLACE = 0xFFFFFFFF
-"""Marker of pixels without samples: a number of all one bits, which no index reaches."""
-LEAST_DENSITY = 1e-6
-"""Lower bound on the sum of densities (1/sr) by which light is divided: rounding may turn the only
-pixel whose lobe contains a direction away from it."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +98,6 @@ class LobeSamples:
         count: number of camera samples of each pixel.
         directions: number of rays from each sample.
         gathers: whether the rays end on the skin that they meet (see `LobeTracer.trace`).
-        reach: distance (pixels) in rows and columns up to which they share their rays.
         passes: number of passes in which the samples draw rays.
         segments: number of segments of rays, from coating to coating, up to which there are further
             passes, with samples of their own.
@@ -119,16 +107,17 @@ class LobeSamples:
     count: int
     directions: int
     gathers: bool = True
-    reach: int = 0
     passes: int = 1
     segments: float = 0
 
     @classmethod
     def of_contacts(cls, pixels: NDArray[np.bool_], count: int, rays: float) -> LobeSamples:
-        """Return the samples of pixels in contacts, which draw a number of rays together."""
+        """Return the samples of pixels that see contacts or bent skin, which draw a number of rays
+        together.
+        """
         passes = max(1, math.ceil(rays / MOST_RAYS))
         directions = _directions(rays / passes, pixels, count)
-        return cls(pixels, count, directions, gathers=False, reach=CONTACT_REACH, passes=passes)
+        return cls(pixels, count, directions, gathers=False, passes=passes)
 
     @classmethod
     def of_skin(cls, pixels: NDArray[np.bool_], rays: float, segments: float = 0) -> LobeSamples:
@@ -321,16 +310,12 @@ class _Image:
             tracer = LobeTracer(self.cache, self.scenes, self.lamps, channel)
             rays = tracer.trace(points, samples.directions, samples.gathers)
             segments += rays.segments
-            if samples.reach > 0:
-                seen = _Seen.of(points, scene.table, samples.pixels)
-                _add_shared(film, rays, seen, samples.reach, 1 / samples.directions)
-            else:
-                _add_own(film, rays, points, scene.table, 1 / samples.directions)
+            _add_light(film, rays, points, scene.table, 1 / samples.directions)
             dr.eval(film.sums)
             if mirrored is not None:
                 directions = max(1, round(MIRRORED_SHARE * samples.directions))
                 rays = tracer.trace(mirrored, directions, samples.gathers)
-                _add_own(film, rays, mirrored, scene.table, 1 / directions)
+                _add_light(film, rays, mirrored, scene.table, 1 / directions)
                 dr.eval(film.sums)
         return segments
 
@@ -344,132 +329,14 @@ def _lit_rays(rays: LobeRays, groups: int) -> mi.UInt32:
     return dr.compress((total != 0) & (rays.density > 0))
 
 
-@dataclass
-class _Seen:
-    """The visible points of pixels, each of which has the same number of samples.
-
-    Attributes:
-        points: the visible points: the first sample of all pixels, then the second, and so on.
-        table: the optical data of the surfaces.
-        place: place among the pixels of each pixel of the image, `NO_PLACE` for the others.
-        pixels: number of the pixels.
-        width, height: size of the image, pixels.
-    """
-
-    points: VisiblePoints
-    table: mi.Float
-    place: mi.UInt32
-    pixels: mi.UInt32
-    width: mi.UInt32
-    height: mi.UInt32
-
-    @classmethod
-    def of(cls, points: VisiblePoints, table: mi.Float, pixels: NDArray[np.bool_]) -> _Seen:
-        place = np.full(pixels.size, NO_PLACE, dtype=np.uint32)
-        chosen = np.flatnonzero(pixels)
-        place[chosen] = np.arange(len(chosen))
-        sizes = (len(chosen), pixels.shape[1], pixels.shape[0])
-        return cls(
-            points, table, mi.UInt32(padded(place)), *(dr.opaque(mi.UInt32, s) for s in sizes)
-        )
-
-    def beside(
-        self, pixel: mi.UInt32, number: mi.UInt32, side: int, first: mi.UInt32
-    ) -> tuple[VisiblePoints, CoatingBsdf, mi.Bool]:
-        """Return a sample of a pixel around others, its coating, and whether there is one.
-
-        Args:
-            pixel: the others.
-            number: number of the pixel in the square around each of them.
-            side: side of this square, pixels.
-            first: number of the sample times the number of pixels.
-        """
-        # Whole numbers without a sign wrap around, so that those left of 0 are too large.
-        column = pixel % self.width + number % side - side // 2
-        row = pixel // self.width + number // side - side // 2
-        there = (column < self.width) & (row < self.height)
-        place = dr.gather(mi.UInt32, self.place, row * self.width + column, there)
-        there &= place != NO_PLACE
-        points = dr.gather(VisiblePoints, self.points, first + place, there)
-        there &= points.valid
-        return points, coating_of(self.table, points.surface, there), there
-
-
-def _add_shared(film: Film, rays: LobeRays, seen: _Seen, reach: int, share: float) -> None:
-    """Add the light that arrives along rays to the pixels around those that drew them.
-
-    The light hardly differs between neighbouring pixels, while their lobes differ: each pixel
-    reflects it with its own lobe. A pixel's samples and those of its neighbours that have the same
-    number form one estimator with several densities, combined by the balance heuristic (Veach and
-    Guibas 1995). The direction from which light arrives is that from the other pixel's point to the
-    end of the ray, as though the ray were straight: plane mirrors and interfaces between similar
-    media show lamps at fixed places. Without this, the light at the rim of a contact of GelSight
-    Mini at 160x120 pixels would be 3 % off. Light that comes straight from another coating varies
-    faster, and is not shared.
+def _add_light(
+    film: Film, rays: LobeRays, seen: VisiblePoints, table: mi.Float, share: float
+) -> None:
+    """Add the light that arrives along rays to the pixels that drew them.
 
     Args:
         share: inverse of the number of rays of each sample.
     """
-    lit = _lit_rays(rays, len(film.sums))
-    if dr.width(lit) >= FEWEST_RAYS:
-        _scatter_shared(film, rays, seen, lit, 2 * reach + 1, share)
-
-
-@dr.syntax
-def _scatter_shared(
-    film: Film, rays: LobeRays, seen: _Seen, lit: mi.UInt32, side: int, share: float
-) -> None:
-    owner = dr.gather(mi.UInt32, rays.owner, lit)
-    whole = dr.gather(mi.Bool, rays.whole, lit)
-    start = dr.gather(mi.Point3f, seen.points.point, owner)
-    pixel = dr.gather(mi.UInt32, seen.points.pixel, owner)
-    end = start + dr.gather(mi.Vector3f, rays.way, lit) * dr.gather(mi.Float, rays.distance, lit)
-    first = owner - owner % seen.pixels
-    weight = dr.opaque(mi.Float, share)
-    i = mi.UInt32(0)
-    while dr.hint(
-        i < side * side,
-        exclude=[film, rays, seen, lit, side, whole, pixel, end, first, weight],
-    ):
-        points, coating, there = seen.beside(pixel, i, side, first)
-        there &= ~whole | (i == side * side // 2)
-        reflected = _reflected(points, coating, dr.normalize(end - points.point), whole)
-        if dr.hint(
-            there & (dr.max(reflected) > 0),
-            exclude=[
-                film,
-                rays,
-                seen,
-                lit,
-                side,
-                whole,
-                end,
-                first,
-                weight,
-                points,
-                reflected,
-            ],
-        ):
-            density = mi.Float(0)
-            j = mi.UInt32(0)
-            while dr.hint(j < side * side, exclude=[seen, side, whole, end, first, points]):
-                other, lobe, exists = seen.beside(points.pixel, j, side, first)
-                exists &= ~whole | (j == side * side // 2)
-                back = end - other.point
-                way = dr.normalize(back)
-                drawn = coating_density(lobe, other.normal, way, other.towards_eye)
-                density += dr.select(exists, drawn / dr.squared_norm(back), 0)
-                j += 1
-            density *= dr.squared_norm(end - points.point)
-            value = reflected * points.weight * (weight / dr.maximum(density, LEAST_DENSITY))
-            _add_light(film, rays, lit, value, points.pixel)
-        i += 1
-
-
-def _add_own(
-    film: Film, rays: LobeRays, seen: VisiblePoints, table: mi.Float, share: float
-) -> None:
-    """Add the light that arrives along rays to the pixels that drew them; see `_add_shared`."""
     lit = _lit_rays(rays, len(film.sums))
     if dr.width(lit) < FEWEST_RAYS:
         return
@@ -478,18 +345,11 @@ def _add_own(
     way, whole = dr.gather(mi.Vector3f, rays.way, lit), dr.gather(mi.Bool, rays.whole, lit)
     value = _reflected(points, coating, way, whole) * points.weight
     value *= dr.opaque(mi.Float, share) / dr.gather(mi.Float, rays.density, lit)
-    _add_light(film, rays, lit, value, points.pixel)
-
-
-def _add_light(
-    film: Film, rays: LobeRays, lit: mi.UInt32, value: mi.Color3f, pixel: mi.UInt32
-) -> None:
-    """Add the light of the rays of numbers ``lit`` to pixels (n,), times a colour (3, n)."""
     groups = len(film.sums)
     for g in range(groups):
         for k in range(3):
             light = dr.gather(mi.Float, rays.light, (lit * groups + g) * 3 + k)
-            dr.scatter_add(film.sums[g], light * value[k], pixel * 3 + k)
+            dr.scatter_add(film.sums[g], light * value[k], points.pixel * 3 + k)
 
 
 def _reflected(

@@ -160,7 +160,6 @@ def _secondary_hits(
         towards_eye=-way,
         surface=dr.select(raised, pressed.surface, skin.surface),
         light=mi.UInt32(0),
-        distance=mi.Float(0),
         pixel=points.pixel,
         random=random,
         series=next_random(random ^ points.series),

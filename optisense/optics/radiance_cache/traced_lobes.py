@@ -82,7 +82,6 @@ class LobeRays:
             interface mirrors; of the others, it is the peaks of metallic lobes.
         light: radiance, 1/(mm^2 sr) for lights of 1 mW, that arrives along each ray: three channels
             of each light group, (3 groups n,).
-        distance: (n,) length (mm) of the way to the first lamp or coating.
         segments: number of all segments of rays from coating to coating.
     """
 
@@ -91,7 +90,6 @@ class LobeRays:
     density: mi.Float
     whole: mi.Bool
     light: mi.Float
-    distance: mi.Float
     segments: int = 0
 
 
@@ -159,7 +157,6 @@ class LobeTracer:
             dr.select(ray.active, density, 0),
             whole,
             dr.zeros(mi.Float, 3 * self.cache.binned.groups * count),
-            dr.zeros(mi.Float, count),
         )
         bits = next_random((first.random ^ (number * GOLDEN_BITS)) * 69069)
         dr.eval(found, ray, bits, traced)
@@ -231,8 +228,6 @@ class LobeTracer:
             if dr.width(kept) < FEWEST_RAYS:
                 return
             lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
-            if reflections == 0:
-                dr.scatter(found.distance, end.distance, lane)
             if reflections == 0 and gathers and self.scenes.indenters is not None:
                 share = dr.gather(mi.Color3f, traced, lane)
                 mirrored = _on_indenter(scene.table, end)

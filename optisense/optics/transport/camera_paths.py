@@ -34,7 +34,6 @@ class PathEnd:
         towards_eye: unit vector back along the path.
         surface: the surface's number.
         light: the number + 1 of the light whose emitting face the path ends on, else 0.
-        distance: length of the path, mm.
     """
 
     valid: mi.Bool
@@ -45,7 +44,6 @@ class PathEnd:
     towards_eye: mi.Vector3f
     surface: mi.UInt32
     light: mi.UInt32
-    distance: mi.Float
 
 
 @dataclass
@@ -89,7 +87,6 @@ def follow(
     face_normal = mi.Vector3f(0, 0, 1)
     towards_eye = mi.Vector3f(0, 0, 1)
     surface = mi.UInt32(0)
-    distance = mi.Float(0)
     total = mi.Color3f(0)
     branch_origin = mi.Point3f(0)
     branch_direction = mi.Vector3f(0, 0, 1)
@@ -112,7 +109,6 @@ def follow(
         towards_eye = dr.select(ends, -ray.direction, towards_eye)
         surface = dr.select(seen, hit.surface, surface)
         found |= seen
-        distance += dr.select(hit.valid, hit.distance, 0)
         weight *= step.transmittance
         if dr.hint(ray_kind is RayKind.CAMERA, mode="scalar"):
             branch = weight * step.reflection.weight
@@ -126,7 +122,7 @@ def follow(
                 branch_absorption = dr.select(chosen, step.absorption, branch_absorption)
         weight = dr.select(step.goes_on, weight * step.lobe.weight, weight)
         ray = step.ray
-    end = PathEnd(found, weight, point, normal, face_normal, towards_eye, surface, light, distance)
+    end = PathEnd(found, weight, point, normal, face_normal, towards_eye, surface, light)
     branched = Ray(branch_origin, branch_direction, dr.max(total) > 1e-5)
     branched.absorption, branched.channel = branch_absorption, ray.channel
     return end, branched, total
