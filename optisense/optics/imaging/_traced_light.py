@@ -35,7 +35,7 @@ from optisense.optics.transport.camera_paths import (
 CONTACT_RAYS = 1.0
 """Number of rays from contacts for each photon of the cache, so that the noise of both falls with
 the number of photons. At a specularity of 1, the noise of contacts is that of the rays alone: on
-GelSight Mini, 1.6 million rays leave a noise of 2.8 % over patches of the contact with one or with
+GelSight Mini, 1.6 million rays leave the same noise over patches of the contact with one and with
 four million photons, which take almost twice as long."""
 MOST_RAYS = 2_000_000
 """Largest number of rays that are traced together; their light takes up to 200 MB."""
