@@ -162,6 +162,9 @@ def test_specks_are_spread_within_their_region() -> None:
     assert found[:, :20].sum() == pytest.approx(1.0, rel=1e-5)
     assert found[20, 10] < 0.1
     assert found[20, 30] == 1.0 and found[:, 20:].sum() == 1.0
+    # Light that is subtracted is spread likewise.
+    less = without_specks(-layers, np.zeros_like(region), region)[0, ..., 0]
+    assert less == pytest.approx(-found, abs=1e-7)
 
 
 def test_even_light_of_specks_stays_even_at_the_edge_of_a_region() -> None:

@@ -164,7 +164,9 @@ def without_specks(
     spread = np.zeros_like(layers)
     for layer, found in zip(layers, spread, strict=True):
         bright = layer.sum(axis=-1)
-        left = _left_of_lone(np.maximum(bright, 0)) - _left_of_lone(np.maximum(-bright, 0))
+        left = _left_of_lone(np.maximum(bright, 0))
+        if bright.min() < 0:
+            left -= _left_of_lone(np.maximum(-bright, 0))
         left = np.where(steady | ~region, bright, left)
         kept = np.divide(left, bright, out=np.ones_like(bright), where=bright != 0)[..., None]
         lone = layer * (1.0 - kept)

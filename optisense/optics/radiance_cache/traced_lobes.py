@@ -144,13 +144,15 @@ class LobeTracer:
         ray.active &= (coating.specularity > 0) & (density > 0)
         ray.active &= (dr.dot(way, first.face_normal) > 0) & (dr.dot(way, first.normal) > 0)
         whole = self._is_uncached(first, ray)
-        every = evaluate_coating(coating, first.normal, way, first.towards_eye)
-        peak = evaluate_peak(coating, first.normal, way, first.towards_eye)
-        traced = dr.select(whole, 1, dr.select(every > 0, peak / every, 0))
+        traced = None
         if gathers and self.scenes.indenters is not None:
+            every = evaluate_coating(coating, first.normal, way, first.towards_eye)
+            peak = evaluate_peak(coating, first.normal, way, first.towards_eye)
+            traced = dr.select(whole, 1, dr.select(every > 0, peak / every, 0))
             whole = dr.full(mi.Bool, True, count)
         else:
-            ray.active &= dr.max(traced) > 0
+            cos_m = half_vector_cosine(first.normal, way, first.towards_eye)
+            ray.active &= whole | (peak_share(cos_m) > 0)
         found = LobeRays(
             owner,
             way,
@@ -191,14 +193,19 @@ class LobeTracer:
         return straight & ~held
 
     def _follow(
-        self, found: LobeRays, ray: Ray, bits: mi.UInt32, traced: mi.Color3f, gathers: bool
+        self,
+        found: LobeRays,
+        ray: Ray,
+        bits: mi.UInt32,
+        traced: mi.Color3f | None,
+        gathers: bool,
     ) -> None:
         """Add the light that arrives along rays to ``found``.
 
         Args:
             bits: random bits (n,) of each ray.
             traced: share (3, n) of the reflected light of each ray that the cache does not hold if
-                it comes from skin or lamps; 1 if it comes straight from an indenter.
+                it comes from skin or lamps; None if no light of mirrored indenters is added.
             gathers: as in `trace`. Rays whose light is read on the skin go on, in the whole lobe,
                 but only the light of indenters that they meet is added, which the cache does not
                 hold.
@@ -228,7 +235,7 @@ class LobeTracer:
             if dr.width(kept) < FEWEST_RAYS:
                 return
             lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
-            if reflections == 0 and gathers and self.scenes.indenters is not None:
+            if reflections == 0 and traced is not None:
                 share = dr.gather(mi.Color3f, traced, lane)
                 mirrored = _on_indenter(scene.table, end)
                 self._subtract_skin_behind(found, end, lane, bits, 1 - share, mirrored)
