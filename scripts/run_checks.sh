@@ -48,8 +48,21 @@ check() { # one target: what it prints, its outcome, and its turn for the next o
     echo "$turn" >&3
 }
 
+# Programs that tests start are forks of one Python that has imported everything: see
+# tests/helpers/warm_python.py. It ends when this shell, which alone writes to its input, has ended.
+if [ "$(uname)" = Linux ]; then
+    mkdir "$folder/programs"
+    mkfifo "$folder/input" "$folder/output"
+    OPTISENSE_LIBRARY="$folder/none" XDG_STATE_HOME="$folder/none" .venv/bin/python \
+        tests/helpers/warm_python.py "$folder/programs" --render \
+        <"$folder/input" >"$folder/output" 2>/dev/null &
+    exec 4>"$folder/input"
+    read -r _ <"$folder/output" && export WARM_PYTHON="$folder/programs"
+fi
+
 mkfifo "$folder/turns"
 exec 3<>"$folder/turns"
+checks=
 turn=0
 while [ "$turn" -lt "$at_a_time" ]; do
     echo "$turn" >&3
@@ -58,8 +71,11 @@ done
 for name in "$@"; do
     read -r turn <&3
     printf '%s begins\n' "$name"
-    check "$name" "$turn" &
+    check "$name" "$turn" 4>&- &
+    checks="$checks $!"
 done
+wait $checks
+exec 4>&-
 wait
 
 printf '\n== Summary\n'

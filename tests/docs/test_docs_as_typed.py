@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
-from warm_python import can_fork, warm_python
+from warm_python import programs
 
 from optisense.cli import app
 from paper.__main__ import app as paper_app
@@ -79,20 +79,10 @@ def ids(page: Path) -> str:
     return page.stem
 
 
-@pytest.fixture(scope="module")
-def programs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """The folder of the programs `python` and `optisense`."""
-    if not can_fork():
-        yield PROGRAMS
-        return
-    with warm_python(reader_environment(tmp_path_factory.mktemp("own"))) as folder:
-        yield folder
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [page for page in PAGES if typed(page)], ids=ids)
-def test_a_page_works_as_typed(page: Path, programs: Path, tmp_path: Path) -> None:
-    type_page(page, [block for block in typed(page) if not block.long], tmp_path, programs)
+def test_a_page_works_as_typed(page: Path, tmp_path: Path) -> None:
+    type_page(page, [block for block in typed(page) if not block.long], tmp_path, programs())
 
 
 @pytest.mark.long

@@ -46,6 +46,17 @@ def test_streams_arguments_folder_environment_and_code_are_the_callers(
     assert (out, error, child.returncode) == (f"typed ['x'] {tmp_path} b\n", "", 7)
 
 
+def test_a_fork_runs_on_the_processors_of_its_caller(begin: Begin) -> None:
+    begin("python", "-c", "").wait()  # the process that forks has all processors
+    ours = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(ours)})
+    try:
+        child = begin("python", "-c", "import os; print(*os.sched_getaffinity(0))")
+        assert child.communicate()[0] == f"{min(ours)}\n"
+    finally:
+        os.sched_setaffinity(0, ours)
+
+
 def test_scripts_and_modules_import_what_is_beside_them(begin: Begin, tmp_path: Path) -> None:
     (tmp_path / "beside.py").write_text("name = __name__\n")
     (tmp_path / "script.py").write_text("import beside, sys; print(__name__, beside.name)\n")

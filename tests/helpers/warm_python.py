@@ -3,8 +3,11 @@
 A process that renders spends half of its time on imports and on the renderer's start. Here one
 process does this once and forks for each program that is run; a program in a folder of its own asks
 it to. The fork has the caller's folder, environment, arguments and standard streams, hears its
-signals and gives it its exit code. What a process does before its first line is not tested so.
-Python that such a program starts by `sys.executable` is a fork, too.
+signals, runs on its processors, and gives it its exit code. What a process does before its first
+line is not tested so. Python that such a program starts by `sys.executable` is a fork, too.
+
+`make test` starts one such process for all its targets, and names its folder of programs in the
+environment variable `WARM_PYTHON`.
 """
 
 from __future__ import annotations
@@ -17,6 +20,7 @@ import os
 import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -60,7 +64,8 @@ def can_fork() -> bool:
 def warm_python(
     environment: dict[str, str], *, python: str = sys.executable, render: bool = True
 ) -> Iterator[Path]:
-    """Start the process, and yield the folder with the programs `python` and `optisense`.
+    """Start the process, and yield the folder with the programs `python` and `optisense`, which
+    wait for its imports.
 
     Args:
         environment: what modules find in the environment when they are imported.
@@ -68,21 +73,15 @@ def warm_python(
         render: whether it renders once, which loads the kernels.
     """
     with tempfile.TemporaryDirectory(prefix="warm-") as folder:
-        address = str(Path(folder) / "asked")
         server = subprocess.Popen(
-            [python, __file__, address, *(["--render"] if render else [])],
+            [python, __file__, folder, *(["--render"] if render else [])],
             env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
         )
         assert server.stdin is not None and server.stdout is not None
-        assert server.stdout.readline() == b"ready\n", "the imports failed"
-        for name in ("python", "optisense"):
-            program = Path(folder) / name
-            text = CLIENT.format(python=python, address=address, name=name)
-            program.write_text(text, encoding="utf-8")
-            program.chmod(0o755)
+        assert server.stdout.readline() == b"ready\n", "the process did not start"
         try:
             yield Path(folder)
         finally:
@@ -96,7 +95,8 @@ atexit.register(_shared.close)
 
 @cache
 def programs(python: str = sys.executable) -> Path:
-    """Return a folder with the programs `python` and `optisense`, which all tests of a run share.
+    """Return a folder with the programs `python` and `optisense`, which all tests of a run share,
+    and all targets of `make test`.
 
     They are the real ones where a process cannot fork.
 
@@ -105,6 +105,8 @@ def programs(python: str = sys.executable) -> Path:
     """
     if not can_fork():
         return Path(python).parent
+    if "WARM_PYTHON" in os.environ:
+        return Path(os.environ["WARM_PYTHON"])
     return _shared.enter_context(warm_python(dict(os.environ), python=python))
 
 
@@ -141,14 +143,22 @@ def render() -> None:
     OpticalModel(load("gelsight-mini")).render([ball], resolution=(64, 48), photons=50000)
 
 
-def serve(address: str) -> None:
-    """Fork for each request until standard input is closed."""
+def serve(folder: Path, rendering: bool) -> None:
+    """Write the programs to a folder, and fork for each request until standard input is closed."""
+    address = str(folder / "asked")
     with socket.socket(socket.AF_UNIX) as asked:
         asked.bind(address)
         asked.listen()
+        for name in ("python", "optisense"):
+            text = CLIENT.format(python=sys.executable, address=address, name=name)
+            (folder / name).write_text(text, encoding="utf-8")
+            (folder / name).chmod(0o755)
+        os.write(1, b"ready\n")
+        import_all()
+        if rendering:
+            render()
         gc.collect()
         gc.freeze()  # else the collections of a fork would copy the pages of all objects
-        os.write(1, b"ready\n")
         while True:
             ready, _, _ = select.select([asked, 0], [], [])
             with contextlib.suppress(ChildProcessError):  # where all have ended
@@ -159,13 +169,17 @@ def serve(address: str) -> None:
             caller, _ = asked.accept()
             if os.fork() == 0:
                 asked.close()
-                sys.executable = str(Path(address).with_name("python"))
+                sys.executable = str(folder / "python")
                 handle(caller)
             caller.close()
 
 
 def handle(caller: socket.socket) -> NoReturn:
     """Run one program in a fork of this one, which hands signals on and tells the exit code."""
+    size = struct.calcsize("3i")
+    pid, _, _ = struct.unpack("3i", caller.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, size))
+    with contextlib.suppress(OSError):  # where the caller has gone
+        os.sched_setaffinity(0, os.sched_getaffinity(pid))
     head, streams, _, _ = socket.recv_fds(caller, 4, 3)
     text = b""
     while len(text) < int.from_bytes(head, "big"):
@@ -239,7 +253,4 @@ def run(
 
 
 if __name__ == "__main__":
-    import_all()
-    if "--render" in sys.argv:
-        render()
-    serve(sys.argv[1])
+    serve(Path(sys.argv[1]), "--render" in sys.argv)
