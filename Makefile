@@ -63,8 +63,8 @@ demo: setup
 
 # Each of these runs whatever becomes of the others, several at a time; a summary at the end says
 # what failed. Those that take longest begin first.
-CHECKS := pytest-tasks pytest-optics pytest-rest pytest-search pytest-sensors pytest-docs \
-    pytest-scoring-pages pytest-pages studio-tests types docs bare-pytest lint import-rules
+CHECKS := pytest-tasks pytest-sensors pytest-optics pytest-rest pytest-search pytest-docs \
+    pytest-scoring-pages studio-tests types docs bare-pytest lint import-rules
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
@@ -94,11 +94,10 @@ pytest: setup
 
 # The same in lots, which `make test` runs side by side. A lot is one process: its folders share
 # imports, and the first renderings, which load the kernels.
-LOTS := optics pages search sensors tasks
+LOTS := optics search sensors tasks
 LOT_optics := optics
-LOT_pages := browser report paper
 LOT_search := search
-LOT_sensors := sensors objectives
+LOT_sensors := sensors objectives browser report paper
 LOT_tasks := tasks calibration cli
 
 # The pages that score, search and verify take as long as all others, and are a lot of their own.
