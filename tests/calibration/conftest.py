@@ -24,6 +24,9 @@ SIZE = (160, 120)
 SMALL = (100, 75)
 """Size (pixels) of photographs that show the contacts well enough for a fit."""
 
+SMALLER = (64, 48)
+"""Size (pixels) of photographs that show well enough which light is dim or lies lower."""
+
 
 @pytest.fixture(scope="session")
 def mini() -> OpticalModel:

@@ -29,7 +29,7 @@ from optisense.cli import app
 from optisense.design import Status, get_value, set_value
 from optisense.errors import CalibrationError
 
-from .conftest import PHOTONS, PLACES, SMALL
+from .conftest import PHOTONS, PLACES, SMALLER
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -293,7 +293,7 @@ def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
     design = with_single_lights(mini.design)
     real = ots.OpticalModel(set_value(design, "lights.red-2.flux", 1.0))
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES[:2]]
-    shown = photograph_model(real, balls, resolution=SMALL, photons=200_000, seed=5)
+    shown = photograph_model(real, balls, resolution=SMALLER, photons=200_000, seed=5)
     kept = ["colours", "tone", "black", "shading", "view", "place"]
     settings = CalibrationSettings(
         families=chosen_families(kept, ["leds"]), rounds=1, photons=200_000, held_out=()
@@ -311,7 +311,7 @@ def test_a_row_of_lights_that_lies_lower_is_found(
     lower = -0.8  # mm; more than twice the step of the difference quotients
     real = ots.OpticalModel(with_lights_moved(mini.design, "blue", lower))
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES[:2]]
-    shown = photograph_model(real, balls, resolution=SMALL, photons=200_000, seed=5)
+    shown = photograph_model(real, balls, resolution=SMALLER, photons=200_000, seed=5)
     monkeypatch.setattr(  # one number of a body is enough
         "optisense.calibration.calibrating.quantities_of",
         lambda *of: [q for q in quantities_of(*of) if q.path in LOWER_AND_POWERS],
