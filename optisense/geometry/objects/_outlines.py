@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from optisense.array_types import FloatArray
 
@@ -91,7 +90,7 @@ def star(x: FloatArray, y: FloatArray, points: int, outer: float, inner: float) 
     angle = np.abs(np.mod(np.arctan2(y, x) + sector, 2.0 * sector) - sector)
     tip = np.array([outer, 0.0])
     valley = inner * np.array([np.cos(sector), np.sin(sector)])
-    normal: ArrayLike = np.array([valley[1] - tip[1], tip[0] - valley[0]])
+    normal: FloatArray = np.array([valley[1] - tip[1], tip[0] - valley[0]])
     radius = np.hypot(x, y)
-    along = radius * (np.cos(angle) * normal[0] + np.sin(angle) * normal[1])  # type: ignore[index]
+    along = radius * (np.cos(angle) * normal[0] + np.sin(angle) * normal[1])
     return np.clip(1.0 - along / float(tip @ normal), 0.0, 1.0)
