@@ -11,6 +11,7 @@ import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -89,8 +90,6 @@ class CmaEs(Method):
         self._unit = np.where(whole, 1.0, problem.space.upper - problem.space.lower)
         self._origin = np.where(whole, 0.0, problem.space.lower)
         self._idle = max(0, LEAST_DIMENSIONS - size)
-        # The matrices of pycma are small: threads only wait for each other, and round differently.
-        self._linear_algebra = ThreadpoolController().select(user_api="blas")
         self._asked: list[FloatArray] = []
         self._begin(problem.space.start)
 
@@ -175,11 +174,21 @@ class CmaEs(Method):
         theirs = np.random.get_state()
         np.random.set_state(self._state)
         try:
-            with self._linear_algebra.limit(limits=1):
+            with _linear_algebra().limit(limits=1):
                 yield
         finally:
             self._state = np.random.get_state()
             np.random.set_state(theirs)
+
+
+@cache
+def _linear_algebra() -> Any:
+    """Return the limit on the threads of the libraries of linear algebra, which takes milliseconds
+    to look up.
+
+    The matrices of pycma are small: threads only wait for each other, and round differently.
+    """
+    return ThreadpoolController().select(user_api="blas")
 
 
 def _pycma() -> Any:
