@@ -122,8 +122,10 @@ def numeric_constant(node: ast.stmt) -> str | None:
         target, value = node.target, node.value
     else:
         return None
+    if not has_number(value):
+        return None
     name = ast.unparse(target).strip("()")
-    return name if name.isupper() and has_number(value) else None
+    return name if name.isupper() else None
 
 
 def has_number(value: ast.AST) -> bool:
