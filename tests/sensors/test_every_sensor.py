@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ from optisense.geometry import (
 )
 from optisense.optics import OpticalModel
 from optisense.optics.transport.chief_rays import RayOutcome
+
+ModelOf = Callable[[str], OpticalModel]
 
 SMALL: dict[str, Any] = {"resolution": (80, 60), "photons": 50_000}
 FINE: dict[str, Any] = {**SMALL, "resolution": (160, 120)}
@@ -70,8 +73,8 @@ def test_what_is_assumed_is_marked(sensor: SensorDesign) -> None:
 
 
 @pytest.fixture(scope="module")
-def model(sensor: SensorDesign) -> OpticalModel:
-    return OpticalModel(sensor)
+def model(sensor: SensorDesign, model_of: ModelOf) -> OpticalModel:
+    return model_of(sensor.name)
 
 
 def test_no_ray_of_the_picture_is_lost(model: OpticalModel) -> None:
@@ -102,11 +105,11 @@ def test_a_ball_shows(model: OpticalModel) -> None:
 
 
 @pytest.mark.slow
-def test_every_indenter_shows(tmp_path: Path) -> None:
+def test_every_indenter_shows(model_of: ModelOf, tmp_path: Path) -> None:
     """On a flat skin and on a bent one."""
     brick = tmp_path / "brick.obj"
     TriangleMesh.box((-2, -1.5, 0), (2, 1.5, 4)).save_obj(brick)
     for name in ("gelsight-mini-ideal", "gelsight-mini-ideal-spherical"):
-        model = OpticalModel(sensors.build(name))
+        model = model_of(name)
         for each in (Cylinder(radius=2.0, length=4.0), Plane(size=4.0), MeshIndenter(brick)):
             assert shows(model, each), (name, each)

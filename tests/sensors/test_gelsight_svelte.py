@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -31,8 +32,8 @@ def design() -> SensorDesign:
 
 
 @pytest.fixture(scope="module")
-def model(design: SensorDesign) -> OpticalModel:
-    return OpticalModel(design)
+def model(model_of: Callable[[str], OpticalModel]) -> OpticalModel:
+    return model_of("gelsight-svelte")
 
 
 @pytest.fixture(scope="module")
