@@ -138,9 +138,11 @@ def import_all() -> None:
 def render() -> None:
     """Render once."""
     from optisense import Contact, OpticalModel, Sphere, load
+    from optisense.optics.backend.memory import release_memory
 
     ball = Contact(Sphere(radius=1.5), at=(0, 0), depth=0.5)
     OpticalModel(load("gelsight-mini")).render([ball], resolution=(64, 48), photons=50000)
+    release_memory()  # else a fork that writes to it would copy it
 
 
 def serve(folder: Path, rendering: bool) -> None:
