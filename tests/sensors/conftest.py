@@ -10,8 +10,11 @@ import pytest
 from optisense import sensors
 from optisense.optics import OpticalModel
 
+ModelOf = Callable[[str], OpticalModel]
+"""The model of a built-in sensor by its name."""
+
 
 @pytest.fixture(scope="session")
-def model_of() -> Callable[[str], OpticalModel]:
-    """The model of a sensor by its name, which is made once; tests do not change it."""
+def model_of() -> ModelOf:
+    """Each model is made once; tests do not change it."""
     return cache(lambda name: OpticalModel(sensors.build(name)))

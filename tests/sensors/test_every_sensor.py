@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from optisense.geometry import (
 from optisense.optics import OpticalModel
 from optisense.optics.transport.chief_rays import RayOutcome
 
-ModelOf = Callable[[str], OpticalModel]
+from .conftest import ModelOf
 
 SMALL: dict[str, Any] = {"resolution": (80, 60), "photons": 50_000}
 FINE: dict[str, Any] = {**SMALL, "resolution": (160, 120)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,8 @@ from optisense.geometry.containment import inside
 from optisense.optics import OpticalModel
 from optisense.optics.transport.chief_rays import RayOutcome
 from optisense.sensors._tip_shape import TipShape
+
+from .conftest import ModelOf
 
 R, HEIGHT, GEL, SHELL = 14.0, 34.0, 3.0, 2.5
 """Default dimensions, mm."""
@@ -30,7 +31,7 @@ def design() -> SensorDesign:
 
 
 @pytest.fixture(scope="module")
-def model(model_of: Callable[[str], OpticalModel]) -> OpticalModel:
+def model(model_of: ModelOf) -> OpticalModel:
     return model_of("gelsight360")
 
 
