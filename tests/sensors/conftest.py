@@ -1,9 +1,8 @@
-"""Models of the built-in sensors, which the tests of all files share."""
+"""The model of a built-in sensor, which files of tests share."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 
 import pytest
 
@@ -14,7 +13,15 @@ ModelOf = Callable[[str], OpticalModel]
 """The model of a built-in sensor by its name."""
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def model_of() -> ModelOf:
-    """Each model is made once; tests do not change it."""
-    return cache(lambda name: OpticalModel(sensors.build(name)))
+    """Tests do not change a model. One is kept at a time, as each takes up to 0.9 GB."""
+    kept: dict[str, OpticalModel] = {}
+
+    def model(name: str) -> OpticalModel:
+        if name not in kept:
+            kept.clear()
+            kept[name] = OpticalModel(sensors.build(name))
+        return kept[name]
+
+    return model

@@ -18,8 +18,6 @@ from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 from optisense.sensors._gelsight_svelte import PALM_OUTLINE
 from optisense.sensors._svelte_profile import Palm
 
-from .conftest import ModelOf
-
 STRAIGHT = {"palm_outline": ((20.0, 22.0), (20.0, 60.0), (20.0, 90.0)), "m1_sagitta": 3.0}
 ARC_CENTRE, ARC_RADIUS = np.array([132.9, 43.1]), 130.5
 """Centre (x, z) and radius (mm) of the arc that was measured for the mirror M1."""
@@ -33,8 +31,8 @@ def design() -> SensorDesign:
 
 
 @pytest.fixture(scope="module")
-def model(model_of: ModelOf) -> OpticalModel:
-    return model_of("gelsight-svelte")
+def model(design: SensorDesign) -> OpticalModel:
+    return OpticalModel(design)
 
 
 @pytest.fixture(scope="module")
