@@ -125,7 +125,7 @@ def test_directions_of_the_guide_have_its_density(monkeypatch: pytest.MonkeyPatc
     points = np.flatnonzero(np.asarray(guide.found))
     assert len(points) > 30
     random = np.random.default_rng(0)
-    count = 5_000_000
+    count = 1_000_000
     for point in points[:: len(points) // 3]:
         number = dr.full(mi.UInt32, int(point), count)
         u, v, w = (mi.Float(random.random(count, dtype=np.float32)) for _ in range(3))
