@@ -173,7 +173,7 @@ def _end(scene: RayScene, camera: RayCamera, film: mi.Point2f) -> PathEnd:
     if scene.absorbing:
         start.absorption = mi.Color3f(0)
     unused = generator(dr.arange(mi.UInt32, count))
-    return follow(scene, start, mi.Color3f(1), unused, RayKind.CAMERA)[0]
+    return follow(scene, start, mi.Color3f(1), unused, RayKind.CAMERA).end
 
 
 def _guide(model: OpticalModel, points: FloatArray) -> EmissionGuide:

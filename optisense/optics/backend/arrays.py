@@ -21,6 +21,11 @@ PACKET = 64
 vectors of processors, 16 single-precision numbers."""
 
 
+FEWEST_LANES = 2
+"""Lower bound on the number of entries of arrays that kernels work on: for arrays of one entry,
+Dr.Jit compiles other kernels."""
+
+
 def gathered(value: Value, lanes: mi.UInt32) -> Value:
     """Return the given lanes of an array, or of each array of a dataclass; fields that are None
     stay None.

@@ -10,6 +10,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.optics.backend.arrays import FEWEST_LANES
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film, average_pixels, repeated
@@ -17,7 +18,7 @@ from optisense.optics.imaging._grain import OUTLINE_SAMPLES, outline
 from optisense.optics.imaging.lamp_images import without_specks
 from optisense.optics.imaging.sampling import PixelRegions, SamplingPlan
 from optisense.optics.radiance_cache.cache import RadianceCache
-from optisense.optics.radiance_cache.traced_lobes import FEWEST_RAYS, LobeRays, LobeTracer
+from optisense.optics.radiance_cache.traced_lobes import LobeRays, LobeTracer
 from optisense.optics.scene.bsdf import (
     CoatingBsdf,
     coating_of,
@@ -338,7 +339,7 @@ def _add_light(
         share: inverse of the number of rays of each sample.
     """
     lit = _lit_rays(rays, len(film.sums))
-    if dr.width(lit) < FEWEST_RAYS:
+    if dr.width(lit) < FEWEST_LANES:
         return
     points = dr.gather(VisiblePoints, seen, dr.gather(mi.UInt32, rays.owner, lit))
     coating = coating_of(table, points.surface, points.valid)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
+from optisense.optics.backend.arrays import FEWEST_LANES
 from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache.angular_variance import occluder_horizon
 from optisense.optics.radiance_cache.bin_sums import sum_bins
@@ -48,9 +49,6 @@ and 0.07 % at its rim."""
 PLACE_SHADOW_RAYS = 4.0
 """Number of shadow rays per light group of a place that a ray meets: a quarter of those of visible
 points, as its light is a small part of a pixel's."""
-MIN_LANES = 2
-"""Lower bound on the number of places that are shaded at once, as Dr.Jit compiles other kernels for
-arrays of one entry."""
 
 
 @dataclass
@@ -171,11 +169,11 @@ def _secondary_hits(
     count = dr.width(lanes)
     if count == 0:
         return None
-    if count < MIN_LANES:
-        lanes = dr.repeat(lanes, MIN_LANES)
+    if count < FEWEST_LANES:
+        lanes = dr.repeat(lanes, FEWEST_LANES)
     seen = dr.gather(SecondaryHits, seen, lanes)
-    if count < MIN_LANES:
-        seen.points.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
+    if count < FEWEST_LANES:
+        seen.points.valid &= dr.arange(mi.UInt32, FEWEST_LANES) == 0
     return seen
 
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.arrays import gathered, joined
+from optisense.optics.backend.arrays import FEWEST_LANES, joined
 from optisense.optics.backend.sequences import STEPS_2D, unit_float
 from optisense.optics.radiance_cache.beam_sums import sum_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
@@ -32,12 +32,15 @@ from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import bin_axis
 from optisense.optics.scene.surfaces import Region, SurfaceKind
-from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints, follow, generator
+from optisense.optics.transport.camera_paths import (
+    PathEnd,
+    VisiblePoints,
+    follow,
+    follow_branches,
+    generator,
+)
 from optisense.optics.transport.interact import RayKind
 
-MIN_LANES = 2
-"""Lower bound on the number of places that are shaded at once, as Dr.Jit compiles other kernels for
-arrays of one entry."""
 MOST_LANES = 16_000
 """Largest number of places that are shaded; if rays end at more, a part of them is drawn. A ball of
 1.5 mm in GelSight Mini has up to 5,000. A plate that fills the image has 160,000, which would take
@@ -84,11 +87,11 @@ def mirrored_contacts(
         end, owner = dr.gather(PathEnd, end, drawn), dr.gather(mi.UInt32, owner, drawn)
         end.weight *= count / MOST_LANES
         dr.eval(end, owner)
-    alone = count < MIN_LANES
+    alone = count < FEWEST_LANES
     if alone:
-        lanes = dr.repeat(mi.UInt32(0), MIN_LANES)
+        lanes = dr.repeat(mi.UInt32(0), FEWEST_LANES)
         end, owner = dr.gather(PathEnd, end, lanes), dr.gather(mi.UInt32, owner, lanes)
-        end.valid &= dr.arange(mi.UInt32, MIN_LANES) == 0
+        end.valid &= dr.arange(mi.UInt32, FEWEST_LANES) == 0
     seen = replace(dr.gather(VisiblePoints, points, owner), **vars(end))
     dr.eval(seen)
     return seen, _radiance_differences(cache, scenes, seen)
@@ -117,20 +120,14 @@ def _ends(scenes: ContactScenes, points: VisiblePoints) -> Iterator[tuple[PathEn
     ray.active &= first.valid & (kind == int(SurfaceKind.DIELECTRIC))
     if scene.absorbing:
         ray.absorption = mi.Color3f(0) if scenes.absorption is None else scenes.absorption
-    end, branch, rest = follow(scene, ray, weight, generator(bits), RayKind.CAMERA)
+    paths = follow(scene, ray, weight, generator(bits), RayKind.CAMERA)
     number = dr.arange(mi.UInt32, dr.width(points.pixel))
-    dr.eval(end, branch, rest, number, bits)
-    yield end, number
-    lanes = dr.compress(branch.active)
+    dr.eval(paths, number, bits)
+    yield paths.end, number
+    lanes = dr.compress(paths.branch.active)
     if dr.width(lanes) == 0:
         return
-    again, _, _ = follow(
-        scene,
-        gathered(branch, lanes),
-        dr.gather(mi.Color3f, rest, lanes),
-        generator(dr.gather(mi.UInt32, bits, lanes) * 69069),
-        RayKind.REFLECTION,
-    )
+    again = follow_branches(scene, paths, lanes, dr.gather(mi.UInt32, bits, lanes) * 69069)
     dr.eval(again)
     yield again, lanes
 

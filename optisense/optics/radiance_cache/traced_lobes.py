@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.arrays import gathered, joined
+from optisense.optics.backend.arrays import FEWEST_LANES, gathered
 from optisense.optics.backend.sequences import GOLDEN_BITS, STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache._irradiance import irradiance
+from optisense.optics.radiance_cache._lobe_branches import follow_to_coating
 from optisense.optics.radiance_cache._lobe_guide import LobeGuide
 from optisense.optics.radiance_cache._ray_resampling import (
     MOST_CACHED,
@@ -44,24 +45,15 @@ from optisense.optics.scene.bsdf import (
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.lamp_windows import LampWindows
-from optisense.optics.scene.ray_scene import Ray, RayScene, leave
+from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
 from optisense.optics.scene.surfaces import Region, SurfaceKind
-from optisense.optics.transport.camera_paths import (
-    PathEnd,
-    VisiblePoints,
-    follow,
-    follow_branches,
-    generator,
-)
+from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints
 from optisense.optics.transport.interact import RayKind
 
 MAX_REFLECTIONS = 16
 """Largest number of coatings that a ray meets. Gel between a metal coating and glass guides light:
 with four, the light in a contact of GelSight Mini of specularity 1 would be 2 % too weak."""
-FEWEST_RAYS = 2
-"""Number of rays below which they are dropped, as Dr.Jit compiles other kernels for arrays of one
-entry."""
 GUIDED_SHARE = 0.3
 """Share of the rays from the skin that are drawn from the beams of the cache. With 0.3, the noise
 of the skin of GelSight Mini of specularity 1 is 12 instead of 15 %; with 0.7, it is larger again,
@@ -217,22 +209,17 @@ class LobeTracer:
         weight = dr.full(mi.Color3f, 1, count)
         read = dr.full(mi.Bool, False, count)
         for reflections in range(MAX_REFLECTIONS):
-            if dr.width(lane) < FEWEST_RAYS:
+            if dr.width(lane) < FEWEST_LANES:
                 return
             if scene.absorbing:
                 clear = self.scenes.absorption is None
                 ray.absorption = mi.Color3f(0) if clear else self.scenes.absorption
             if self.channel is not None:
                 ray.channel = dr.opaque(mi.UInt32, self.channel, dr.width(lane))
-            if gathers and reflections == 0:
-                end, kept = _both_ways(scene, ray, weight, bits)
-            else:
-                end, _, _ = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION)
-                dr.eval(end)
-                kept = dr.compress(end.valid | (end.light > 0))
-                end = gathered(end, kept)
+            kind = RayKind.CAMERA if gathers and reflections == 0 else RayKind.REFLECTION
+            end, kept = follow_to_coating(scene, ray, weight, bits, kind)
             found.segments += dr.width(lane)
-            if dr.width(kept) < FEWEST_RAYS:
+            if dr.width(kept) < FEWEST_LANES:
                 return
             lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
             if reflections == 0 and traced is not None:
@@ -243,7 +230,7 @@ class LobeTracer:
                 end.valid &= dr.max(end.weight) > 0
             self._add_lamps(found, end, lane, ~read)
             kept = dr.compress(end.valid)
-            if dr.width(kept) < FEWEST_RAYS:
+            if dr.width(kept) < FEWEST_LANES:
                 return
             end = gathered(end, kept)
             lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
@@ -289,7 +276,7 @@ class LobeTracer:
             mirrored: mask of the rays that end on indenters.
         """
         kept = dr.compress(mirrored & (dr.max(held) > 0))
-        if dr.width(kept) < FEWEST_RAYS:
+        if dr.width(kept) < FEWEST_LANES:
             return
         skin, weight = gathered(end, kept), dr.gather(mi.Color3f, held, kept)
         away = -skin.towards_eye
@@ -354,7 +341,7 @@ class LobeTracer:
         dr.eval(cell, on_skin, raised)
         most = MOST_CACHED if only_tail else MOST_GATHERED
         kept, share = drawn(on_skin & ~read, dr.max(dr.abs(end.weight)), bits, most)
-        if dr.width(kept) < FEWEST_RAYS:
+        if dr.width(kept) < FEWEST_LANES:
             return on_skin, raised
         flat = gathered(end, kept)
         cell, lane = dr.gather(mi.UInt32, cell, kept), dr.gather(mi.UInt32, lane, kept)
@@ -384,41 +371,6 @@ def _on_indenter(table: mi.Float, end: PathEnd) -> mi.Bool:
     whose light hardly differs from that of the skin at rest.
     """
     return end.valid & (surface_region(table, end.surface, end.valid) == int(Region.INDENTER))
-
-
-def _both_ways(
-    scene: RayScene, ray: Ray, weight: mi.Color3f, bits: mi.UInt32
-) -> tuple[PathEnd, mi.UInt32]:
-    """Follow rays through interfaces and, as rays of their own, one of the reflections of each.
-
-    Little light is reflected at an interface, but from the skin of GelSight Mini only the reflected
-    light meets other skin.
-
-    Args:
-        weight: factor (3, n) on the radiance at the rays' beginnings.
-        bits: random bits (n,) of each ray.
-
-    Returns:
-        The ends of those rays that meet a lamp or a coating, and the numbers of the rays that they
-        belong to.
-    """
-    through, branch, share = follow(scene, ray, weight, generator(bits), RayKind.CAMERA)
-    dr.eval(through, branch, share)
-    parts = [(through, dr.arange(mi.UInt32, dr.width(bits)))]
-    turned = dr.compress(branch.active)
-    if dr.width(turned) >= FEWEST_RAYS:
-        other = dr.gather(mi.UInt32, bits, turned) ^ GOLDEN_BITS
-        parts.append((follow_branches(scene, branch, share, turned, other), turned))
-    ends, numbers = [], []
-    for end, number in parts:
-        dr.eval(end)
-        kept = dr.compress(end.valid | (end.light > 0))
-        if dr.width(kept) > 0:
-            ends.append(gathered(end, kept))
-            numbers.append(dr.gather(mi.UInt32, number, kept))
-    if len(ends) == 2:
-        return joined(*ends), joined(*numbers)
-    return (ends[0], numbers[0]) if ends else (through, dr.zeros(mi.UInt32, 0))
 
 
 def _reflected(

@@ -64,10 +64,36 @@ class VisiblePoints(PathEnd):
     number: mi.UInt32
 
 
+@dataclass
+class Paths:
+    """Paths that `follow` has followed.
+
+    Attributes:
+        end: their ends.
+        branch: for each path from the camera one of its reflections at interfaces, drawn in
+            proportion to its weight; of other paths, inactive rays.
+        branch_weight: sum (3, n) of the weights of its reflections.
+        stopped: the rays that meet a rough interface before which the paths stop; of other paths,
+            inactive rays.
+        stopped_weight: factor (3, n) on the radiance at the origins of these rays.
+    """
+
+    end: PathEnd
+    branch: Ray
+    branch_weight: mi.Color3f
+    stopped: Ray
+    stopped_weight: mi.Color3f
+
+
 @dr.syntax
 def follow(
-    scene: RayScene, ray: Ray, weight: mi.Color3f, rng: mi.PCG32, ray_kind: RayKind
-) -> tuple[PathEnd, Ray, mi.Color3f]:
+    scene: RayScene,
+    ray: Ray,
+    weight: mi.Color3f,
+    rng: mi.PCG32,
+    ray_kind: RayKind,
+    until_rough: bool = False,
+) -> Paths:
     """Follow paths to their ends.
 
     Args:
@@ -75,10 +101,7 @@ def follow(
         weight: factor (3, n) on the radiance at the paths' beginnings.
         rng: a random generator for each path.
         ray_kind: the kind of the rays, `RayKind.CAMERA` or `RayKind.REFLECTION`.
-
-    Returns:
-        The ends; and for each path from the camera one of its reflections at interfaces, drawn in
-        proportion to its weight, and the sum of their weights.
+        until_rough: whether paths stop before rough interfaces.
     """
     found = mi.Bool(False)
     light = mi.UInt32(0)
@@ -91,7 +114,11 @@ def follow(
     branch_origin = mi.Point3f(0)
     branch_direction = mi.Vector3f(0, 0, 1)
     branch_absorption = ray.absorption
-    while dr.hint(ray.active, exclude=[scene, ray_kind]):
+    stopped_origin = mi.Point3f(0)
+    stopped_direction = mi.Vector3f(0, 0, 1)
+    stopped_weight = mi.Color3f(0)
+    stopped_absorption = ray.absorption
+    while dr.hint(ray.active, exclude=[scene, ray_kind, until_rough]):
         sample = None
         if dr.hint(ray_kind.draws or scene.rough, mode="scalar"):
             sample = LobeSample(rng.next_float32())
@@ -109,6 +136,13 @@ def follow(
         towards_eye = dr.select(ends, -ray.direction, towards_eye)
         surface = dr.select(seen, hit.surface, surface)
         found |= seen
+        if dr.hint(until_rough, mode="scalar"):
+            stopped_origin = dr.select(step.rough, ray.origin, stopped_origin)
+            stopped_direction = dr.select(step.rough, ray.direction, stopped_direction)
+            stopped_weight = dr.select(step.rough, weight, stopped_weight)
+            if dr.hint(scene.absorbing, mode="scalar"):
+                stopped_absorption = dr.select(step.rough, ray.absorption, stopped_absorption)
+            step.ray.active &= ~step.rough
         weight *= step.transmittance
         if dr.hint(ray_kind is RayKind.CAMERA, mode="scalar"):
             branch = weight * step.reflection.weight
@@ -125,22 +159,20 @@ def follow(
     end = PathEnd(found, weight, point, normal, face_normal, towards_eye, surface, light)
     branched = Ray(branch_origin, branch_direction, dr.max(total) > 1e-5)
     branched.absorption, branched.channel = branch_absorption, ray.channel
-    return end, branched, total
+    stopped = Ray(stopped_origin, stopped_direction, dr.max(stopped_weight) > 0)
+    stopped.absorption, stopped.channel = stopped_absorption, ray.channel
+    return Paths(end, branched, total, stopped, stopped_weight)
 
 
-def follow_branches(
-    scene: RayScene, branch: Ray, weight: mi.Color3f, paths: mi.UInt32, bits: mi.UInt32
-) -> PathEnd:
+def follow_branches(scene: RayScene, paths: Paths, lanes: mi.UInt32, bits: mi.UInt32) -> PathEnd:
     """Follow the reflections that `follow` has drawn of some paths from the camera to their ends.
 
     Args:
-        branch: the reflections (n,) of all paths.
-        weight: sums (3, n) of the weights of their reflections.
-        paths: numbers (k,) of the paths whose reflections are followed.
+        lanes: numbers (k,) of the paths whose reflections are followed.
         bits: random bits (k,) of each of these.
     """
-    ray, weight = gathered(branch, paths), dr.gather(mi.Color3f, weight, paths)
-    return follow(scene, ray, weight, generator(bits), RayKind.REFLECTION)[0]
+    ray, weight = gathered(paths.branch, lanes), dr.gather(mi.Color3f, paths.branch_weight, lanes)
+    return follow(scene, ray, weight, generator(bits), RayKind.REFLECTION).end
 
 
 MAX_PIXEL_SAMPLES = 64
@@ -214,16 +246,16 @@ def find_visible_points(
     if channel is not None:
         start.channel = dr.opaque(mi.UInt32, channel, dr.width(film))
         weight = mi.Color3f(*(dr.select(start.channel == k, mi.Float(1), 0) for k in range(3)))
-    end, branch, total = follow(scene, start, weight, generator(own), RayKind.CAMERA)
-    dr.eval(end, branch, total, own, other, series)
-    main = VisiblePoints(**vars(end), pixel=pixel, random=own, series=series, number=number)
+    paths = follow(scene, start, weight, generator(own), RayKind.CAMERA)
+    dr.eval(paths, own, other, series)
+    main = VisiblePoints(**vars(paths.end), pixel=pixel, random=own, series=series, number=number)
     if only_main:
         return main, None
-    lanes = dr.compress(branch.active)
+    lanes = dr.compress(paths.branch.active)
     if dr.width(lanes) == 0:
         return main, None
     other, series, number = (dr.gather(mi.UInt32, each, lanes) for each in (other, series, number))
-    end = follow_branches(scene, branch, total, lanes, other)
+    end = follow_branches(scene, paths, lanes, other)
     dr.eval(end, other, series, number)
     kept = dr.compress(end.valid | (end.light > 0))
     if dr.width(kept) == 0:

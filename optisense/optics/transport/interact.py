@@ -101,6 +101,7 @@ class Interaction:
             surface.
         goes_on: mask of the rays that neither end nor escape.
         totally: mask of the rays that are totally reflected.
+        rough: mask of the rays that meet a rough interface.
         turned: mask of the rays that are reflected, by a mirror or at an interface.
         lobe: the lobe that the ray follows.
         reflection: the reflected lobe of a smooth interface through which the ray continues; of
@@ -124,6 +125,7 @@ class Interaction:
     ended: mi.Bool
     goes_on: mi.Bool
     totally: mi.Bool
+    rough: mi.Bool
     turned: mi.Bool
     lobe: Lobe
     reflection: Lobe
@@ -262,6 +264,7 @@ def interact(
         ended=hit.valid & ~sensed & ~goes_on,
         goes_on=goes_on,
         totally=totally,
+        rough=interface & (alpha > SMOOTH_ALPHA),
         turned=turned,
         lobe=Lobe(direction, weight),
         reflection=Lobe(reflected, mi.Color3f(beside)),

@@ -1,0 +1,92 @@
+"""Rays of lobes from one coating to the next, with branches at interfaces."""
+
+from __future__ import annotations
+
+import drjit as dr
+import mitsuba as mi
+
+from optisense.optics.backend.arrays import FEWEST_LANES, gathered, joined
+from optisense.optics.backend.sequences import GOLDEN_BITS
+from optisense.optics.scene.ray_scene import Ray, RayScene
+from optisense.optics.transport.camera_paths import (
+    PathEnd,
+    Paths,
+    follow,
+    follow_branches,
+    generator,
+)
+from optisense.optics.transport.interact import RayKind
+
+MOST_SCATTERED = 8
+"""Largest number of rays into which a ray is split at a rough interface. The rays of all splits
+are about as many as those that are followed. In the contact of GelSight Mini of specularity 1, most
+of the noise of rays is from the scattering at the rough edges of the light guide: splitting reduces
+the noise of pixels from 27 to 20 %, on the skin far from it from 16 to 12 %, and takes a fifth more
+time."""
+
+
+def follow_to_coating(
+    scene: RayScene, ray: Ray, weight: mi.Color3f, bits: mi.UInt32, ray_kind: RayKind
+) -> tuple[PathEnd, mi.UInt32]:
+    """Follow rays to the lamp or the coating that they meet.
+
+    Rays of the kind `RayKind.CAMERA` go through interfaces, and one of the reflections of each is
+    followed as a ray of its own: little light is reflected at an interface, but from the skin of
+    GelSight Mini only the reflected light meets other skin. Rays are split into several at the
+    first rough interface, as the rough edges of a light guide scatter few rays towards lamps.
+
+    Args:
+        weight: factor (3, n) on the radiance at the rays' beginnings.
+        bits: random bits (n,) of each ray.
+
+    Returns:
+        The ends of those rays that meet a lamp or a coating, and the numbers of the rays that they
+        belong to.
+    """
+    paths = follow(scene, ray, weight, generator(bits), ray_kind, until_rough=scene.rough)
+    dr.eval(paths)
+    parts = [_met(paths.end, dr.arange(mi.UInt32, dr.width(bits)))]
+    rough = dr.compress(paths.stopped.active)
+    if dr.width(rough) >= FEWEST_LANES:
+        parts.append(_scattered(scene, paths, rough, bits))
+    turned = dr.compress(paths.branch.active)
+    if dr.width(turned) >= FEWEST_LANES:
+        other = dr.gather(mi.UInt32, bits, turned) ^ GOLDEN_BITS
+        parts.append(_met(follow_branches(scene, paths, turned, other), turned))
+    out, *others = [part for part in parts if dr.width(part[1]) > 0] or parts[:1]
+    for part in others:
+        out = joined(out, part)
+    return out
+
+
+def _scattered(
+    scene: RayScene, paths: Paths, lanes: mi.UInt32, bits: mi.UInt32
+) -> tuple[PathEnd, mi.UInt32]:
+    """Follow several rays from each rough interface before which paths have stopped.
+
+    All of them bring the light of lamps, and only the first that of coatings.
+
+    Args:
+        lanes: numbers (k,) of the stopped paths.
+        bits: random bits (n,) of each path.
+    """
+    stopped = dr.width(lanes)
+    copies = max(1, min(MOST_SCATTERED, round(dr.width(bits) / stopped)))
+    number = dr.arange(mi.UInt32, stopped * copies)
+    first = number < dr.opaque(mi.UInt32, stopped)
+    lanes = dr.concat([lanes] * copies)
+    bits = mi.sample_tea_32(dr.gather(mi.UInt32, bits, lanes), number)[0]
+    share = dr.opaque(mi.Float, 1 / copies)
+    weight = dr.gather(mi.Color3f, paths.stopped_weight, lanes) * share
+    ray = gathered(paths.stopped, lanes)
+    end = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION).end
+    end.valid &= first
+    end.weight *= dr.select(end.valid, 1 / share, 1)
+    return _met(end, lanes)
+
+
+def _met(end: PathEnd, number: mi.UInt32) -> tuple[PathEnd, mi.UInt32]:
+    """Return the ends on lamps and coatings, and the numbers of their rays."""
+    dr.eval(end)
+    kept = dr.compress(end.valid | (end.light > 0))
+    return gathered(end, kept), dr.gather(mi.UInt32, number, kept)
