@@ -25,7 +25,7 @@ WINDOW_STAMP := .blender-window/.set-up
 
 LOCK := --universal --python-version 3.11 --generate-hashes --no-emit-index-url --upgrade
 
-.PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-pages pytest-scoring-pages pytest-rest bare-pytest quick-pytest \
+.PHONY: help setup demo test quick-test lint types import-rules docs docs-as-typed pytest pytest-docs pytest-scoring-pages pytest-rest bare-pytest quick-pytest \
     studio-tests test-blender studio-window-test package-test extension setup-blender \
     browser-tests setup-browser \
     format bench fuzz guided-fuzz kill-tests memory-tests lock clean
@@ -63,8 +63,8 @@ demo: setup
 
 # Each of these runs whatever becomes of the others, several at a time; a summary at the end says
 # what failed. Those that take longest begin first.
-CHECKS := pytest-tasks pytest-optics pytest-pages pytest-rest pytest-search pytest-sensors \
-    pytest-scoring-pages studio-tests types docs bare-pytest lint import-rules
+CHECKS := pytest-rest pytest-docs pytest-tasks pytest-optics pytest-scoring-pages pytest-search \
+    pytest-sensors pytest-pages studio-tests types docs bare-pytest lint import-rules
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
@@ -94,26 +94,25 @@ pytest: setup
 
 # The same in lots, which `make test` runs side by side. A lot is one process: its folders share
 # imports, and the first renderings, which load the kernels.
-LOTS := optics search sensors tasks
+LOTS := optics pages search sensors tasks
 LOT_optics := optics
+LOT_pages := browser report paper
 LOT_search := search
 LOT_sensors := sensors objectives
 LOT_tasks := tasks calibration cli
 
-# Pages of the documentation, of reports and of the paper are a lot. The pages that score, search and
-# verify take as long as all others of the documentation, and are a lot of their own.
-PAGES := docs browser report paper
+# The pages that score, search and verify take as long as all others, and are a lot of their own.
 SCORING_PAGES := datasets light-colours objectives search study-report tasks tolerance verify
 SCORING := $(SCORING_PAGES:%="tests/docs/test_docs_as_typed.py::test_a_page_works_as_typed[%]")
 
-pytest-pages: setup
-	$(BIN)/python -m pytest $(PAGES:%=tests/%) $(SCORING:%=--deselect %)
+pytest-docs: setup
+	$(BIN)/python -m pytest tests/docs $(SCORING:%=--deselect %)
 
 pytest-scoring-pages: setup
 	$(BIN)/python -m pytest $(SCORING)
 
 pytest-rest: setup
-	$(BIN)/python -m pytest $(PAGES:%=--ignore=tests/%) $(foreach lot,$(LOTS),$(LOT_$(lot):%=--ignore=tests/%))
+	$(BIN)/python -m pytest --ignore=tests/docs $(foreach lot,$(LOTS),$(LOT_$(lot):%=--ignore=tests/%))
 
 $(LOTS:%=pytest-%): pytest-%: setup
 	$(BIN)/python -m pytest $(LOT_$*:%=tests/%)

@@ -3,8 +3,9 @@
 A process that renders spends half of its time on imports and on the renderer's start. Here one
 process does this once and forks for each program that is run; a program in a folder of its own asks
 it to. The fork has the caller's folder, environment, arguments and standard streams, hears its
-signals, runs on its processors, and gives it its exit code. What a process does before its first
-line is not tested so. Python that such a program starts by `sys.executable` is a fork, too.
+signals, runs on its processors, and gives it its exit code. Tests with forks do not test what a
+process does before its first line. Python that such a program starts by `sys.executable` is a fork,
+too.
 
 `make test` starts one such process for all its targets, and names its folder of programs in the
 environment variable `WARM_PYTHON`.

@@ -15,7 +15,10 @@ ModelOf = Callable[[str], OpticalModel]
 
 @pytest.fixture(scope="package")
 def model_of() -> ModelOf:
-    """Tests do not change a model. One is kept at a time, as each takes up to 0.9 GB."""
+    """Return a function that returns a model, which tests do not change.
+
+    It keeps the model that it returned last, as each takes up to 0.9 GB.
+    """
     kept: dict[str, OpticalModel] = {}
 
     def model(name: str) -> OpticalModel:
