@@ -19,8 +19,6 @@ Value = TypeVar("Value")
 PACKET = 64
 """Number of entries of which a kernel reads a multiple, at least: four times those of the widest
 vectors of processors, 16 single-precision numbers."""
-
-
 FEWEST_LANES = 2
 """Lower bound on the number of entries of arrays that kernels work on: for arrays of one entry,
 Dr.Jit compiles other kernels."""

@@ -38,6 +38,8 @@ def follow_to_coating(
     Args:
         weight: factor (3, n) on the radiance at the rays' beginnings.
         bits: random bits (n,) of each ray.
+        ray_kind: `RayKind.CAMERA` or `RayKind.REFLECTION`. Rays of the latter draw one of both ways
+            at each interface.
 
     Returns:
         The ends of those rays that meet a lamp or a coating, and the numbers of the rays that they

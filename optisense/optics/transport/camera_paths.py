@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.arrays import gathered
+from optisense.optics.backend.arrays import FEWEST_LANES, gathered
 from optisense.optics.backend.sequences import folded_lattice, sequence_2d
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.bsdf import grey, surface_light
@@ -260,15 +260,14 @@ def find_visible_points(
     kept = dr.compress(end.valid | (end.light > 0))
     if dr.width(kept) == 0:
         return main, None
-    alone = dr.width(kept) == 1
-    # Dr.Jit compiles other kernels for arrays of one entry, so an entry without weight is appended.
-    if alone:
-        kept = dr.repeat(kept, 2)
+    alone = dr.width(kept) < FEWEST_LANES
+    if alone:  # an entry without weight is appended
+        kept = dr.repeat(kept, FEWEST_LANES)
     pixel = dr.gather(mi.UInt32, pixel, lanes)
     found = VisiblePoints(**vars(end), pixel=pixel, random=other, series=series, number=number)
     reflected = dr.gather(VisiblePoints, found, kept)
     if alone:
-        first = dr.arange(mi.UInt32, 2) == 0
+        first = dr.arange(mi.UInt32, FEWEST_LANES) == 0
         reflected.valid &= first
         reflected.light = dr.select(first, reflected.light, 0)
     dr.eval(reflected)
