@@ -37,17 +37,30 @@ def gathered(value: Value, lanes: mi.UInt32) -> Value:
 
 
 def joined(first: Value, second: Value) -> Value:
-    """Concatenate two arrays, or the corresponding arrays of two tuples or dataclasses."""
+    """Concatenate two arrays, or the corresponding arrays of two tuples or dataclasses.
+
+    A kernel of `drjit.concat` contains the lengths of the arrays, and cannot be reused for others.
+    """
+    dr.eval(first, second)
+    count = dr.width(first)
+    number = dr.arange(mi.UInt32, count + dr.width(second))
+    start = dr.opaque(mi.UInt32, count)
+    return _joined(first, second, number, number - start, number < start)
+
+
+def _joined(
+    first: Value, second: Value, number: mi.UInt32, later: mi.UInt32, in_first: mi.Bool
+) -> Value:
     if isinstance(first, tuple) and isinstance(second, tuple):
-        return type(first)(joined(one, other) for one, other in zip(first, second, strict=True))
+        pairs = zip(first, second, strict=True)
+        return type(first)(_joined(one, two, number, later, in_first) for one, two in pairs)
     if is_dataclass(first) and not isinstance(first, type):
         names = [each.name for each in fields(first)]
-        return type(first)(**{n: joined(getattr(first, n), getattr(second, n)) for n in names})
-    if dr.depth_v(first) > 1:
-        one: Any = first
-        other: Any = second
-        return type(first)(*(joined(one[k], other[k]) for k in range(len(one))))
-    return dr.concat((first, second))
+        parts = ((getattr(first, name), getattr(second, name)) for name in names)
+        return type(first)(*(_joined(one, two, number, later, in_first) for one, two in parts))
+    one = dr.gather(type(first), first, number, in_first)
+    two = dr.gather(type(first), second, later, ~in_first)
+    return dr.select(in_first, one, two)
 
 
 def floats(values: NDArray[np.floating]) -> mi.Float:

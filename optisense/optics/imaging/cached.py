@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from functools import reduce
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.backend.arrays import padded
+from optisense.optics.backend.arrays import joined, padded
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._contact_light import (
@@ -283,7 +284,7 @@ class _Shading:
         ]
         if not counted:
             return
-        pixel, number, count = (dr.concat(each) for each in zip(*counted, strict=True))
+        pixel, number, count = reduce(joined, counted)
         dr.eval(pixel, number, count)
         self.sample(pixel, number, True, count=count)
 
@@ -347,7 +348,7 @@ class _Shading:
         again = apart & np.kron(grain[::2, ::2], np.ones((2, 2), bool))[:height, :width]
         tiers = [repeated(each, 1) for each in (apart, again) if each.any()]
         tiers[0] = tiers[0][0], dr.zeros(mi.UInt32, dr.width(tiers[0][0]))
-        pixel, number = (dr.concat(each) for each in zip(*tiers, strict=True))
+        pixel, number = reduce(joined, tiers)
         dr.eval(pixel, number)
         self.sample(pixel, number, False, again=True)
 

@@ -76,7 +76,7 @@ def _scattered(
     copies = max(1, min(MOST_SCATTERED, round(dr.width(bits) / stopped)))
     number = dr.arange(mi.UInt32, stopped * copies)
     first = number < dr.opaque(mi.UInt32, stopped)
-    lanes = dr.concat([lanes] * copies)
+    lanes = dr.gather(mi.UInt32, lanes, number % dr.opaque(mi.UInt32, stopped))
     bits = mi.sample_tea_32(dr.gather(mi.UInt32, bits, lanes), number)[0]
     share = dr.opaque(mi.Float, 1 / copies)
     weight = dr.gather(mi.Color3f, paths.stopped_weight, lanes) * share

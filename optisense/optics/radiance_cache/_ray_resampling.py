@@ -5,6 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
+from optisense.optics.backend.arrays import joined
 from optisense.optics.backend.sequences import unit_float
 
 SPLIT_SHARE = 1 / 16
@@ -43,9 +44,27 @@ def drawn(
     total = dr.gather(mi.Float, until, mi.UInt32(count - 1))
     shift = unit_float(dr.gather(mi.UInt32, bits, kept[0]))
     step = total / most
-    places = (dr.arange(mi.Float, most) + shift) * step
-    place = dr.binary_search(0, count - 1, lambda i: dr.gather(mi.Float, until, i) <= places)
+    place = _first_above(until, (dr.arange(mi.Float, most) + shift) * step)
     return dr.gather(mi.UInt32, kept, place), dr.gather(mi.Float, weight, place) / step
+
+
+def _first_above(rising: mi.Float, values: mi.Float) -> mi.UInt32:
+    """Return the index (m,) of the first entry of rising numbers (n,) that is greater than each of
+    the values (m,), or that of the last entry.
+
+    Unlike that of `drjit.binary_search`, the kernel does not depend on n, so that it is compiled
+    once.
+    """
+
+    def halved(first: mi.UInt32, last: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32]:
+        middle = (first + last) // 2
+        above = dr.gather(mi.Float, rising, middle) > values
+        return dr.select(above, first, middle + 1), dr.select(above, middle, last)
+
+    first = dr.zeros(mi.UInt32, dr.width(values))
+    last = dr.opaque(mi.UInt32, dr.width(rising) - 1, dr.width(values))
+    first, _ = dr.while_loop((first, last), lambda first, last: first < last, halved)
+    return first
 
 
 def split(on_skin: mi.Bool, count: int) -> tuple[mi.UInt32, int]:
@@ -61,4 +80,7 @@ def split(on_skin: mi.Bool, count: int) -> tuple[mi.UInt32, int]:
     every = dr.arange(mi.UInt32, dr.width(on_skin))
     if copies == 1 or dr.width(raised) == 0:
         return every, 1
-    return dr.concat([every, dr.repeat(raised, copies - 1)]), copies
+    # `drjit.repeat` would compile a kernel for each number of copies.
+    number = dr.arange(mi.UInt32, dr.width(raised) * (copies - 1))
+    again = dr.gather(mi.UInt32, raised, number % dr.opaque(mi.UInt32, dr.width(raised)))
+    return joined(every, again), copies

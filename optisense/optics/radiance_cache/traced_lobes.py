@@ -112,10 +112,11 @@ class LobeTracer:
         table = self.scenes.full.table
         count = dr.width(points.pixel) * directions
         lane = dr.arange(mi.UInt32, count)
-        owner = lane // directions
+        each = dr.opaque(mi.UInt32, directions)
+        owner = lane // each
         first = dr.gather(VisiblePoints, points, owner)
         coating = coating_of(table, first.surface, first.valid)
-        number = first.number * directions + lane % directions
+        number = first.number * each + lane % each
         # The rays of a pixel share its lobes evenly.
         u = unit_float(first.series + number * STEPS_2D[0])
         v = unit_float(first.series * 277803737 + number * STEPS_2D[1])
@@ -243,7 +244,7 @@ class LobeTracer:
             if reflections == 0:
                 chosen, copies = split(on_skin, count)
                 if copies > 1:
-                    end.weight *= dr.select(on_skin, 1, 1 / copies)
+                    end.weight *= dr.select(on_skin, 1, dr.opaque(mi.Float, 1 / copies))
                     dr.eval(end, bits)
                     end = gathered(end, chosen)
                     lane, bits, read, on_skin = (
