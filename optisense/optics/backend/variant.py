@@ -97,6 +97,11 @@ def use_variant(variant: str = "auto") -> str:
     # always the same.
     drjit = import_renderer("drjit")
     drjit.set_flag(drjit.JitFlag.PacketOps, False)
+    # For additions to an array of up to a million entries, Dr.Jit would make a copy of the array
+    # for each thread. The kernel would contain the array's length, and be compiled anew for images
+    # of another size and for other contacts, for seconds. Additions to the array itself are as
+    # fast.
+    drjit.set_expand_threshold(0)
     return name
 
 

@@ -95,8 +95,9 @@ class RayCamera:
         """
         position, right, up, forward, fov, lens = self.pose() if pose is None else pose
         half = fov * float(np.pi / 360)
-        u = 2 * x / self.width - 1
-        v = (self.height - 2 * y) / self.width
+        width, height = (dr.opaque(mi.Float, float(size)) for size in (self.width, self.height))
+        u = 2 * x / width - 1
+        v = (height - 2 * y) / width
         if self.distortion is not None:
             u, v = self._undistorted(self.distortion, u, v, half, lens)
         if self.equidistant:
@@ -127,7 +128,8 @@ class RayCamera:
         across, down = distortion.centre
         edge = half if self.equidistant else dr.tan(half)
         x = (u + (1 - 2 * across)) * edge
-        y = -(v + (1 - 2 * down) * (-self.height / self.width)) * edge
+        shape = dr.opaque(mi.Float, self.height / self.width)
+        y = -(v - (1 - 2 * down) * shape) * edge
         numbers = tuple(dr.detach(each) for each in lens)
         ideal_x, ideal_y = distortion.undistort(dr.detach(x), dr.detach(y), numbers)
         a, b, c, d = distortion.jacobian(ideal_x, ideal_y, numbers)

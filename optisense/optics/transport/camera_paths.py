@@ -205,8 +205,9 @@ def film_samples(
     else:
         jitter = folded_lattice(sample, count, MAX_PIXEL_SAMPLES, pixel, bits)
     middle = sample == 0
-    x = mi.Float(pixel % width) + dr.select(middle, 0.5, jitter.x)
-    y = mi.Float(pixel // width) + dr.select(middle, 0.5, jitter.y)
+    row = dr.opaque(mi.UInt32, width)
+    x = mi.Float(pixel % row) + dr.select(middle, 0.5, jitter.x)
+    y = mi.Float(pixel // row) + dr.select(middle, 0.5, jitter.y)
     return mi.Point2f(x, y)
 
 

@@ -160,8 +160,9 @@ def trace_chief_rays(
     """
     shape = camera.height, camera.width
     index = dr.arange(mi.UInt32, camera.width * camera.height)
-    x = mi.Float(index % camera.width) + 0.5
-    y = mi.Float(index // camera.width) + 0.5
+    width = dr.opaque(mi.UInt32, camera.width)
+    x = mi.Float(index % width) + 0.5
+    y = mi.Float(index // width) + 0.5
     outcome, point, normal, arriving, region, face, mirrors, _path = _trace(
         scene, None, Ray(*camera.rays(x, y), mi.Bool(True))
     )
