@@ -95,9 +95,9 @@ class RayCamera:
         """
         position, right, up, forward, fov, lens = self.pose() if pose is None else pose
         half = fov * float(np.pi / 360)
-        width, height = (dr.opaque(mi.Float, float(size)) for size in (self.width, self.height))
-        u = 2 * x / width - 1
-        v = (height - 2 * y) / width
+        pixel, height = dr.opaque(mi.Float, 1 / self.width), dr.opaque(mi.Float, float(self.height))
+        u = 2 * x * pixel - 1
+        v = (height - 2 * y) * pixel
         if self.distortion is not None:
             u, v = self._undistorted(self.distortion, u, v, half, lens)
         if self.equidistant:
