@@ -1,7 +1,11 @@
 """The sensors and contacts of the ablation, and their reference images.
 
 The references are rendered by progressive photon mapping, which shares the photon pass and the
-surfaces with the radiance cache but neither its cells nor its shading. They are kept in files.
+surfaces with the radiance cache but neither its cells nor its shading. Too few of its photons
+arrive in the narrow lobes of a mirroring coating. The references of such coatings are images from
+the radiance cache with ten times the photons, so that only changes of the error are known;
+`benchmarks.patches` compares all features together with path tracing. The references are kept in
+files.
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from optisense.design.difference import fingerprint
 from optisense.geometry import Contact, Sphere
 from optisense.mechanics import CONFORMING
 from optisense.optics.drafts import DraftModel
+from optisense.optics.estimators import RADIANCE_CACHE, SPPM
 
 CACHE = Path(__file__).parent / ".cache"
 RESOLUTION = (160, 120)
@@ -28,6 +33,8 @@ RESOLUTION = (160, 120)
 are rendered."""
 PHOTONS = 600_000
 """Number of photons of an image, near the 560,000 of `benchmarks.case`."""
+LOBE_PHOTONS = 300_000
+"""Number of photons of an image of which narrow lobes are traced, which takes longer."""
 DRAFT_PHOTONS = 20_000
 """Number of photons of a draft, as in the studio."""
 RADIUS, DEPTH = 1.5, 0.8
@@ -59,6 +66,8 @@ class Case:
         radius, depth: radius and depth (mm) of the ball.
         resolution: width and height, pixels.
         draft: whether the image is a draft.
+        lobes: whether the coating's metallic lobes are traced. The features of this tracing are
+            switched off, and the reference is the radiance cache with all features.
     """
 
     sensor: str
@@ -69,6 +78,7 @@ class Case:
     depth: float = DEPTH
     resolution: tuple[int, int] = RESOLUTION
     draft: bool = False
+    lobes: bool = False
 
     @property
     def name(self) -> str:
@@ -78,7 +88,7 @@ class Case:
     @property
     def photons(self) -> int:
         """Number of photons of an image."""
-        return DRAFT_PHOTONS if self.draft else PHOTONS
+        return DRAFT_PHOTONS if self.draft else LOBE_PHOTONS if self.lobes else PHOTONS
 
     @property
     def design(self) -> SensorDesign:
@@ -101,6 +111,8 @@ class Case:
 
 DIFFUSE, METALLIC = {"coating.specularity": 0.0}, {"coating.specularity": 0.6}
 """Settings of coatings without metal, and with more metal than not."""
+MIRRORING = {"coating.specularity": 1.0}
+"""Settings of coatings of metal alone."""
 WHITE = {"coating.specularity": 0.0, "coating.reflectance": (0.8, 0.8, 0.8)}
 """Settings of a coating as white as paint, which reflects much light between skin and contact."""
 CASES = [
@@ -108,6 +120,16 @@ CASES = [
         Case(sensor, what, coating)
         for sensor in ("gelsight-mini-ideal", "gelsight-svelte", "gelbelt", "gelsight360")
         for what, coating in (("diffuse", DIFFUSE), ("metallic", METALLIC))
+    ),
+    *(
+        Case(sensor, "mirroring", MIRRORING, lobes=True)
+        for sensor in (
+            "gelsight-mini-ideal",
+            "gelsight-mini",
+            "gelsight-svelte",
+            "gelbelt",
+            "gelsight360",
+        )
     ),
     Case("gelsight-mini", "as fitted"),
     Case("gelsight-mini-ideal", "white, deep", WHITE, radius=3.0, depth=1.8),
@@ -117,11 +139,10 @@ CASES = [
     Case("gelsight-svelte", "draft", METALLIC, draft=True),
     Case("gelsight-mini-ideal", "metallic, 320x240", METALLIC, resolution=(320, 240)),
 ]
-"""Diffuse and metallic coatings on four sensors; and cases in which a refinement may matter that
-changes little in those: the sensor that is fitted to photographs, much interreflection in a large
-contact, a small contact near the lamps, a curved surface, drafts of the studio, and many pixels. A
-coating of metal alone is not among them: against this reference, its error elsewhere than in the
-contact is 60 to 67 % whatever is switched off."""
+"""Diffuse, metallic and mirroring coatings on four sensors; and cases in which a refinement may
+matter that changes little in those: the sensor that is fitted to photographs, much interreflection
+in a large contact, a small contact near the lamps, a curved surface, drafts of the studio, and many
+pixels."""
 
 
 def smooth(image: FloatArray) -> FloatArray:
@@ -182,7 +203,7 @@ def reference(case: Case) -> Truth:
                 case.resolution,
                 REFERENCE_PHOTONS,
                 seed=seed,
-                estimator="sppm",
+                estimator=RADIANCE_CACHE if case.lobes else SPPM,
                 skin=CONFORMING,
             )
             for seed in REFERENCE_SEEDS

@@ -31,11 +31,14 @@ class Ablation:
         name: its name in the table.
         changes: the values to replace.
         light: whether the content of the radiance cache depends on it, and not only the shading.
+        lobes: whether it is a feature of the tracing of narrow lobes, and does nothing on coatings
+            without them.
     """
 
     name: str
     changes: Sequence[Change]
     light: bool
+    lobes: bool = False
 
     @contextmanager
     def applied(self) -> Iterator[None]:
@@ -47,8 +50,8 @@ class Ablation:
 
 
 def ablations() -> list[Ablation]:
-    """Return all ablations: those of camera samples and shading, then those of the light."""
-    return [*_of_sampling(), *_of_shading(), *_of_light()]
+    """Return all ablations: of camera samples and shading, of the light, and of narrow lobes."""
+    return [*_of_sampling(), *_of_shading(), *_of_light(), *_of_lobes()]
 
 
 def _shading(name: str, *changes: Change) -> Ablation:
@@ -57,6 +60,10 @@ def _shading(name: str, *changes: Change) -> Ablation:
 
 def _light(name: str, *changes: Change) -> Ablation:
     return Ablation(name, changes, True)
+
+
+def _lobes(name: str, *changes: Change) -> Ablation:
+    return Ablation(name, changes, False, lobes=True)
 
 
 def _nothing(*given: Any) -> None:
@@ -211,4 +218,61 @@ def _of_light() -> list[Ablation]:
         _light("widened beams of single photons", Change(beams, "SPARSE_SHARE", 0.0)),
         _light("empty bins left out", Change(tally, "EMPTY_BIN_SHARE", -1.0)),
         _light("flat faces merged", Change(assembly, "_merged", _first)),
+    ]  # fmt: skip
+
+
+def _of_lobes() -> list[Ablation]:
+    import drjit as dr
+    import mitsuba as mi
+
+    from optisense.optics.imaging import _traced_light, cached
+    from optisense.optics.radiance_cache import (
+        _lobe_branches,
+        _ray_resampling,
+        lit_scene,
+        traced_lobes,
+    )
+    from optisense.optics.transport.interact import RayKind
+
+    class OneWay:
+        CAMERA = REFLECTION = RayKind.REFLECTION
+
+    def all_cached(tracer: Any, first: Any, ray: Any) -> Any:
+        return dr.full(mi.Bool, False, dr.width(ray.active))
+
+    def blurred(layers: Any, weight: Any, where: Any, reach: int, deblurred: bool) -> None:
+        average(layers, weight, where, reach, False)
+
+    def followed(pixels: Any, rays: float, segments: float = 0) -> Any:
+        directions = _traced_light._directions(rays, pixels, 1)
+        return _traced_light.LobeSamples(pixels, 1, directions, gathers=False, segments=segments)
+
+    average = _traced_light.average_pixels
+    return [
+        Ablation("tracing of narrow lobes",
+                 [Change(lit_scene, "TRACED_ROUGHNESS", 0.0)], light=True, lobes=True),
+        _lobes("rays drawn from beams", Change(traced_lobes, "GUIDED_SHARE", 0.0)),
+        _lobes("rays split at rough faces", Change(_lobe_branches, "MOST_SCATTERED", 1)),
+        _lobes("both ways at the first interfaces", Change(traced_lobes, "RayKind", OneWay)),
+        _lobes("rays split at contacts", Change(_ray_resampling, "SPLIT_SHARE", 0.0)),
+        _lobes("drawn places of cached light",
+               Change(traced_lobes, "MOST_CACHED", 10**9),
+               Change(traced_lobes, "MOST_GATHERED", 10**9)),
+        _lobes("final gathering on the skin",
+               Change(_traced_light.LobeSamples, "of_skin", staticmethod(followed))),
+        _lobes("light straight from other coatings",
+               Change(traced_lobes.LobeTracer, "_is_uncached", all_cached)),
+        _lobes("skin behind mirrored contacts",
+               Change(traced_lobes.LobeTracer, "_subtract_skin_behind", _nothing)),
+        _lobes("further passes of skin", Change(_traced_light, "SKIN_SEGMENTS", 0.0)),
+        _lobes("more rays around contacts", Change(_traced_light, "NEAR_RAYS", 0.03)),
+        _lobes("more rays beside contacts", Change(_traced_light, "BESIDE_RAYS", 0.02)),
+        _lobes("few rays from mirrored points", Change(_traced_light, "MIRRORED_SHARE", 1.0)),
+        _lobes("averages far from contacts", Change(_traced_light, "SKIN_WIDTH", 0.0)),
+        _lobes("averages beside contacts", Change(_traced_light, "BESIDE_WIDTH", 0.0)),
+        _lobes("averages around contacts",
+               Change(_traced_light, "NEAR_WIDTH", 0.0), Change(cached, "NEAR_WIDTH", 0.0)),
+        _lobes("blur undone", Change(_traced_light, "average_pixels", blurred)),
+        _lobes("spread of traced specks", Change(_traced_light, "without_specks", _first)),
+        _lobes("more samples at the outline", Change(_traced_light, "OUTLINE_SAMPLES", 1)),
     ]  # fmt: skip

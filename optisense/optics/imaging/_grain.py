@@ -12,7 +12,7 @@ GRAIN_SAMPLES = 4
 """Largest number of further camera samples per pixel in grainy places outside contacts, which
 halves the grain; they are limited to half of the image's samples. A sample reads one cell of the
 cache, so that neighbouring cells that differ much show as grain. Without them, the error outside
-the contact of GelSight Svelte is 26 % larger (benchmarks/ablation.md)."""
+the contact of GelSight Svelte is 21 % larger (benchmarks/ablation.md)."""
 OUTLINE_SAMPLES = 9
 """Number of camera samples per pixel at the outline of the skin, such as the edge of a
 mirror, so that it is smooth, as in photographs. On GelSight Svelte, 1,200 of 76,800 pixels lie

@@ -21,7 +21,7 @@ an image `REFERENCE_WIDTH` wide. Twelve keep the noise of the samples below 1 % 
 MIN_CONTACT_SAMPLES = 16_000
 """Lower bound on the number of camera samples in all contacts together: that of 1,300 pixels of
 twelve samples. If contacts fill fewer pixels, tilt and shadow vary more within each pixel, and each
-gets more samples; without it, the error in a contact of GelSight Svelte is up to 26 % larger
+gets more samples; without it, the error in a contact of GelBelt is 16 % larger
 (benchmarks/ablation.md)."""
 RIM_SAMPLES = 6
 """Number of camera samples per pixel around contacts, in an image `REFERENCE_WIDTH` wide: half of
