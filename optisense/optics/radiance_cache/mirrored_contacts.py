@@ -64,9 +64,10 @@ def mirrored_contacts(
         if no ray ends on an indenter.
     """
     lane = dr.arange(mi.UInt32, dr.width(points.pixel) * rays)
-    points = dr.gather(VisiblePoints, points, lane // rays)
-    points.number = points.number * rays + lane % rays
-    points.weight /= rays
+    each = dr.opaque(mi.UInt32, rays)
+    points = dr.gather(VisiblePoints, points, lane // each)
+    points.number = points.number * each + lane % each
+    points.weight *= dr.opaque(mi.Float, 1 / rays)
     found = None
     for end, owner in _ends(scenes, points):
         region = surface_region(scenes.full.table, end.surface, end.valid)
@@ -82,10 +83,11 @@ def mirrored_contacts(
     if count > MOST_LANES:
         # The places are in the order of their pixels, so that each pixel keeps an equal share.
         shift = unit_float(dr.gather(mi.UInt32, points.random, mi.UInt32(0)))
-        drawn = mi.UInt32((dr.arange(mi.Float, MOST_LANES) + shift) * (count / MOST_LANES))
-        drawn = dr.minimum(drawn, count - 1)
+        step = dr.opaque(mi.Float, count / MOST_LANES)
+        drawn = mi.UInt32((dr.arange(mi.Float, MOST_LANES) + shift) * step)
+        drawn = dr.minimum(drawn, dr.opaque(mi.UInt32, count - 1))
         end, owner = dr.gather(PathEnd, end, drawn), dr.gather(mi.UInt32, owner, drawn)
-        end.weight *= count / MOST_LANES
+        end.weight *= step
         dr.eval(end, owner)
     alone = count < FEWEST_LANES
     if alone:
