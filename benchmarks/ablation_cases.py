@@ -115,22 +115,14 @@ MIRRORING = {"coating.specularity": 1.0}
 """Settings of coatings of metal alone."""
 WHITE = {"coating.specularity": 0.0, "coating.reflectance": (0.8, 0.8, 0.8)}
 """Settings of a coating as white as paint, which reflects much light between skin and contact."""
+SENSORS = "gelsight-mini-ideal", "gelsight-svelte", "gelbelt", "gelsight360"
 CASES = [
     *(
         Case(sensor, what, coating)
-        for sensor in ("gelsight-mini-ideal", "gelsight-svelte", "gelbelt", "gelsight360")
+        for sensor in SENSORS
         for what, coating in (("diffuse", DIFFUSE), ("metallic", METALLIC))
     ),
-    *(
-        Case(sensor, "mirroring", MIRRORING, lobes=True)
-        for sensor in (
-            "gelsight-mini-ideal",
-            "gelsight-mini",
-            "gelsight-svelte",
-            "gelbelt",
-            "gelsight360",
-        )
-    ),
+    *(Case(sensor, "mirroring", MIRRORING, lobes=True) for sensor in (*SENSORS, "gelsight-mini")),
     Case("gelsight-mini", "as fitted"),
     Case("gelsight-mini-ideal", "white, deep", WHITE, radius=3.0, depth=1.8),
     Case("gelsight-mini-ideal", "small, in a corner", DIFFUSE, CORNER, 0.5, 0.3),

@@ -36,6 +36,16 @@ def gathered(value: Value, lanes: mi.UInt32) -> Value:
     return dr.gather(type(value), value, lanes)
 
 
+def tiled(values: mi.UInt32, times: int) -> mi.UInt32:
+    """Return an array (n,) of integers ``times`` times, one after the other.
+
+    A kernel of `drjit.repeat` contains the number of times, and cannot be reused for others.
+    """
+    count = dr.width(values)
+    number = dr.arange(mi.UInt32, count * times)
+    return dr.gather(mi.UInt32, values, number % dr.opaque(mi.UInt32, count))
+
+
 def joined(first: Value, second: Value) -> Value:
     """Concatenate two arrays, or the corresponding arrays of two tuples or dataclasses.
 
@@ -51,6 +61,9 @@ def joined(first: Value, second: Value) -> Value:
 def _joined(
     first: Value, second: Value, number: mi.UInt32, later: mi.UInt32, in_first: mi.Bool
 ) -> Value:
+    """Return the entries ``number`` (n,) of the first array where ``in_first``, and the entries
+    ``later`` (n,) of the second elsewhere.
+    """
     if isinstance(first, tuple) and isinstance(second, tuple):
         pairs = zip(first, second, strict=True)
         return type(first)(_joined(one, two, number, later, in_first) for one, two in pairs)

@@ -95,6 +95,7 @@ class RayCamera:
         """
         position, right, up, forward, fov, lens = self.pose() if pose is None else pose
         half = fov * float(np.pi / 360)
+        # Opaque: one kernel for all sizes. A factor, as Dr.Jit makes of a constant divisor.
         pixel, height = dr.opaque(mi.Float, 1 / self.width), dr.opaque(mi.Float, float(self.height))
         u = 2 * x * pixel - 1
         v = (height - 2 * y) * pixel

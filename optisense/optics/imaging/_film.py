@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from optisense.optics.backend.arrays import padded
+from optisense.optics.backend.arrays import padded, tiled
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.transport.camera_paths import VisiblePoints
 
@@ -26,7 +26,7 @@ def repeated(mask: NDArray[np.bool_], times: int) -> tuple[mi.UInt32, mi.UInt32]
     chosen = dr.compress(mi.Bool(padded(mask.ravel())))
     lane = dr.arange(mi.UInt32, dr.width(chosen) * times)
     count = dr.opaque(mi.UInt32, dr.width(chosen))
-    return dr.gather(mi.UInt32, chosen, lane % count), lane // count + 1
+    return tiled(chosen, times), lane // count + 1
 
 
 class Film:

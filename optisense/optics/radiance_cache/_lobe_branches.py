@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.arrays import FEWEST_LANES, gathered, joined
+from optisense.optics.backend.arrays import FEWEST_LANES, gathered, joined, tiled
 from optisense.optics.backend.sequences import GOLDEN_BITS
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.transport.camera_paths import (
@@ -76,7 +76,7 @@ def _scattered(
     copies = max(1, min(MOST_SCATTERED, round(dr.width(bits) / stopped)))
     number = dr.arange(mi.UInt32, stopped * copies)
     first = number < dr.opaque(mi.UInt32, stopped)
-    lanes = dr.gather(mi.UInt32, lanes, number % dr.opaque(mi.UInt32, stopped))
+    lanes = tiled(lanes, copies)
     bits = mi.sample_tea_32(dr.gather(mi.UInt32, bits, lanes), number)[0]
     share = dr.opaque(mi.Float, 1 / copies)
     weight = dr.gather(mi.Color3f, paths.stopped_weight, lanes) * share

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.backend.arrays import joined
+from optisense.optics.backend.arrays import joined, tiled
 from optisense.optics.backend.sequences import unit_float
 
 SPLIT_SHARE = 1 / 16
@@ -80,7 +80,4 @@ def split(on_skin: mi.Bool, count: int) -> tuple[mi.UInt32, int]:
     every = dr.arange(mi.UInt32, dr.width(on_skin))
     if copies == 1 or dr.width(raised) == 0:
         return every, 1
-    # `drjit.repeat` would compile a kernel for each number of copies.
-    number = dr.arange(mi.UInt32, dr.width(raised) * (copies - 1))
-    again = dr.gather(mi.UInt32, raised, number % dr.opaque(mi.UInt32, dr.width(raised)))
-    return joined(every, again), copies
+    return joined(every, tiled(raised, copies - 1)), copies
