@@ -12,11 +12,11 @@ SPLIT_SHARE = 1 / 16
 """Share of all rays up to which those that meet an indenter first are split into several. Few rays
 from the skin do, and the contact is bright: on the skin around a contact of GelSight Mini of
 specularity 1, splitting reduces the noise from 17 to 10 %."""
-MOST_CACHED = 10_000
+MOST_CACHED = 2_500
 """Largest number of places on the skin whose cached light is summed at each reflection; if rays
-meet more, a part of them is drawn. The sum takes as long as the ray on GelSight Mini, and ten times
-as long on GelSight360 with its nine light groups. With 40,000, the noise of contacts is the
-same."""
+meet more, a part of them is drawn. The sum over beams takes up to ten times as long as a ray, on
+GelSight360 with its nine light groups. With 10,000, the noise of contacts is the same, and images
+take up to a tenth longer."""
 MOST_GATHERED = 40_000
 """The same where rays end. With 10,000, the noise of the skin of GelSight Mini far from contacts is
 19 instead of 16 %."""
