@@ -171,6 +171,7 @@ def _of_shading() -> list[Ablation]:
                  Change(shading, "occluder_horizon", always_doubtful),
                  Change(glossy_interreflection, "occluder_horizon", always_doubtful)),
         _shading("light partly below the horizon", Change(bin_sums, "cosine_half_width", zero)),
+        _shading("shadow rays mirrored above the face", Change(bin_sums, "mirrored_above", _first)),
         _shading("anisotropic angular variance",
                  Change(bin_sums, "angular_variance", isotropic),
                  Change(beam_sums, "angular_variance", isotropic)),

@@ -13,6 +13,7 @@ from optisense.optics.radiance_cache.angular_variance import (
     angular_variance,
     broadened_coating,
     cosine_half_width,
+    mirrored_above,
     sample_direction,
     two_discs,
 )
@@ -89,6 +90,16 @@ def test_light_of_the_undeformed_surface_is_above_it_whole() -> None:
     upright = mi.Vector3f(np.cos(0.02) * UP + np.sin(0.02) * TOWARDS)
     half_width = cosine_half_width(light(), upright, upright)
     assert half_width[0] <= np.sin(0.02) + 1e-6
+
+
+def test_directions_below_a_plane_are_mirrored_up() -> None:
+    normal = mi.Vector3f(0, 0, 1)
+    assert np.asarray(mirrored_above(mi.Vector3f(0.6, 0, -0.8), normal)).ravel() == pytest.approx(
+        [0.6, 0, 0.8]
+    )
+    assert np.asarray(mirrored_above(mi.Vector3f(0.6, 0, 0.8), normal)).ravel() == pytest.approx(
+        [0.6, 0, 0.8]
+    )
 
 
 def test_two_discs_have_the_variances_of_the_light() -> None:

@@ -127,6 +127,16 @@ def cosine_half_width(
     return dr.minimum(dr.sqrt(3 * variance), dr.abs(dr.dot(upright, light.towards)))
 
 
+def mirrored_above(direction: mi.Vector3f, normal: mi.Vector3f) -> mi.Vector3f:
+    """Return directions (3, n), of which those that point below the plane of a normal are mirrored
+    to above it.
+
+    Shadow rays of an indenter that is not convex would otherwise meet the indenter itself. The
+    balls of the ablation are convex, so that it shows no effect.
+    """
+    return direction - normal * (2 * dr.minimum(dr.dot(direction, normal), 0))
+
+
 def passes_near(ball: mi.Vector4f, start: mi.Point3f, light: AngularVariance) -> mi.Bool:
     """Return whether a beam from ``start`` may touch a ball, (n,).
 

@@ -19,6 +19,7 @@ from optisense.optics.radiance_cache.angular_variance import (
     coating_with_broadened_tail,
     cosine_half_width,
     mean_direction,
+    mirrored_above,
     sample_direction,
     squared_radius,
     two_discs,
@@ -144,7 +145,7 @@ def sum_bins(
                             mi.UInt32, dr.gather(mi.Float, light.centres, k * 4 + 3)
                         )
                         state = next_random(points.random + (number * groups + g) * GOLDEN_BITS)
-                        way = sample_direction(beam, state)
+                        way = mirrored_above(sample_direction(beam, state), points.face_normal)
                         blocked = indenters.occluded(at.start, way, mi.Bool(True))
                         weight = dr.select(blocked, 0.0, times / share)
                     if dr.hint(light.coloured, mode="scalar"):
