@@ -36,12 +36,13 @@ from optisense.optics.transport.camera_paths import (
 CONTACT_RAYS = 4.0
 """Number of rays from contacts for each photon of the cache. At a specularity of 1, the noise of
 contacts is that of these rays alone. With four, an image of GelSight Mini with 300,000 photons has
-a noise of 2.3 % over patches of the contact, about that of a diffuse coating with 560,000. With
-one, the same noise takes 1.7 times the time on GelSight Mini, and twice the time on GelSight360,
-where photons and rays of the skin take most of it."""
+a noise of 2.3 % over patches of the contact, about that of a diffuse coating with 560,000; with
+one, the same noise takes 1.7 times the time. On GelSight360, where photons and rays of the skin
+take most of the time, images with one take as long and have twice the noise."""
 SCORE_RAYS = 1.0
 """The same in images of contacts alone, which scores take from a cache of many photons. With five
-million, the noise over patches is 1.2 %, as that of a diffuse coating."""
+million on GelSight Mini, the noise over patches is 1.2 %, as that of a diffuse coating; four rays
+for each photon would triple the time of a score."""
 MOST_RAYS = 2_000_000
 """Largest number of rays that are traced together; their light takes up to 200 MB."""
 BENT_RAYS = 1.0
@@ -144,8 +145,8 @@ def _lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> li
         photons: number of photons of the cache.
     """
     tiers = plan.of_contacts(regions) if regions.near.any() else []
-    rays = (SCORE_RAYS if plan.only_contacts else CONTACT_RAYS) * photons
     if plan.only_contacts:
+        rays = SCORE_RAYS * photons
         total = sum(int(np.count_nonzero(pixels)) for pixels, _ in tiers)
         shares = [np.count_nonzero(pixels) / max(1, total) for pixels, _ in tiers]
         return [
@@ -170,7 +171,7 @@ def _lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> li
         LobeSamples(~(inside | hit | edge), count=1, directions=1),
     ]
     if tiers:
-        samples.append(LobeSamples.of_contacts(*tiers[0], rays))
+        samples.append(LobeSamples.of_contacts(*tiers[0], CONTACT_RAYS * photons))
         samples.append(LobeSamples.of_contacts(bent, tiers[1][1], BENT_RAYS * photons))
     return samples
 
