@@ -140,3 +140,15 @@ def test_nine_places_share_the_area_even_where_points_crowd() -> None:
 def test_nine_places_need_nine_points() -> None:
     with pytest.raises(ContactError, match="only 4"):
         nine_places(np.zeros((4, 3)))
+
+
+def test_rounding_does_not_choose_among_equally_near_points() -> None:
+    """The middle of a picture with an even number of pixels lies between four of them."""
+    x, y = np.meshgrid(np.linspace(-9, 9, 96), np.linspace(-6, 6, 72), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    exact = nine_places(points)
+    np.testing.assert_allclose(points[exact[4]], [-9 / 95, -6 / 71, 0], atol=1e-9)
+    rng = np.random.default_rng(8)
+    for _ in range(10):
+        rounded = points + 1e-6 * rng.standard_normal(points.shape)
+        np.testing.assert_array_equal(nine_places(rounded), exact)
