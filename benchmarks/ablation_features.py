@@ -80,7 +80,7 @@ def _of_sampling() -> list[Ablation]:
     from optisense.optics.backend import sequences
     from optisense.optics.imaging import _grain, cached, lamp_images, sampling
     from optisense.optics.radiance_cache import bin_sums, shading, shading_points
-    from optisense.optics.transport import camera_paths, interact
+    from optisense.optics.transport import camera_paths
 
     def random_richtmyer(series: Any, number: Any, dimension: int) -> Any:
         return sequences.unit_float(mi.sample_tea_32(series ^ mi.UInt32(dimension), number)[0])
@@ -95,7 +95,6 @@ def _of_sampling() -> list[Ablation]:
         home, found = shading_points.cell_at(cells, base, active)
         return home, mi.Vector3f(0), found
 
-    coherent = property(lambda kind: False)
     one_cell = replace(shading.FULL_EFFORT, cells=1)
     return [
         _shading("shading of every second pixel",
@@ -111,7 +110,6 @@ def _of_sampling() -> list[Ablation]:
                  Change(bin_sums, "richtmyer", random_richtmyer),
                  Change(shading_points, "richtmyer", random_richtmyer)),
         _shading("spread of specks", Change(lamp_images, "without_specks", _first)),
-        _shading("coherent camera rays", Change(interact.RayKind, "is_coherent", coherent)),
     ]  # fmt: skip
 
 

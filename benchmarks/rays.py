@@ -86,9 +86,9 @@ def _counted() -> Iterator[mi.UInt32]:
     dr.make_opaque(counter)
     original = RayScene.intersect
 
-    def counting(scene: RayScene, ray: Ray, coherent: bool = False) -> SurfaceHit:
+    def counting(scene: RayScene, ray: Ray) -> SurfaceHit:
         dr.scatter_inc(counter, mi.UInt32(0), ray.active)
-        return original(scene, ray, coherent)
+        return original(scene, ray)
 
     RayScene.intersect = counting  # type: ignore[method-assign]
     try:

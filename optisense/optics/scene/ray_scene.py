@@ -246,15 +246,11 @@ class RayScene:
         )
         return found.t, found.is_valid()
 
-    def intersect(self, ray: Ray, coherent: bool = False) -> SurfaceHit:
-        """Return the first hits along rays, with normals; symbolic loops may call it.
-
-        Args:
-            coherent: whether rays of neighbouring lanes are similar, which saves time.
-        """
+    def intersect(self, ray: Ray) -> SurfaceHit:
+        """Return the first hits along rays, with normals; symbolic loops may call it."""
         origin, direction = ray.origin, ray.direction
         found = self.scene.ray_intersect_preliminary(
-            self._displaced(origin, direction), coherent=coherent, active=ray.active
+            self._displaced(origin, direction), coherent=False, active=ray.active
         )
         valid = ray.active & found.is_valid()
         face = found.prim_index

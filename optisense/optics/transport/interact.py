@@ -61,10 +61,8 @@ class RayKind(Enum):
         return self in (RayKind.CAMERA, RayKind.REFLECTION)
 
     @property
-    def is_coherent(self) -> bool:
-        """Whether rays of neighbouring lanes are similar, which lets the ray tracer handle them
-        faster.
-        """
+    def is_from_camera(self) -> bool:
+        """Whether rays go straight through smooth interfaces, as from the camera."""
         return self in (RayKind.CAMERA, RayKind.CHIEF)
 
 
@@ -171,7 +169,7 @@ def interact(
         sample: random numbers; not needed for chief rays, nor for camera rays in smooth scenes.
     """
     drawn = LobeSample() if sample is None else sample
-    hit = scene.intersect(ray, ray_kind.is_coherent)
+    hit = scene.intersect(ray)
     side = -dr.sign(dr.dot(ray.direction, hit.normal))
     kind, eta, alpha = surface_kind(scene.table, hit.surface, hit.valid)
     region = surface_region(scene.table, hit.surface, hit.valid)
@@ -231,7 +229,7 @@ def interact(
                 outgoing = dr.select(mirror, outgoing, spread)
 
     direction = dr.normalize(outgoing)
-    if dr.hint(ray_kind.is_coherent, mode="scalar"):
+    if dr.hint(ray_kind.is_from_camera, mode="scalar"):
         direction = mi.Vector3f(
             *(dr.select(dr.abs(each) < LEAST_COMPONENT, 0, each) for each in direction)
         )
