@@ -163,8 +163,6 @@ def _of_shading() -> list[Ablation]:
                  Change(sampling.SamplingPlan, "interreflection_width", single)),
         _shading("end of negligible paths", Change(glossy_interreflection, "NEGLIGIBLE_SHARE", 0)),
         _shading("light of contacts on the skin", Change(cached, "beside_layers", _nothing)),
-        _shading("contacts mirrored in interfaces",
-                 Change(cached, "mirrored_contact_layers", _nothing)),
         _shading("occluder horizon",
                  Change(shading, "occluder_horizon", always_doubtful),
                  Change(glossy_interreflection, "occluder_horizon", always_doubtful)),

@@ -13,11 +13,7 @@ from numpy.typing import NDArray
 from optisense.optics.backend.arrays import joined, padded
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging._contact_light import (
-    MIRRORED_ROUGHNESS,
-    beside_layers,
-    mirrored_contact_layers,
-)
+from optisense.optics.imaging._contact_light import beside_layers
 from optisense.optics.imaging._film import Film, repeated
 from optisense.optics.imaging._grain import GRAIN_SAMPLES, OUTLINE_SAMPLES, grainy, outline
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
@@ -52,13 +48,6 @@ differ by 2.5 % (RMS, at a noise of 10 %)."""
 SPARSE_METALLIC_BEAMS = 4e6
 """Value of `SPARSE_SHADING_BEAMS` for metallic coatings. They take longer for each beam, as they
 evaluate a metallic lobe, and sum all beams, while diffuse ones sum those near indenters."""
-MIRRORED_RANGE = 0.1
-"""Distance from a contact, as a fraction of the image width, within which metallic coatings are
-shaded with the light that the contact reflects through the interfaces: 2 mm on GelSight Mini."""
-LEAST_LEFT = 0.5
-"""Lower bound on the share of a pixel's light that remains after the light of the skin hidden by
-contacts is subtracted. Mirror images of hidden skin are a small part of a pixel's light; a loss of
-more than half is the noise of a few bright rays."""
 AVERAGED_ROUGHNESS = 0.18
 """GGX alpha of metallic lobes from which on interreflected light is averaged over pixels in
 contacts (see `INTERREFLECTION_WIDTH`). At 0.2 this reduces the noise of the camera samples in a
@@ -117,7 +106,8 @@ def render_cached(
             layers = known.with_faint(main)
         else:
             known.keep_faint(main, layers - main)
-    if regions.near.any() and not plan.draft and not cache.traced_lobes:
+    narrow = cache.traced_lobes or cache.binned.narrow_lobes
+    if regions.near.any() and not (plan.draft or plan.only_contacts or narrow):
         layers = image.with_light_of_contacts(layers)
     mirrored = None if lamps is None else lamps.layers(camera, seed)
     if mirrored is not None:
@@ -353,23 +343,9 @@ class _Shading:
         self.sample(pixel, number, False, again=True)
 
     def with_light_of_contacts(self, layers: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return layers with the light that contacts reflect to the skin beside them, directly and
-        through the interfaces.
-        """
-        cache, scenes, regions = self.cache, self.scenes, self.regions
-        rays, contacts, only_contacts = regions.rays, regions.contacts, self.plan.only_contacts
-        if not (only_contacts or cache.binned.narrow_lobes):
-            skin = rays.hit & (rays.region == Region.SENSING)
-            ring = skin & ~regions.near & regions.within(BESIDE_RANGE)
-            beside = beside_layers(cache, scenes, self.camera, ring, self.seed)
-            if beside is not None:
-                layers = layers + beside
-        if cache.roughness is not None and cache.roughness < MIRRORED_ROUGHNESS:
-            lit = contacts if only_contacts else rays.hit & regions.within(MIRRORED_RANGE)
-            mirrored = mirrored_contact_layers(
-                cache, scenes, self.camera, lit, lit & ~contacts, self.seed
-            )
-            if mirrored is not None:
-                # A contact also hides skin that would reflect light, but never a large share.
-                layers = np.maximum(layers + mirrored, layers * LEAST_LEFT)
-        return layers
+        """Return layers with the light that contacts reflect to the skin beside them."""
+        regions = self.regions
+        skin = regions.rays.hit & (regions.rays.region == Region.SENSING)
+        ring = skin & ~regions.near & regions.within(BESIDE_RANGE)
+        beside = beside_layers(self.cache, self.scenes, self.camera, ring, self.seed)
+        return layers if beside is None else layers + beside

@@ -52,7 +52,7 @@ points, as its light is a small part of a pixel's."""
 
 
 @dataclass
-class SecondaryHits:
+class _SecondaryHits:
     """Places that rays have met.
 
     Attributes:
@@ -68,7 +68,7 @@ class SecondaryHits:
 
 
 def glossy_interreflection(
-    cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints, directions: int | None = None
+    cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints
 ) -> list[mi.Color3f]:
     """Return the radiance (3, n) towards the camera due to interreflected light, for each light
     group.
@@ -76,13 +76,12 @@ def glossy_interreflection(
     Args:
         cache: the radiance cache.
         scenes: the scenes of the image, with indenters.
-        directions: number of rays from each point; by default that of points in contacts.
+        at: the points.
     """
     lanes = dr.width(at.seen.pixel)
     totals = [dr.zeros(mi.Float, 3 * lanes) for _ in range(cache.binned.groups)]
     dr.eval(at)
-    if directions is None:
-        directions = DIRECTIONS if cache.binned.narrow_lobes else BROAD_DIRECTIONS
+    directions = DIRECTIONS if cache.binned.narrow_lobes else BROAD_DIRECTIONS
     lane = dr.arange(mi.UInt32, lanes * directions)
     owner = lane // directions
     table = scenes.full.table
@@ -104,8 +103,8 @@ def glossy_interreflection(
         seen = _secondary_hits(cache, scenes, looking)
         if seen is None or dr.width(seen.near) < least:
             break
-        looking = shading_points(cache, scenes, seen)
-        light = light_of(cache, scenes, looking)
+        looking = _shading_points(cache, scenes, seen)
+        light = _light_of(cache, scenes, looking)
         for total, value in zip(totals, light, strict=True):
             for k in range(3):
                 weighted = value[k] * looking.seen.weight[k]
@@ -120,7 +119,7 @@ def glossy_interreflection(
 
 def _secondary_hits(
     cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints
-) -> SecondaryHits | None:
+) -> _SecondaryHits | None:
     """Return the places that one ray from each point meets, drawn from its coating's lobes.
 
     Rays that meet the skin are left out where the cache holds its light.
@@ -163,7 +162,7 @@ def _secondary_hits(
         series=next_random(random ^ points.series),
         number=mi.UInt32(points.number),
     )
-    seen = SecondaryHits(found, raised, at.cell)
+    seen = _SecondaryHits(found, raised, at.cell)
     dr.eval(seen)
     lanes = dr.compress(valid)
     count = dr.width(lanes)
@@ -171,14 +170,14 @@ def _secondary_hits(
         return None
     if count < FEWEST_LANES:
         lanes = dr.repeat(lanes, FEWEST_LANES)
-    seen = dr.gather(SecondaryHits, seen, lanes)
+    seen = dr.gather(_SecondaryHits, seen, lanes)
     if count < FEWEST_LANES:
         seen.points.valid &= dr.arange(mi.UInt32, FEWEST_LANES) == 0
     return seen
 
 
-def shading_points(
-    cache: RadianceCache, scenes: ContactScenes, seen: SecondaryHits
+def _shading_points(
+    cache: RadianceCache, scenes: ContactScenes, seen: _SecondaryHits
 ) -> ShadingPoints:
     """Return the shading points of places; each reads the cache below it, along the skin's
     normal.
@@ -200,7 +199,7 @@ def shading_points(
     )
 
 
-def light_of(cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
+def _light_of(cache: RadianceCache, scenes: ContactScenes, at: ShadingPoints) -> list[mi.Color3f]:
     """Return the light (3, n) of the cache that places reflect towards the points that see them,
     for each light group.
     """

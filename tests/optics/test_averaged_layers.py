@@ -1,4 +1,4 @@
-"""Light of contacts that a metal coating reflects through the interfaces, and its averaging."""
+"""Averaging of light over the pixels of a film."""
 
 from __future__ import annotations
 
@@ -7,16 +7,9 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-import optisense as ots
-from optisense.mechanics import CONFORMING
 from optisense.optics.backend.arrays import joined
 from optisense.optics.imaging._film import Film
-from optisense.optics.radiance_cache import mirrored_contacts
 from optisense.optics.transport.camera_paths import VisiblePoints
-
-RELATIVE = 0.01
-"""Relative error of the mean radiance of a contact; all the light that it reflects through the
-interfaces makes a difference of 4 %."""
 
 
 def test_arrays_of_vectors_and_of_tuples_are_joined() -> None:
@@ -49,20 +42,6 @@ def test_spreading_keeps_even_light_and_the_sum_of_a_bright_sample() -> None:
     assert spread[where].sum() == pytest.approx(1.0, rel=1e-5)
     assert spread[20, 20] < 0.1 and (spread[where] > 0).sum() > 30
     assert spread[10, 2] == 1.0 and not spread[~where].sum() > 1.0
-
-
-def test_drawing_a_part_of_the_places_changes_no_mean(monkeypatch: pytest.MonkeyPatch) -> None:
-    design = ots.set_value(ots.load("gelsight-mini-ideal-cylindrical"), "coating.specularity", 0.8)
-    model = ots.OpticalModel(design)
-    ball = [ots.Contact(ots.Sphere(4.0), at=(0.5, 0.3), depth=0.8)]
-
-    def mean_in_contact(most: int) -> float:
-        monkeypatch.setattr(mirrored_contacts, "MOST_LANES", most)
-        image = model.render(ball, resolution=(32, 24), photons=100_000, skin=CONFORMING)
-        return float(image.radiance[image.contact_mask].mean())
-
-    everywhere = mean_in_contact(10**9)  # about 13,000 places
-    assert mean_in_contact(2000) == pytest.approx(everywhere, rel=RELATIVE)
 
 
 def test_averaging_without_blur_keeps_a_peak() -> None:
