@@ -1,9 +1,9 @@
 """Effect of each acceleration and refinement of the optics: each is switched off in turn.
 
-``python -m benchmarks.ablation [--case WORD ...] [--only WORD ...] [--dry]`` writes ablation.json
-and ablation.md beside this file. Images with and without a feature are rendered in turn, so that
-other work of the machine slows both; times are processor times. The errors are those against the
-references of `benchmarks.ablation_cases`.
+``python -m benchmarks.ablation [--case WORD ...] [--only WORD ...] [--errors] [--dry]`` writes
+ablation.json and ablation.md beside this file. Images with and without a feature are rendered in
+turn, so that other work of the machine slows both; times are processor times, and are left out with
+``--errors``, on a GPU. The errors are those against the references of `benchmarks.ablation_cases`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from benchmarks.ablation_cases import (
+    AROUND,
     BOX,
     CASES,
     DEPTH,
@@ -58,8 +59,8 @@ SMALL = 0.1
 CERTAINTY = 2.0
 """Number of standard errors within which it is uncertain whether a change is above `SMALL`."""
 
-ERRORS = ("error_in_contact", "error_elsewhere")
-BIASES = ("bias_in_contact", "bias_elsewhere")
+ERRORS = ("error_in_contact", "error_around", "error_elsewhere")
+BIASES = ("bias_in_contact", "bias_around", "bias_elsewhere")
 TIMES = ("new_light", "kept_light")
 FloatArray = NDArray[np.floating]
 
@@ -69,7 +70,7 @@ class Measured:
     """Images of a case with every feature (first of each pair) and without one (second).
 
     Attributes:
-        squares: squared errors in the contact and elsewhere of the images of each seed.
+        squares: squared errors of the images of each seed, one for each of `ERRORS`.
         biases: errors of their means.
         differences: squared differences of each pair, relative to the squared mean.
         seconds: processor seconds, of images with new light and with kept light.
@@ -134,7 +135,9 @@ def rounded(value: Any) -> Any:
     return round(value, 5) if isinstance(value, float) else value
 
 
-def compared(case: Case, on: OpticalModel, ablation: Ablation | None, truth: Truth) -> Measured:
+def compared(
+    case: Case, on: OpticalModel, ablation: Ablation | None, truth: Truth, times: bool
+) -> Measured:
     """Return images with and without a feature; the feature None switches off nothing.
 
     Args:
@@ -143,10 +146,11 @@ def compared(case: Case, on: OpticalModel, ablation: Ablation | None, truth: Tru
             radiance caches.
         ablation: the feature.
         truth: the reference.
+        times: whether times are measured.
     """
     off_is = nullcontext if ablation is None else ablation.applied
     new_light = ablation is None or ablation.light or case.draft
-    ball = case.ball(on)
+    contact = case.contact(on)
     off = on
     if new_light:
         with off_is():
@@ -156,7 +160,7 @@ def compared(case: Case, on: OpticalModel, ablation: Ablation | None, truth: Tru
         with off_is() if which else nullcontext():
             began = time.process_time()
             seen = (on, off)[which].render(
-                [ball], case.resolution, photons, seed=seed, skin=CONFORMING
+                [contact], case.resolution, photons, seed=seed, skin=CONFORMING
             )
             return seen.radiance, time.process_time() - began
 
@@ -183,34 +187,40 @@ def compared(case: Case, on: OpticalModel, ablation: Ablation | None, truth: Tru
         if new_light:
             forget()
             pair = both(seed)
-            found.seconds["new_light"].append([seconds for _, seconds in pair])
             pictures = [picture for picture, _ in pair]
-        for _ in range(0 if case.draft else 1 if new_light else PAIRS):
+            if times:
+                found.seconds["new_light"].append([seconds for _, seconds in pair])
+        kept = 0 if case.draft else 1 if new_light else PAIRS
+        for _ in range(kept if times else not new_light):
             pair = both(seed)
-            found.seconds["kept_light"].append([seconds for _, seconds in pair])
             pictures = pictures or [picture for picture, _ in pair]
+            if times:
+                found.seconds["kept_light"].append([seconds for _, seconds in pair])
         found.add(truth, pictures)
     if off is not on:
         off.forget_light(guide=True)
     return found
 
 
-def measure(case: Case, only: Sequence[str]) -> Iterator[tuple[str, dict[str, Any]]]:
+def measure(
+    case: Case, only: Sequence[str], times: bool = True
+) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the results of each ablation of a case; the first is "nothing", with every feature.
 
     Args:
         case: the case.
         only: words; an ablation is measured if its name contains one of them.
+        times: whether times are measured.
     """
     truth = reference(case)
     model = case.model()
-    ball = case.ball(model)
+    contact = case.contact(model)
     for seed in SEEDS:
-        model.render([ball], case.resolution, case.photons, seed=seed, skin=CONFORMING)
+        model.render([contact], case.resolution, case.photons, seed=seed, skin=CONFORMING)
     for ablation in ablations():
         if ablation.lobes == case.lobes and any(word in ablation.name for word in only):
-            yield ablation.name, compared(case, model, ablation, truth).row()
-    yield "nothing", compared(case, model, None, truth).row()
+            yield ablation.name, compared(case, model, ablation, truth, times).row()
+    yield "nothing", compared(case, model, None, truth, times).row()
     model.forget_light(guide=True)
 
 
@@ -240,6 +250,7 @@ def table(found: dict[str, Any]) -> str:
         "the RMS difference from progressive photon mapping with "
         f"{2 * REFERENCE_PHOTONS / 1e6:g} million photons, over squares of {BOX} pixels, relative "
         "to the mean; the noise of the reference is subtracted. The bias is the error of the mean. "
+        f"*Around it* is within {AROUND} pixels of the contact, which *elsewhere* includes. "
         f"Images of mirroring coatings have {LOBE_PHOTONS:,} photons, and are compared with images "
         "that have all features and as many photons as the other references. "
         "Times are processor times of all threads: of an image with its pilot pass and photons "
@@ -248,14 +259,16 @@ def table(found: dict[str, Any]) -> str:
         f"{len(LIGHT_SEEDS)} or {PAIRS * len(SEEDS)} pairs (features of light or of shading). The "
         "± is the standard error: of that median, and of an error's change by the jackknife over "
         f"{len(SEEDS)} or {len(LIGHT_SEEDS)} seeds. Changes of errors below "
-        f"{100 * LEAST_ERROR:g} % are relative to {100 * LEAST_ERROR:g} %.", "",
+        f"{100 * LEAST_ERROR:g} % are relative to {100 * LEAST_ERROR:g} %. Where no times are "
+        "given, a GPU rendered the images.", "",
         "## Largest effects", "",
         "Each cell is the largest increase of the error or the time without the feature among the "
         "cases, in brackets the case. The last column tells whether some increase exceeds "
         f"{100 * SMALL:g} %; *perhaps*, if that is within {CERTAINTY:g} standard errors. The row "
         "*nothing* compares two models with all features.", "",
-        "| switched off | error in the contact | error elsewhere | seconds, new light "
-        f"| seconds, light kept | above {100 * SMALL:g} % |", "|---|---|---|---|---|---|",
+        "| switched off | error in the contact | error around it | error elsewhere "
+        f"| seconds, new light | seconds, light kept | above {100 * SMALL:g} % |",
+        "|---" * 7 + "|",
     ]  # fmt: skip
     names = list(dict.fromkeys(what for case in found.values() for what in case["rows"]))
     for what in names:
@@ -272,16 +285,17 @@ def table(found: dict[str, Any]) -> str:
         lines.append(f"| {what} | " + " | ".join(cells) + " |")
     for name, case in found.items():
         lines += ["", f"## {name}", "",
-                  "| switched off | error in the contact | change | error elsewhere | change "
-                  "| bias in the contact | bias elsewhere | seconds, new light | change "
-                  "| seconds, light kept | change |",
-                  "|---|---|---|---|---|---|---|---|---|---|---|"]  # fmt: skip
+                  "| switched off | error in the contact | change | error around it | change "
+                  "| error elsewhere | change | bias in the contact | bias around it "
+                  "| bias elsewhere | seconds, new light | change | seconds, light kept | change |",
+                  "|---" * 14 + "|"]  # fmt: skip
         for what, row in case["rows"].items():
             changes = {key: _percent(*value) for key, value in row["changes"].items()}
             cells = []
             for key in ERRORS:
-                cells += [f"{100 * row[key]:.2f} %", changes[key]]
-            cells += [f"{100 * row[key]:+.2f} %" for key in BIASES]
+                # Earlier measurements have no error around the contact.
+                cells += [f"{100 * row[key]:.2f} %", changes[key]] if key in row else ["", ""]
+            cells += [f"{100 * row[key]:+.2f} %" if key in row else "" for key in BIASES]
             for key in TIMES:
                 seconds = row.get(f"cpu_s_{key}")
                 cells += ["" if seconds is None else f"{seconds:.2f}", changes.get(key, "")]
@@ -306,6 +320,7 @@ def main() -> None:
     parser.add_argument(
         "--only", nargs="+", default=[""], help="switch off only what has such a word in its name"
     )
+    parser.add_argument("--errors", action="store_true", help="measure no times")
     parser.add_argument("--dry", action="store_true", help="print only, write no results")
     options = parser.parse_args()
     console = Console()
@@ -315,7 +330,7 @@ def main() -> None:
     for case in CASES:
         if not any(word in case.name for word in options.case):
             continue
-        for what, row in measure(case, options.only):
+        for what, row in measure(case, options.only, not options.errors):
             # Read anew: cases may be measured by processes of their own.
             found = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
             known = found.setdefault(case.name, {"machine": about, "rows": {}})

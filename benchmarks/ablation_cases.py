@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import distance_transform_edt, uniform_filter
 
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign, set_value
 from optisense.design.difference import fingerprint
-from optisense.geometry import Contact, Sphere
+from optisense.geometry import Contact, Indenter, Sphere
+from optisense.geometry.objects import ObjectIndenter
 from optisense.mechanics import CONFORMING
 from optisense.optics.drafts import DraftModel
 from optisense.optics.estimators import RADIANCE_CACHE, SPPM
@@ -39,6 +40,8 @@ DRAFT_PHOTONS = 20_000
 """Number of photons of a draft, as in the studio."""
 RADIUS, DEPTH = 1.5, 0.8
 """Radius and depth (mm) of the ball, those of `benchmarks.case`."""
+BALL = Sphere(radius=RADIUS)
+"""The indenter of most cases."""
 MIDDLE, CORNER = 4, 0
 """Indices, among the nine contacts of a sensor, of that in the middle of the view and of one in a
 corner, near the lamps."""
@@ -47,6 +50,9 @@ REFERENCE_PHOTONS = 3_000_000
 REFERENCE_SEEDS = (101, 102)
 """Seeds of the two reference images, which no judged image has; the difference of the two gives the
 noise of the reference."""
+AROUND = 12
+"""Distance (pixels) from the contact within which an error is reported by itself, that of
+`benchmarks.patches`."""
 BOX = 3
 """Side (pixels) of the square over which pictures are averaged before they are compared, which
 removes most of the reference's noise."""
@@ -56,14 +62,15 @@ FloatArray = NDArray[np.floating]
 
 @dataclass(frozen=True)
 class Case:
-    """A sensor with a ball pressed in, and its image.
+    """A sensor with an indenter pressed in, and its image.
 
     Attributes:
         sensor: built-in sensor.
         what: what distinguishes the case from other cases of the sensor.
         settings: values of the design, by path.
-        place: index of the ball's place among the nine contacts of the sensor.
-        radius, depth: radius and depth (mm) of the ball.
+        place: index of the indenter's place among the nine contacts of the sensor.
+        indenter: the indenter.
+        depth: its depth, mm.
         resolution: width and height, pixels.
         draft: whether the image is a draft.
         lobes: whether the coating's metallic lobes are traced. The features of this tracing are
@@ -74,7 +81,7 @@ class Case:
     what: str
     settings: dict[str, Any] = field(default_factory=dict)
     place: int = MIDDLE
-    radius: float = RADIUS
+    indenter: Indenter = BALL
     depth: float = DEPTH
     resolution: tuple[int, int] = RESOLUTION
     draft: bool = False
@@ -102,15 +109,17 @@ class Case:
         """Return a new model of the sensor, without any light."""
         return DraftModel(self.design) if self.draft else OpticalModel(self.design)
 
-    def ball(self, model: OpticalModel) -> Contact:
-        """Return the contact of the ball."""
+    def contact(self, model: OpticalModel) -> Contact:
+        """Return the contact of the indenter."""
         place = model.nine_contacts()[self.place].point
         assert place is not None
-        return Contact(Sphere(radius=self.radius), point=place, depth=self.depth)
+        return Contact(self.indenter, point=place, depth=self.depth)
 
 
 DIFFUSE, METALLIC = {"coating.specularity": 0.0}, {"coating.specularity": 0.6}
 """Settings of coatings without metal, and with more metal than not."""
+POLISHED = {"coating.specularity": 0.8}
+"""Settings of a coating whose lobes are nearly as narrow as those that are traced."""
 MIRRORING = {"coating.specularity": 1.0}
 """Settings of coatings of metal alone."""
 WHITE = {"coating.specularity": 0.0, "coating.reflectance": (0.8, 0.8, 0.8)}
@@ -120,21 +129,24 @@ CASES = [
     *(
         Case(sensor, what, coating)
         for sensor in SENSORS
-        for what, coating in (("diffuse", DIFFUSE), ("metallic", METALLIC))
+        for what, coating in (("diffuse", DIFFUSE), ("metallic", METALLIC), ("polished", POLISHED))
     ),
     *(Case(sensor, "mirroring", MIRRORING, lobes=True) for sensor in (*SENSORS, "gelsight-mini")),
     Case("gelsight-mini", "as fitted"),
-    Case("gelsight-mini-ideal", "white, deep", WHITE, radius=3.0, depth=1.8),
-    Case("gelsight-mini-ideal", "small, in a corner", DIFFUSE, CORNER, 0.5, 0.3),
+    Case("gelsight-mini-ideal", "white, deep", WHITE, indenter=Sphere(radius=3.0), depth=1.8),
+    Case("gelsight-mini-ideal", "polished, deep", POLISHED, indenter=Sphere(radius=3.0), depth=1.8),
+    Case("gelsight-mini-ideal", "small, in a corner", DIFFUSE, CORNER, Sphere(radius=0.5), 0.3),
+    Case("gelsight-mini-ideal", "brick", DIFFUSE, indenter=ObjectIndenter("brick")),
     Case("gelsight-mini-ideal-spherical", "diffuse", DIFFUSE),
     Case("gelsight-mini-ideal", "draft", DIFFUSE, draft=True),
     Case("gelsight-svelte", "draft", METALLIC, draft=True),
     Case("gelsight-mini-ideal", "metallic, 320x240", METALLIC, resolution=(320, 240)),
+    Case("gelsight-mini-ideal", "mirroring, 320x240", MIRRORING, resolution=(320, 240), lobes=True),
 ]
-"""Diffuse, metallic and mirroring coatings on four sensors; and cases in which a refinement may
+"""Coatings from diffuse to mirroring on four sensors; and cases in which a refinement may
 matter that changes little in those: the sensor that is fitted to photographs, much interreflection
-in a large contact, a small contact near the lamps, a curved surface, drafts of the studio, and many
-pixels."""
+in large contacts, a small contact near the lamps, an indenter whose studs shade each other, a
+curved surface, drafts of the studio, and many pixels."""
 
 
 def smooth(image: FloatArray) -> FloatArray:
@@ -143,13 +155,15 @@ def smooth(image: FloatArray) -> FloatArray:
 
 
 def masks(contact: NDArray[np.bool_], truth: FloatArray) -> list[NDArray[np.bool_]]:
-    """Return masks (h, w) of the pixels in the contact, and of all others that are not dark.
+    """Return masks (h, w) of the pixels in the contact, of those around it, and of all others that
+    are not dark, of which those around it are a part.
 
     Args:
         contact: contact mask (h, w).
         truth: radiance (h, w, 3) of the reference.
     """
-    return [contact, ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())]
+    lit = ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())
+    return [contact, lit & (distance_transform_edt(~contact) <= AROUND), lit]
 
 
 @dataclass(frozen=True)
@@ -158,8 +172,8 @@ class Truth:
 
     Attributes:
         image: smoothed radiance (h, w, 3).
-        noise: variance of its noise in the contact and elsewhere.
-        masks: the masks (h, w) of both; see `masks`.
+        noise: variance of its noise in each region.
+        masks: the masks (h, w) of the regions; see `masks`.
     """
 
     image: FloatArray
@@ -183,15 +197,15 @@ def reference(case: Case) -> Truth:
     Its name depends on the design, the contact, and the numbers of pixels and photons.
     """
     CACHE.mkdir(exist_ok=True)
-    press = (case.place, case.radius, case.depth, case.resolution, REFERENCE_PHOTONS)
+    press = (case.place, case.indenter, case.depth, case.resolution, REFERENCE_PHOTONS)
     known = f"{fingerprint(case.design)} {press}"
     path = CACHE / f"ablation-{hashlib.sha256(known.encode()).hexdigest()[:16]}.npz"
     if not path.is_file():
         model = OpticalModel(case.design)
-        ball = case.ball(model)
+        contact = case.contact(model)
         images = [
             model.render(
-                [ball],
+                [contact],
                 case.resolution,
                 REFERENCE_PHOTONS,
                 seed=seed,
@@ -200,8 +214,8 @@ def reference(case: Case) -> Truth:
             )
             for seed in REFERENCE_SEEDS
         ]
-        contact = images[0].contact_mask
-        np.savez(path, *(image.radiance for image in images), contact=contact)
+        pressed = images[0].contact_mask
+        np.savez(path, *(image.radiance for image in images), contact=pressed)
     with np.load(path) as kept:
         one, other, contact = smooth(kept["arr_0"]), smooth(kept["arr_1"]), kept["contact"]
     truth = (one + other) / 2
