@@ -16,6 +16,8 @@ from benchmarks.reference import box_around, window_camera
 from optisense import Contact, OpticalModel
 from optisense.optics import TactileImage
 
+pytestmark = pytest.mark.usefixtures("few_contact_rays")
+
 PATH = json.loads((Path(__file__).parents[1] / "assets" / "metal-patches.json").read_text())
 PHOTONS = {0.6: 1_000_000, 1.0: 2_000_000}
 """Photons of an image for each specularity. At 1, rays are traced in proportion to them; the skin

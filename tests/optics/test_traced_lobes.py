@@ -20,6 +20,8 @@ from optisense.optics.radiance_cache._lobe_guide import LobeGuide
 from optisense.optics.radiance_cache.lit_scene import TAIL_ROUGHNESS, LitScene
 from optisense.optics.scene.sensor_scenes import SensorScenes
 
+pytestmark = pytest.mark.usefixtures("few_contact_rays")
+
 METAL = ots.set_value(ots.load("gelsight-mini-ideal"), "coating.specularity", 1.0)
 NOISE = 0.03
 """Relative error of the mean of a contact: three times its noise with 300,000 photons."""
