@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from rich.console import Console
 
 from benchmarks.ablation_cases import (
-    AROUND,
     BOX,
     CASES,
     DEPTH,
@@ -38,6 +37,7 @@ from benchmarks.ablation_cases import (
     smooth,
 )
 from benchmarks.ablation_features import Ablation, ablations
+from benchmarks.patches import RING
 from benchmarks.results import machine, say_if_busy
 from optisense import OpticalModel
 from optisense.mechanics import CONFORMING
@@ -250,7 +250,7 @@ def table(found: dict[str, Any]) -> str:
         "the RMS difference from progressive photon mapping with "
         f"{2 * REFERENCE_PHOTONS / 1e6:g} million photons, over squares of {BOX} pixels, relative "
         "to the mean; the noise of the reference is subtracted. The bias is the error of the mean. "
-        f"*Around it* is within {AROUND} pixels of the contact, which *elsewhere* includes. "
+        f"*Around it* is within {RING} pixels of the contact, which *elsewhere* includes. "
         f"Images of mirroring coatings have {LOBE_PHOTONS:,} photons, and are compared with images "
         "that have all features and as many photons as the other references. "
         "Times are processor times of all threads: of an image with its pilot pass and photons "
@@ -259,8 +259,8 @@ def table(found: dict[str, Any]) -> str:
         f"{len(LIGHT_SEEDS)} or {PAIRS * len(SEEDS)} pairs (features of light or of shading). The "
         "± is the standard error: of that median, and of an error's change by the jackknife over "
         f"{len(SEEDS)} or {len(LIGHT_SEEDS)} seeds. Changes of errors below "
-        f"{100 * LEAST_ERROR:g} % are relative to {100 * LEAST_ERROR:g} %. Where no times are "
-        "given, a GPU rendered the images.", "",
+        f"{100 * LEAST_ERROR:g} % are relative to {100 * LEAST_ERROR:g} %. Some cases and "
+        "features were measured without times, most of them on a GPU.", "",
         "## Largest effects", "",
         "Each cell is the largest increase of the error or the time without the feature among the "
         "cases, in brackets the case. The last column tells whether some increase exceeds "

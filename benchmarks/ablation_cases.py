@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, uniform_filter
 
+from benchmarks.patches import RING
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign, set_value
 from optisense.design.difference import fingerprint
@@ -50,9 +51,6 @@ REFERENCE_PHOTONS = 3_000_000
 REFERENCE_SEEDS = (101, 102)
 """Seeds of the two reference images, which no judged image has; the difference of the two gives the
 noise of the reference."""
-AROUND = 12
-"""Distance (pixels) from the contact within which an error is reported by itself, that of
-`benchmarks.patches`."""
 BOX = 3
 """Side (pixels) of the square over which pictures are averaged before they are compared, which
 removes most of the reference's noise."""
@@ -163,7 +161,7 @@ def masks(contact: NDArray[np.bool_], truth: FloatArray) -> list[NDArray[np.bool
         truth: radiance (h, w, 3) of the reference.
     """
     lit = ~contact & (truth.sum(axis=-1) > 0.02 * truth.sum(axis=-1).mean())
-    return [contact, lit & (distance_transform_edt(~contact) <= AROUND), lit]
+    return [contact, lit & (distance_transform_edt(~contact) <= RING), lit]
 
 
 @dataclass(frozen=True)

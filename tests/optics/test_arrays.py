@@ -1,9 +1,14 @@
-"""Copies of NumPy arrays on the device."""
+"""Arrays on the device: copies of NumPy arrays, and arrays that are joined."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
+
+import mitsuba as mi
+import numpy as np
+
+from optisense.optics.backend.arrays import joined
 
 AT_THE_END_OF_MEMORY = """
 import ctypes, mmap
@@ -35,3 +40,11 @@ def test_nothing_behind_an_array_is_read() -> None:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout == "read\n"
+
+
+def test_arrays_of_vectors_and_of_tuples_are_joined() -> None:
+    one = mi.Point3f(mi.Float([1, 2]), mi.Float([3, 4]), mi.Float([5, 6]))
+    other = mi.Point3f(mi.Float([7]), mi.Float([8]), mi.Float([9]))
+    points, numbers = joined((one, mi.UInt32([1, 2])), (other, mi.UInt32([3])))
+    assert np.array(points).tolist() == [[1, 2, 7], [3, 4, 8], [5, 6, 9]]
+    assert np.array(numbers).tolist() == [1, 2, 3]

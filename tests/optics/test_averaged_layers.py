@@ -7,17 +7,8 @@ import mitsuba as mi
 import numpy as np
 import pytest
 
-from optisense.optics.backend.arrays import joined
 from optisense.optics.imaging._film import Film
 from optisense.optics.transport.camera_paths import VisiblePoints
-
-
-def test_arrays_of_vectors_and_of_tuples_are_joined() -> None:
-    one = mi.Point3f(mi.Float([1, 2]), mi.Float([3, 4]), mi.Float([5, 6]))
-    other = mi.Point3f(mi.Float([7]), mi.Float([8]), mi.Float([9]))
-    points, numbers = joined((one, mi.UInt32([1, 2])), (other, mi.UInt32([3])))
-    assert np.array(points).tolist() == [[1, 2, 7], [3, 4, 8], [5, 6, 9]]
-    assert np.array(numbers).tolist() == [1, 2, 3]
 
 
 def film_of(values: np.ndarray) -> Film:
