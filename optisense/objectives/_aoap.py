@@ -10,7 +10,7 @@ import numpy as np
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
-from optisense.objectives._coverage import triangles_seen
+from optisense.objectives._coverage import share_of_area, triangles_seen
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
@@ -38,7 +38,7 @@ USUAL = (0.24, 1.0)
     "aoap",
     title="AOAP",
     draw=_figures.draw_aoap,
-    beside=("coverage",),
+    beside=("coverage_by_area",),
     range=bounds,
     rays_only=True,
     usual=USUAL,
@@ -78,10 +78,9 @@ def aoap(
     cosine = np.where(hit, np.clip(rays.incidence, 0.0, 1.0), np.float32(0))
     mean_cosine = float(cosine.mean(dtype=np.float64))
     coverage = float(seen.mean())
-    areas = evaluation.model.sensing.face_areas
     parts = {
         "coverage": coverage,
-        "coverage_by_area": float(areas[seen].sum() / areas.sum()),
+        "coverage_by_area": share_of_area(evaluation, seen),
         "mean_cosine": mean_cosine,
         "mean_cosine_of_rays_that_arrive": mean_cosine / float(hit.mean()),
         "pixels_that_see_the_surface": float(hit.mean()),

@@ -196,9 +196,9 @@ def draw_coverage(score: Score) -> Figure:
     picture.set_xticks([])
     picture.set_yticks([])
     picture.set_xlabel("light: the surface is seen; dark: it is not", fontsize=9)
-    names = ("triangles of\nthe surface", "area of\nthe surface", "pixels of\nthe picture")
+    names = ("area of\nthe surface", "triangles of\nthe surface", "pixels of\nthe picture")
     parts = score.parts
-    values = (score.value, parts["by_area"], parts["pixels_that_see_the_surface"])
+    values = (score.value, parts["by_triangles"], parts["pixels_that_see_the_surface"])
     bars = shares.bar(names, [100 * value for value in values], color=DOT)
     shares.bar_label(bars, fmt="%.1f %%", padding=2)
     shares.set_ylim(0, 110)

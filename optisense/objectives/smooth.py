@@ -2,9 +2,9 @@
 
 The scores themselves jump when a ray begins or ceases to arrive. In the smoothed scores each ray
 has a weight, the area of the picture that it stands for, which changes smoothly when the boundary
-beside it moves (`OpticalModel.differentiable_rays`), and the sums are weighted. AOAP's coverage,
-which counts the triangles seen, becomes the integral of their number for each mm² over what is
-seen.
+beside it moves (`OpticalModel.differentiable_rays`), and the sums are weighted. The area of the
+triangles seen becomes the area seen, and their number, which AOAP counts, the integral of their
+number for each mm² over what is seen.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ class Rays(Protocol):
         weight: (k,) area of the picture that each ray stands for, pixels.
         points: (k, 3) end points, mm.
         density: (k,) share of the surface's triangles per area (1/mm²) at each end point.
+        surface_area: area of the surface, mm².
     """
 
     @property
@@ -57,6 +58,11 @@ class Rays(Protocol):
         """Triangles per area (k,), 1/mm²."""
         ...
 
+    @property
+    def surface_area(self) -> float:
+        """Area of the surface, mm²."""
+        ...
+
 
 class Slopes(NamedTuple):
     """A smoothed score, and its derivatives with respect to the attributes of `Rays`; None for
@@ -74,7 +80,7 @@ def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slop
     the share of the surface's triangles that are seen.
     """
     count = rays.codes.size
-    seen = smooth_coverage(rays)
+    seen = _density_in_view(rays, rays.density)
     value = float((rays.cosine * rays.weight).sum() / count) + coverage_weight * seen.value
     by_weight = rays.cosine / count + coverage_weight * seen.weight
     assert seen.points is not None
@@ -82,13 +88,18 @@ def smooth_aoap(rays: Rays, *, coverage_weight: float = COVERAGE_WEIGHT) -> Slop
 
 
 def smooth_coverage(rays: Rays) -> Slopes:
-    """Return the seen share of the surface's triangles: the integral of their density in view."""
+    """Return the seen share of the surface's area."""
+    return _density_in_view(rays, np.full(len(rays.points), 1.0 / rays.surface_area))
+
+
+def _density_in_view(rays: Rays, at_points: FloatArray) -> Slopes:
+    """Return the integral over the area in view of a density (k,), 1/mm², at the end points."""
     triangles = _PixelTriangles(rays)
-    density = triangles.mean_of_corners(rays.density)
+    density = triangles.mean_of_corners(at_points)
     value = float((density * triangles.weight * triangles.area).sum())
     # The motion of points inside the view does not change what is seen; only the motion of points
     # at its border does. Around inner points these sums vanish.
-    by_points = rays.density[:, None] * triangles.by_points(triangles.weight)
+    by_points = at_points[:, None] * triangles.by_points(triangles.weight)
     return Slopes(value, None, triangles.by_weight(density * triangles.area), by_points)
 
 

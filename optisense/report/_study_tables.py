@@ -135,7 +135,7 @@ def ray_figures(before: RayFigures | None, after: RayFigures | None) -> Table | 
 
 _FIGURES = (
     ("AOAP (higher is better)", "aoap", False, 1),
-    ("coverage: triangles of the skin in view", "coverage", True, 1),
+    ("coverage: area of the skin in view", "coverage", True, 1),
     ("pixels that see the skin", "seeing", True, 1),
     ("upright rays: mean cosine to the skin's normal", "upright", False, 1),
     ("2to3PW: evenness of the pixels (higher is better)", "evenness", False, 1),

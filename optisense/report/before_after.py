@@ -33,7 +33,7 @@ class RayFigures:
 
     Attributes:
         aoap: score AOAP.
-        coverage: share of the sensing surface's triangles that the camera sees.
+        coverage: share of the sensing surface's area that the camera sees.
         upright: mean cosine between ray and surface normal, over all pixels.
         seeing: share of the pixels that see the surface.
         evenness: score 2to3PW.
@@ -127,7 +127,7 @@ def ray_figures(evaluation: Evaluation) -> RayFigures:
     middle, worst = np.percentile(known, [50.0, STRETCHED]) if len(known) else (np.nan, np.nan)
     return RayFigures(
         aoap=scores["aoap"].value,
-        coverage=parts.get("coverage", np.nan),
+        coverage=parts.get("coverage_by_area", np.nan),
         upright=parts.get("mean_cosine", np.nan),
         seeing=parts.get("pixels_that_see_the_surface", np.nan),
         evenness=scores["2to3pw"].value,

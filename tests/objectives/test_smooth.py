@@ -20,6 +20,7 @@ class Rays:
     weight: np.ndarray
     points: np.ndarray
     density: np.ndarray
+    surface_area: float = 2.5
 
 
 def some_rays(seed: int = 0) -> Rays:
@@ -37,8 +38,8 @@ def some_rays(seed: int = 0) -> Rays:
 def test_derivatives_are_those_of_central_differences(name: str, field: str) -> None:
     rays = some_rays()
     if field == "points":
-        # Coverage's derivative by points is exact for points that stay on the surface, or where the
-        # surface has equally many triangles for each mm² everywhere.
+        # The derivative of AOAP's coverage by points is exact for points that stay on the surface,
+        # or where the surface has equally many triangles for each mm² everywhere.
         rays = replace(rays, density=np.full_like(rays.density, 0.6))
     slopes = getattr(SMOOTH[name](rays), field)
     way = np.random.default_rng(1).normal(size=getattr(rays, field).shape)

@@ -334,9 +334,9 @@ def test_the_start_may_break_a_condition(mini: SensorDesign) -> None:
 
 
 def test_a_part_that_does_not_exist_is_found_without_a_sensor() -> None:
-    with pytest.raises(SearchError, match="coverage has no part 'by_aera'") as told:
-        requirements_of(["coverage.by_aera >= 0.5"])
-    assert told.value.hint == "Did you mean 'by_area'?"
+    with pytest.raises(SearchError, match="coverage has no part 'by_triangels'") as told:
+        requirements_of(["coverage.by_triangels >= 0.5"])
+    assert told.value.hint == "Did you mean 'by_triangles'?"
     with pytest.raises(SearchError, match="draft has no part 'least'") as told:
         requirements_of(["draft.least >= 3"])
     assert told.value.hint == "It has no parts that are numbers"

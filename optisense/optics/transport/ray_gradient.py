@@ -59,6 +59,7 @@ class DifferentiableRays:
         points: (k, 3) end points, mm.
         density: (k,) share of the triangles of the sensing surface per area (1/mm²) where each ray
             arrives: 1 over the triangle's area and the number of triangles.
+        surface_area: area of the sensing surface, mm².
         edges: the boundaries; None where there are none.
     """
 
@@ -123,6 +124,7 @@ class DifferentiableRays:
         self.cosine = np.asarray(dr.detach(cosine), dtype=np.float64)
         self.points = np.asarray(dr.detach(arrived_at), dtype=np.float64).T
         areas = self._sensing_areas()
+        self.surface_area = float(areas.sum())
         self.density = 1.0 / (np.count_nonzero(areas) * areas[np.asarray(face)])
 
     def _sensing_areas(self) -> FloatArray:
