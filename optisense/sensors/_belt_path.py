@@ -11,6 +11,11 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.sensors._shapes import arc, pieces_of_arc
 
+BEND_PIECE = 1.0
+"""Largest angle of a piece of a bend, degrees. Between metal coatings, GelBelt's green light is
+guided around its wheels: with pieces of 4.5 degrees, an eighth less of it arrives in a contact in
+the middle of the view (specularity 1), and with 0.5 degrees, 1 % more."""
+
 
 @dataclass(frozen=True)
 class Straight:
@@ -85,7 +90,8 @@ def trace(pieces: Sequence[Straight | Bend], level: float, tessellation: float) 
             points.append(place + share * piece.length * along)
             normals.append(np.repeat(normal[None], steps, axis=0))
         else:
-            steps = pieces_of_arc(piece.radius, piece.angle, tessellation, least=4)
+            least = math.ceil(abs(piece.angle) / BEND_PIECE)
+            steps = pieces_of_arc(piece.radius, piece.angle, tessellation, least)
             centre = place - piece.radius * _normal(angle)
             turns = angle + piece.angle * np.arange(1, steps + 1) / steps
             across = np.array([_normal(turn) for turn in turns])
