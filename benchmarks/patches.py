@@ -125,7 +125,7 @@ CASES = [
     PatchCase("gelsight-mini-ideal-spherical", 1.0, referee=Referee.PATH, batches=24, images=6),
     *(PatchCase("gelbelt", s, batches=16, images=4) for s in BROAD),
     *(PatchCase("gelbelt", s, place=0) for s in (0.0, 0.6)),
-    PatchCase("gelbelt", 1.0, referee=Referee.PATH, images=4),
+    PatchCase("gelbelt", 1.0, referee=Referee.PATH, batches=24, images=4),
     *(PatchCase("gelsight-svelte", s) for s in BROAD),
     PatchCase("gelsight-svelte", 1.0, referee=Referee.PATH, images=4),
     *(PatchCase("gelsight360", s, images=4) for s in BROAD),

@@ -14,6 +14,7 @@ from optisense.optics.radiance_cache.angular_variance import (
     broadened_coating,
     cosine_half_width,
     mirrored_above,
+    reflected_from_discs,
     sample_direction,
     two_discs,
 )
@@ -110,36 +111,50 @@ def test_two_discs_have_the_variances_of_the_light() -> None:
     assert within + (apart @ UP / 2) ** 2 == pytest.approx(VARIANCES[1], rel=0.02)
 
 
-def test_a_narrow_lobe_mirrors_long_light_as_two_discs() -> None:
-    """The mean over drawn directions, for eyes about the mirror direction; as one round disc the
-    light is nearly twice as far off.
-    """
-    coating = CoatingBsdf(
-        reflectance=mi.Color3f(0),
+def coating(alpha: float, specularity: float = 1.0) -> CoatingBsdf:
+    return CoatingBsdf(
+        reflectance=mi.Color3f(0.6),
         metal_eta=mi.Color3f(1.5),
         metal_k=mi.Color3f(7.0),
-        specularity=mi.Float(1),
-        alpha=mi.Float(0.05),
+        specularity=mi.Float(specularity),
+        alpha=mi.Float(alpha),
     )
-    normal = mi.Vector3f(0, 0, 1)
-    mirrored = np.array([-0.6, 0.0, 0.8])
+
+
+NORMAL = mi.Vector3f(0, 0, 1)
+
+
+def three_ways(bsdf: CoatingBsdf, eye: np.ndarray) -> tuple[float, float, float]:
+    """Radiance of this light by drawn directions, as two discs, and as one round disc."""
+    towards_eye = mi.Vector3f(eye / np.linalg.norm(eye))
     ways = drawn()[:20_000]
     cosine = mi.Float(np.linalg.norm(ways.mean(axis=0)))
-    one, other, within = two_discs(light())
+    each = evaluate_coating(bsdf, NORMAL, mi.Vector3f(ways.T), towards_eye)
+    split = reflected_from_discs(bsdf, light(), cosine, NORMAL, towards_eye)
+    disc = broadened_coating(bsdf, cosine)
+    round_ = evaluate_coating(disc, NORMAL, mi.Vector3f(TOWARDS), towards_eye)
+    return float(np.asarray(each)[0].mean()), float(split[0][0]), float(round_[0][0])
 
-    def of(towards: np.ndarray | mi.Vector3f, eye: mi.Vector3f, lobe: CoatingBsdf) -> float:
-        towards = mi.Vector3f(towards.T) if isinstance(towards, np.ndarray) else towards
-        return float(np.asarray(evaluate_coating(lobe, normal, towards, eye))[0].mean())
 
-    truth, split, round_ = [], [], []
-    for along in np.linspace(-0.3, 0.3, 7):
-        for up in np.linspace(-0.2, 0.2, 5):
-            eye = mirrored + along * ALONG + up * np.array([0.8, 0.0, 0.6])
-            eye = mi.Vector3f(eye / np.linalg.norm(eye))
-            truth.append(of(ways, eye, coating))
-            lobe = broadened_coating(coating, within)
-            split.append((of(one, eye, lobe) + of(other, eye, lobe)) / 2)
-            round_.append(of(mi.Vector3f(TOWARDS), eye, broadened_coating(coating, cosine)))
-    errors = [np.sqrt(np.mean((np.array(v) - truth) ** 2)) / max(truth) for v in (split, round_)]
+def test_a_narrow_lobe_mirrors_long_light_as_two_discs() -> None:
+    """For eyes about the mirror direction; one round disc is nearly twice as far off."""
+    mirrored = np.array([-0.6, 0.0, 0.8])
+    eyes = [
+        mirrored + along * ALONG + up * np.array([0.8, 0.0, 0.6])
+        for along in np.linspace(-0.3, 0.3, 7)
+        for up in np.linspace(-0.2, 0.2, 5)
+    ]
+    truth, split, round_ = np.array([three_ways(coating(0.05), eye) for eye in eyes]).T
+    errors = [np.sqrt(np.mean((each - truth) ** 2)) / truth.max() for each in (split, round_)]
     assert errors[0] < 0.09
     assert errors[1] > 1.5 * errors[0]
+
+
+@pytest.mark.parametrize("specularity", [0.6, 0.8, 1.0])
+def test_long_light_at_the_side_of_a_lobe_is_not_round(specularity: float) -> None:
+    """For eyes near the normal, as a camera is above skin that lamps light from its sides."""
+    bsdf = coating(1.0 - 0.8 * specularity, specularity)
+    for eye in ([0.0, 0.0, 1.0], [0.2, 0.1, 1.0], [0.1, -0.2, 1.0]):
+        truth, split, round_ = three_ways(bsdf, np.array(eye))
+        assert split == pytest.approx(truth, rel=0.01)
+        assert abs(round_ / truth - 1) > 2 * abs(split / truth - 1)

@@ -83,3 +83,18 @@ def field_of(model: OpticalModel):  # type: ignore[no-untyped-def]
     """The one radiance cache that a model keeps."""
     (field,) = model._store._done.values()
     return field
+
+
+@pytest.mark.parametrize(("specularity", "widened"), [(0.8, False), (1.0, True)])
+def test_only_narrow_lobes_see_beams_of_single_photons_widened(
+    specularity: float, widened: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = OpticalModel(
+        set_value(build("gelsight-mini-ideal"), "coating.specularity", specularity)
+    )
+    size = {"resolution": (32, 24), "photons": 50_000}
+    usual = model.render(**size).radiance
+    monkeypatch.setattr(beams, "SPARSE_SHARE", 0.0)
+    model.forget_light()
+    measured = model.render(**size).radiance
+    assert np.allclose(usual, measured, rtol=1e-4, atol=0) != widened

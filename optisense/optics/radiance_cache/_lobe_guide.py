@@ -113,9 +113,9 @@ class LobeGuide:
 
     def _beam(self, point: mi.UInt32, slot: mi.UInt32) -> AngularVariance:
         number = dr.gather(mi.UInt32, self.slots, point * SLOTS + slot)
-        towards, cosine, _, _ = beam_at(self.beams, number)
+        towards, cosine, _, tag = beam_at(self.beams, number)
         height = dr.gather(mi.Float, self.beams.heights, number)
-        beam = angular_variance(self.axis, towards, cosine, height)
+        beam = angular_variance(self.axis, towards, self.beams.widened(cosine, tag), height)
         return replace(
             beam,
             variance_along=dr.maximum(beam.variance_along, MIN_VARIANCE),
@@ -177,7 +177,8 @@ def _weight(beams: Beams, number: mi.UInt32, at: ShadingPoints) -> mi.Float:
     The Fresnel reflectance of the metal, which hardly varies, is left out. A beam counts if the
     light at one standard deviation from its mean direction is in the peak.
     """
-    towards, cosine, flux, _ = beam_at(beams, number)
+    towards, cosine, flux, tag = beam_at(beams, number)
+    cosine = beams.widened(cosine, tag)
     seen = at.seen
     cos_m = half_vector_cosine(seen.normal, towards, seen.towards_eye)
     # The half vector turns by half as much as the light.

@@ -11,9 +11,11 @@ from optisense.optics.radiance_cache.angular_variance import (
     angular_variance,
     broadened_coating,
     coating_with_broadened_tail,
+    reflected_from_discs,
     sample_direction,
 )
 from optisense.optics.radiance_cache.beams import Beams
+from optisense.optics.radiance_cache.lit_scene import TRACED_ROUGHNESS
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
 from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.scene.ray_scene import RayScene
@@ -43,7 +45,7 @@ def sum_beams(
     while dr.hint(j < end, exclude=[beams, groups, at, end, axis]):
         towards, cosine, flux, tag = beam_at(beams, j)
         group = tag & GROUP_MASK
-        reflected = flux * _reflected(beams, j, at, axis, towards, cosine)
+        reflected = flux * _reflected(beams, j, at, axis, towards, cosine, tag)
         for g in range(groups):
             totals[g] += dr.select(group == g, reflected, 0)
         j += 1
@@ -100,7 +102,7 @@ def sum_hidden(
     ):
         towards, cosine, flux, tag = beam_at(beams, j)
         group = tag & GROUP_MASK
-        reflected = flux * _reflected(beams, j, at, axis, towards, cosine)
+        reflected = flux * _reflected(beams, j, at, axis, towards, cosine, tag)
         step = mi.Float(MIN_STEP)
         for g in range(groups):
             step = dr.select(group == g, steps[g], step)
@@ -116,11 +118,13 @@ def sum_hidden(
         while dr.hint(
             times > 0,
             exclude=[
+                beams,
                 indenters,
                 at,
                 axis,
                 towards,
                 cosine,
+                tag,
                 height,
                 weight,
                 group,
@@ -129,7 +133,7 @@ def sum_hidden(
             ],
         ):
             state = next_random(state)
-            beam = angular_variance(axis, towards, cosine, height)
+            beam = angular_variance(axis, towards, beams.widened(cosine, tag), height)
             blocked = indenters.occluded(at.start, sample_direction(beam, state), mi.Bool(True))
             part = dr.select(blocked, weight, 0)
             for g in range(groups):
@@ -146,17 +150,27 @@ def _reflected(
     axis: mi.Vector3f,
     towards: mi.Vector3f,
     cosine: mi.Float,
+    tag: mi.UInt32,
 ) -> mi.Color3f:
     """Return the radiance (3, n) that coatings reflect towards the camera of beams of unit flux
     density.
     """
+    normal, towards_eye = at.seen.normal, at.seen.towards_eye
+    if not at.coating.metallic:
+        coating = broadened_coating(at.coating, cosine)
+        return evaluate_coating(coating, normal, towards, towards_eye)
+    height = dr.gather(mi.Float, beams.heights, number)
     if at.coating.only_tail:
-        height = dr.gather(mi.Float, beams.heights, number)
         light = angular_variance(axis, towards, cosine, height)
         coating = coating_with_broadened_tail(at.coating, light, cosine)
-    else:
-        coating = broadened_coating(at.coating, cosine)
-    return evaluate_coating(coating, at.seen.normal, towards, at.seen.towards_eye)
+        return evaluate_coating(coating, normal, towards, towards_eye)
+    light = angular_variance(axis, towards, cosine, height)
+    # Narrow lobes see widened beams as round.
+    variance = 1 - beams.widened(cosine, tag)
+    widened = (at.coating.alpha < TRACED_ROUGHNESS) & (variance > 1 - cosine)
+    light.variance_along = dr.select(widened, variance, light.variance_along)
+    light.variance_up = dr.select(widened, variance, light.variance_up)
+    return reflected_from_discs(at.coating, light, cosine, normal, towards_eye)
 
 
 def beam_at(beams: Beams, number: mi.UInt32) -> tuple[mi.Vector3f, mi.Float, mi.Color3f, mi.UInt32]:

@@ -20,9 +20,9 @@ from optisense.optics.radiance_cache.angular_variance import (
     cosine_half_width,
     mean_direction,
     mirrored_above,
+    reflected_from_discs,
     sample_direction,
     squared_radius,
-    two_discs,
 )
 from optisense.optics.radiance_cache.cache import BinnedLight
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
@@ -185,20 +185,17 @@ def _reflected(
         half_width: half-width of the distribution of the beam's cosine with the normal.
     """
     points = at.seen
-
-    def of_disc(towards: mi.Vector3f, mean_cosine: mi.Float) -> mi.Color3f:
-        coating = broadened_coating(at.coating, mean_cosine)
-        return evaluate_coating(coating, points.normal, towards, points.towards_eye, half_width)
-
     if at.coating.only_tail:
         coating = coating_with_broadened_tail(at.coating, beam, cosine)
         return evaluate_coating(
             coating, points.normal, beam.towards, points.towards_eye, half_width
         )
-    if not light.narrow_lobes:
-        return of_disc(beam.towards, cosine)
-    one, other, within = two_discs(beam)
-    return (of_disc(one, within) + of_disc(other, within)) * 0.5
+    if light.narrow_lobes:
+        return reflected_from_discs(
+            at.coating, beam, cosine, points.normal, points.towards_eye, half_width
+        )
+    coating = broadened_coating(at.coating, cosine)
+    return evaluate_coating(coating, points.normal, beam.towards, points.towards_eye, half_width)
 
 
 def _shorter_path_factor(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:
