@@ -160,11 +160,10 @@ def _reflected(
         coating = broadened_coating(at.coating, cosine)
         return evaluate_coating(coating, normal, towards, towards_eye)
     height = dr.gather(mi.Float, beams.heights, number)
+    light = angular_variance(axis, towards, cosine, height)
     if at.coating.only_tail:
-        light = angular_variance(axis, towards, cosine, height)
         coating = coating_with_broadened_tail(at.coating, light, cosine)
         return evaluate_coating(coating, normal, towards, towards_eye)
-    light = angular_variance(axis, towards, cosine, height)
     # Narrow lobes see widened beams as round.
     variance = 1 - beams.widened(cosine, tag)
     widened = (at.coating.alpha < TRACED_ROUGHNESS) & (variance > 1 - cosine)
