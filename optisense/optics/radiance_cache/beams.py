@@ -61,8 +61,8 @@ class Beams:
             `SPARSE_FLAG`. The number follows from the direction bins of the beam alone, not from
             how many other beams there are.
         heights: mean squared component of the directions of each beam along the bins' axis.
-        sparse_cosine: upper bound on the mean cosine that the peaks of lobes see of beams that may
-            come from a single photon.
+        sparse_cosine: upper bound on the mean cosine of beams that may come from a single photon,
+            where they are widened (see `widened`).
     """
 
     starts: mi.UInt32
@@ -72,8 +72,10 @@ class Beams:
     sparse_cosine: mi.Float
 
     def widened(self, cosine: mi.Float, tag: mi.UInt32) -> mi.Float:
-        """Return the mean cosines (n,) that the peaks of lobes see of beams of mean cosines (n,)
-        and tags (n,).
+        """Return the mean cosines (n,) of beams of mean cosines (n,) and tags (n,), of which those
+        that may come from a single photon are widened.
+
+        Besides the peaks of the narrowest lobes, shadow rays and the guide of lobes see them so.
         """
         sparse = (tag & SPARSE_FLAG) != 0
         return dr.select(sparse, dr.minimum(cosine, self.sparse_cosine), cosine)
