@@ -221,6 +221,7 @@ def _of_lobes() -> list[Ablation]:
     import drjit as dr
     import mitsuba as mi
 
+    from optisense.optics.backend import sequences
     from optisense.optics.imaging import _traced_light, cached
     from optisense.optics.radiance_cache import (
         _lobe_branches,
@@ -232,6 +233,9 @@ def _of_lobes() -> list[Ablation]:
 
     class OneWay:
         CAMERA = REFLECTION = RayKind.REFLECTION
+
+    def at_random(series: Any, number: Any, dimension: int) -> Any:
+        return sequences.unit_float(mi.sample_tea_32(series, number * 4 + dimension, 8)[0])
 
     def all_cached(tracer: Any, first: Any, ray: Any) -> Any:
         return dr.full(mi.Bool, False, dr.width(ray.active))
@@ -250,6 +254,11 @@ def _of_lobes() -> list[Ablation]:
         _lobes("rays drawn from beams", Change(traced_lobes, "GUIDED_SHARE", 0.0)),
         _lobes("rays split at rough faces", Change(_lobe_branches, "MOST_SCATTERED", 1)),
         _lobes("both ways at the first interfaces", Change(traced_lobes, "RayKind", OneWay)),
+        _lobes("later directions spread evenly",
+               Change(_lobe_branches, "richtmyer", at_random),
+               Change(traced_lobes, "richtmyer", at_random)),
+        _lobes("part of the branches followed", Change(_lobe_branches, "BRANCH_FACTOR", 1e9)),
+        _lobes("branches of second segments", Change(traced_lobes, "BRANCHED_SEGMENTS", 1)),
         _lobes("rays split at contacts", Change(_ray_resampling, "SPLIT_SHARE", 0.0)),
         _lobes("drawn places of cached light",
                Change(traced_lobes, "MOST_CACHED", 10**9),

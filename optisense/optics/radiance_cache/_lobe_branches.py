@@ -6,7 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.arrays import FEWEST_LANES, gathered, joined, tiled
-from optisense.optics.backend.sequences import GOLDEN_BITS
+from optisense.optics.backend.sequences import GOLDEN_BITS, richtmyer, unit_float
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.transport.camera_paths import (
     PathEnd,
@@ -15,7 +15,7 @@ from optisense.optics.transport.camera_paths import (
     follow_branches,
     generator,
 )
-from optisense.optics.transport.interact import RayKind
+from optisense.optics.transport.interact import LobeSample, RayKind
 
 MOST_SCATTERED = 8
 """Largest number of rays into which a ray is split at a rough interface. The rays of all splits
@@ -23,10 +23,20 @@ are about as many as those that are followed. In the contact of GelSight Mini of
 of the noise of rays is from the scattering at the rough edges of the light guide: splitting reduces
 the noise of pixels from 27 to 20 %, on the skin far from it from 16 to 12 %, and takes a fifth more
 time."""
+BRANCH_FACTOR = 2.0
+"""Ratio of the probability with which the reflection of a ray at interfaces is followed to the
+weight of that reflection, for rays from contacts. In the contact of the flat GelSight Mini of
+specularity 1, the noise over patches is 2.5 % with 300,000 photons; with a factor of 1, it is 2.6
+%, and with 4, 2.4 % in a tenth more time."""
 
 
 def follow_to_coating(
-    scene: RayScene, ray: Ray, weight: mi.Color3f, bits: mi.UInt32, ray_kind: RayKind
+    scene: RayScene,
+    ray: Ray,
+    weight: mi.Color3f,
+    bits: mi.UInt32,
+    ray_kind: RayKind,
+    roulette: bool,
 ) -> tuple[PathEnd, mi.UInt32]:
     """Follow rays to the lamp or the coating that they meet.
 
@@ -40,6 +50,8 @@ def follow_to_coating(
         bits: random bits (n,) of each ray.
         ray_kind: `RayKind.CAMERA` or `RayKind.REFLECTION`. Rays of the latter draw one of both ways
             at each interface.
+        roulette: whether only a part of the reflections at interfaces are followed, with a
+            probability of `BRANCH_FACTOR` times their weight (Russian roulette).
 
     Returns:
         The ends of those rays that meet a lamp or a coating, and the numbers of the rays that they
@@ -51,7 +63,13 @@ def follow_to_coating(
     rough = dr.compress(paths.stopped.active)
     if dr.width(rough) >= FEWEST_LANES:
         parts.append(_scattered(scene, paths, rough, bits))
-    turned = dr.compress(paths.branch.active)
+    chosen = paths.branch.active
+    if roulette:
+        chance = dr.minimum(1, BRANCH_FACTOR * dr.max(paths.branch_weight))
+        chosen &= unit_float(mi.sample_tea_32(bits, mi.UInt32(GOLDEN_BITS))[0]) < chance
+        paths.branch_weight /= dr.select(chosen, chance, 1)
+        dr.eval(paths.branch_weight, chosen)
+    turned = dr.compress(chosen)
     if dr.width(turned) >= FEWEST_LANES:
         other = dr.gather(mi.UInt32, bits, turned) ^ GOLDEN_BITS
         parts.append(_met(follow_branches(scene, paths, turned, other), turned))
@@ -66,7 +84,9 @@ def _scattered(
 ) -> tuple[PathEnd, mi.UInt32]:
     """Follow several rays from each rough interface before which paths have stopped.
 
-    All of them bring the light of lamps, and only the first that of coatings.
+    All of them bring the light of lamps, and only the first that of coatings. The directions of the
+    rays of one path are spread evenly over the lobes of the interface, by which the noise of the
+    contact of GelSight Mini of specularity 1 is a tenth lower.
 
     Args:
         lanes: numbers (k,) of the stopped paths.
@@ -77,11 +97,15 @@ def _scattered(
     number = dr.arange(mi.UInt32, stopped * copies)
     first = number < dr.opaque(mi.UInt32, stopped)
     lanes = tiled(lanes, copies)
-    bits = mi.sample_tea_32(dr.gather(mi.UInt32, bits, lanes), number)[0]
+    bits = dr.gather(mi.UInt32, bits, lanes)
+    copy = number // dr.opaque(mi.UInt32, stopped)
+    pick, *place = (richtmyer(bits, copy, k) for k in range(3))
+    scattered = LobeSample(pick, mi.Point2f(*place))
+    bits = mi.sample_tea_32(bits, number)[0]
     share = dr.opaque(mi.Float, 1 / copies)
     weight = dr.gather(mi.Color3f, paths.stopped_weight, lanes) * share
     ray = gathered(paths.stopped, lanes)
-    end = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION).end
+    end = follow(scene, ray, weight, generator(bits), RayKind.REFLECTION, first=scattered).end
     end.valid &= first
     end.weight *= dr.select(end.valid, 1 / share, 1)
     return _met(end, lanes)

@@ -93,6 +93,7 @@ def follow(
     rng: mi.PCG32,
     ray_kind: RayKind,
     until_rough: bool = False,
+    first: LobeSample | None = None,
 ) -> Paths:
     """Follow paths to their ends.
 
@@ -102,7 +103,9 @@ def follow(
         rng: a random generator for each path.
         ray_kind: the kind of the rays, `RayKind.CAMERA` or `RayKind.REFLECTION`.
         until_rough: whether paths stop before rough interfaces.
+        first: random numbers of each path's first interaction, in place of those of ``rng``.
     """
+    begins = mi.Bool(True)
     found = mi.Bool(False)
     light = mi.UInt32(0)
     point = mi.Point3f(0)
@@ -118,12 +121,16 @@ def follow(
     stopped_direction = mi.Vector3f(0, 0, 1)
     stopped_weight = mi.Color3f(0)
     stopped_absorption = ray.absorption
-    while dr.hint(ray.active, exclude=[scene, ray_kind, until_rough]):
+    while dr.hint(ray.active, exclude=[scene, ray_kind, until_rough, first]):
         sample = None
         if dr.hint(ray_kind.draws or scene.rough, mode="scalar"):
             sample = LobeSample(rng.next_float32())
             if dr.hint(scene.rough, mode="scalar"):
                 sample.place = mi.Point2f(rng.next_float32(), rng.next_float32())
+            if dr.hint(first is not None, mode="scalar"):
+                sample.pick = dr.select(begins, first.pick, sample.pick)
+                sample.place = dr.select(begins, first.place, sample.place)
+                begins = mi.Bool(False)
         step = interact(scene, ray, ray_kind, sample)
         hit = step.hit
         seen = step.opaque
