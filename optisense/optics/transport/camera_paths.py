@@ -105,6 +105,7 @@ def follow(
         until_rough: whether paths stop before rough interfaces.
         first: random numbers of each path's first interaction, in place of those of ``rng``.
     """
+    opening = LobeSample() if first is None else first
     begins = mi.Bool(True)
     found = mi.Bool(False)
     light = mi.UInt32(0)
@@ -121,15 +122,15 @@ def follow(
     stopped_direction = mi.Vector3f(0, 0, 1)
     stopped_weight = mi.Color3f(0)
     stopped_absorption = ray.absorption
-    while dr.hint(ray.active, exclude=[scene, ray_kind, until_rough, first]):
+    while dr.hint(ray.active, exclude=[scene, ray_kind, until_rough, first, opening]):
         sample = None
         if dr.hint(ray_kind.draws or scene.rough, mode="scalar"):
             sample = LobeSample(rng.next_float32())
             if dr.hint(scene.rough, mode="scalar"):
                 sample.place = mi.Point2f(rng.next_float32(), rng.next_float32())
             if dr.hint(first is not None, mode="scalar"):
-                sample.pick = dr.select(begins, first.pick, sample.pick)
-                sample.place = dr.select(begins, first.place, sample.place)
+                sample.pick = dr.select(begins, opening.pick, sample.pick)
+                sample.place = dr.select(begins, opening.place, sample.place)
                 begins = mi.Bool(False)
         step = interact(scene, ray, ray_kind, sample)
         hit = step.hit
