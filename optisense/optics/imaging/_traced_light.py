@@ -37,7 +37,7 @@ CONTACT_RAYS = 4.0
 """Number of rays from contacts for each photon of the cache. At a specularity of 1, the noise of
 contacts is that of these rays alone. With four, an image of GelSight Mini with 300,000 photons has
 a noise of 2.3 % over patches of the contact, about that of a diffuse coating with 560,000; with
-one, the same noise takes 1.7 times the time. On GelSight360, where photons and rays of the skin
+one, the same noise takes three times the time. On GelSight360, where photons and rays of the skin
 take most of the time, images with one take as long and have twice the noise."""
 SCORE_RAYS = 1.0
 """The same in images of contacts alone, which scores take from a cache of many photons. With five
