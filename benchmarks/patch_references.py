@@ -24,10 +24,11 @@ from numpy.typing import NDArray
 
 from benchmarks.light_tracing import light_traced
 from benchmarks.mitsuba_export import mitsuba_scene
-from benchmarks.reference import box_around, window_camera
+from benchmarks.reference import window_camera
 from optisense import OpticalModel
 from optisense.design import SensorDesign
 from optisense.geometry import Contact
+from optisense.optics.imaging._film import box_around
 from optisense.optics.scene import assembly
 from optisense.optics.scene.surfaces import Region
 

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from benchmarks.case import CONTACT_TEXT, DESIGN, RESOLUTION, Case, FloatArray, ball
 from optisense.design import SensorDesign
 from optisense.optics.camera.projection import RayCamera
+from optisense.optics.imaging._film import box_around
 from optisense.optics.imaging.sppm import render_sppm
 from optisense.optics.transport.photons import Emission
 
@@ -110,7 +111,7 @@ def make_reference(
                 float(kept["seconds"]),
             )
     began = time.perf_counter()
-    images, window = [], box_around(case.mask)
+    images, window = [], box_around(case.mask, MARGIN)
     traced = 0
     for number in range(seeds):
         image, used = _one_seed(case, window, photons, FIRST_SEED + number, radius)
@@ -133,16 +134,6 @@ def make_reference(
         np.savez_compressed(file, **result.__dict__)
     temporary.replace(path)
     return result
-
-
-def box_around(mask: NDArray[np.bool_], margin: int = MARGIN) -> tuple[slice, slice]:
-    """Return the rows and columns of the box around a mask (h, w), with a margin in pixels."""
-    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
-    height, width = mask.shape
-    return (
-        slice(max(0, rows[0] - margin), min(height, rows[-1] + margin + 1)),
-        slice(max(0, columns[0] - margin), min(width, columns[-1] + margin + 1)),
-    )
 
 
 def window_camera(whole: RayCamera, window: tuple[slice, slice]) -> WindowCamera:

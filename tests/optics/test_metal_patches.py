@@ -12,9 +12,10 @@ from scipy import ndimage
 
 from benchmarks.light_tracing import light_traced
 from benchmarks.patches import RESOLUTION, PatchCase, Patches, means
-from benchmarks.reference import box_around, window_camera
+from benchmarks.reference import window_camera
 from optisense import Contact, OpticalModel
 from optisense.optics import TactileImage
+from optisense.optics.imaging._film import box_around
 
 pytestmark = pytest.mark.usefixtures("few_contact_rays")
 

@@ -93,6 +93,18 @@ class Film:
         return layers
 
 
+def box_around(where: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
+    """Return the rows and columns of the box around a mask (h, w), which is not empty, with a
+    margin (pixels) as far as the image extends.
+    """
+    rows, columns = (np.flatnonzero(where.any(axis=axis)) for axis in (1, 0))
+    height, width = where.shape
+    return (
+        slice(max(0, int(rows[0]) - margin), min(height, int(rows[-1]) + margin + 1)),
+        slice(max(0, int(columns[0]) - margin), min(width, int(columns[-1]) + margin + 1)),
+    )
+
+
 def average_pixels(
     layers: NDArray[np.float32],
     samples: NDArray[np.float32],
@@ -107,11 +119,7 @@ def average_pixels(
 
     if not where.any():
         return
-    # Only the rectangle around the region is averaged, with a margin that the kernel reaches.
-    part = tuple(
-        slice(max(0, int(used[0]) - reach // 2), int(used[-1]) + reach // 2 + 1)
-        for used in (np.flatnonzero(where.any(axis=axis)) for axis in (1, 0))
-    )
+    part = box_around(where, reach // 2)
     where = where[part]
 
     def around(image: NDArray[np.floating]) -> NDArray[np.floating]:

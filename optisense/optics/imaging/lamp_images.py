@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging._film import Film, repeated
+from optisense.optics.imaging._film import Film, box_around, repeated
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
@@ -145,9 +145,23 @@ def without_specks(
             their light, too; all pixels by default.
         reach: width over which it is spread, as a fraction of the image width.
     """
-    width = layers.shape[2]
-    side = round(reach * width) | 1  # an odd side: a symmetric square loses no light
+    side = round(reach * layers.shape[2]) | 1  # an odd side: a symmetric square loses no light
     region = np.ones_like(steady) if region is None else region
+    found = layers.copy()
+    if region.any():
+        # The margin holds what the kernel and the comparison with neighbours reach.
+        part = box_around(region, max(side, LONE_WINDOW) // 2)
+        found[:, *part] = _spread(layers[:, *part], steady[part], region[part], side)
+    return found
+
+
+def _spread(
+    layers: NDArray[np.float32],
+    steady: NDArray[np.bool_],
+    region: NDArray[np.bool_],
+    side: int,
+) -> NDArray[np.float32]:
+    """Return layers as `without_specks` does, with a kernel of two squares of a side (pixels)."""
 
     def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
         for _ in range(2):
