@@ -8,7 +8,12 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import unit_float
-from optisense.optics.scene.bsdf import CoatingBsdf, evaluate_coating
+from optisense.optics.scene.bsdf import (
+    CoatingBsdf,
+    evaluate_coating,
+    metal_reflectance,
+    metallic_lobe,
+)
 
 MAX_SPREAD = 0.1
 """Upper bound on 1 - mean cosine of a beam. It is that of a disc of directions of a radius of 36
@@ -235,10 +240,12 @@ def reflected_from_discs(
     diffuse = replace(coating, reflectance=reflectance, metallic=False)
     total = evaluate_coating(diffuse, normal, light.towards, towards_eye, cosine_half_width)
     one, other, within = two_discs(light)
-    lobe = replace(broadened_coating(coating, within), reflectance=mi.Color3f(0))
-    for towards in (one, other):
-        total += evaluate_coating(lobe, normal, towards, towards_eye) * 0.5
-    return total
+    lobe = broadened_coating(coating, within)
+    both = metallic_lobe(lobe, normal, one, towards_eye)
+    both += metallic_lobe(lobe, normal, other, towards_eye)
+    # The reflectance of a metal hardly varies between the two discs.
+    metal = metal_reflectance(coating, light.towards, towards_eye)
+    return total + dr.select(both > 0, metal * (0.5 * both), 0)
 
 
 def coating_with_broadened_tail(

@@ -296,7 +296,6 @@ def evaluate_coating(
     """
     cos_i = dr.dot(normal, towards_light)
     cos_o = dr.dot(normal, towards_eye)
-    lit = (cos_i > 0) & (cos_o > 0)
     cos_d = cos_i
     if cosine_half_width is not None:
         half_width = cosine_half_width + 1e-9
@@ -307,15 +306,41 @@ def evaluate_coating(
     )
     if not coating.metallic:
         return diffuse
+    lobe = metallic_lobe(coating, normal, towards_light, towards_eye)
+    shiny = metal_reflectance(coating, towards_light, towards_eye) * lobe
+    return diffuse * (1 - coating.specularity) + dr.select(lobe > 0, shiny, 0)
+
+
+def metal_reflectance(
+    coating: CoatingBsdf, towards_light: mi.Vector3f, towards_eye: mi.Vector3f
+) -> mi.Color3f:
+    """Return the Fresnel reflectance (3, n) of the metal of coatings, for unit directions away from
+    the surface.
+    """
     half = dr.normalize(towards_light + towards_eye)
+    cosine = dr.abs(dr.dot(half, towards_light))
+    return fresnel_metal(cosine, coating.metal_eta, coating.metal_k)
+
+
+def metallic_lobe(
+    coating: CoatingBsdf,
+    normal: mi.Vector3f,
+    towards_light: mi.Vector3f,
+    towards_eye: mi.Vector3f,
+) -> mi.Float:
+    """Return the BSDF (1/sr) of the metallic lobe times the cosine at the light, (n,), for a
+    reflectance of 1 of the metal; 0 below the surface. The arguments are those of
+    `evaluate_coating`.
+    """
+    cos_i = dr.dot(normal, towards_light)
+    cos_o = dr.dot(normal, towards_eye)
     if coating.only_tail:
         density = _ggx_tail(normal, towards_light, towards_eye, coating.alpha, coating.light_axes)
     else:
+        half = dr.normalize(towards_light + towards_eye)
         density = _facet_density(coating, normal, half, towards_light)
     lobe = density * _smith(cos_i, coating.alpha) * _smith(cos_o, coating.alpha) / (4 * cos_o)
-    metal = fresnel_metal(dr.abs(dr.dot(half, towards_light)), coating.metal_eta, coating.metal_k)
-    shiny = dr.select(lit, metal * (coating.specularity * lobe), 0.0)
-    return diffuse * (1 - coating.specularity) + shiny
+    return dr.select((cos_i > 0) & (cos_o > 0), coating.specularity * lobe, 0)
 
 
 def peak_share(cos_m: mi.Float) -> mi.Float:
