@@ -66,8 +66,11 @@ class LobeGuide:
         total = _total(beams, groups, lobes)
         found = at.active & (total > MIN_WEIGHT)
         lane = dr.arange(mi.UInt32, dr.width(total))
-        slots = dr.zeros(mi.UInt32, SLOTS * dr.width(total))
-        dr.eval(total, found)
+        first = dr.gather(mi.UInt32, beams.starts, at.cell * groups, found)
+        dr.eval(total, found, first)
+        # Rounding may leave the last slot of a point empty, which then holds its first beam.
+        slots = dr.gather(mi.UInt32, first, dr.arange(mi.UInt32, SLOTS * dr.width(total)) // SLOTS)
+        dr.eval(slots)
         _choose(beams, groups, lobes, SLOTS / total, found, lane, slots)
         dr.eval(slots)
         return cls(beams, axis, slots, found)
@@ -156,7 +159,6 @@ def _choose(
     running = unit_float(next_random(at.seen.random ^ GOLDEN_BITS))
     filled = mi.UInt32(0)
     j = dr.gather(mi.UInt32, beams.starts, at.cell * groups, found)
-    first = mi.UInt32(j)
     end = dr.gather(mi.UInt32, beams.starts, (at.cell + 1) * groups, found)
     while dr.hint(j < end, exclude=[beams, groups, at, end, per_weight, lane, slots]):
         running += _weight(beams, j, at) * per_weight
@@ -165,10 +167,6 @@ def _choose(
             dr.scatter(slots, j, lane * SLOTS + filled)
             filled += 1
         j += 1
-    # Rounding may leave the last slot empty.
-    while dr.hint(filled < SLOTS, exclude=[lane, slots, first]):
-        dr.scatter(slots, first, lane * SLOTS + filled, found)
-        filled += 1
 
 
 def _weight(beams: Beams, number: mi.UInt32, at: ShadingPoints) -> mi.Float:
