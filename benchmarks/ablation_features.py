@@ -243,15 +243,16 @@ def _of_lobes() -> list[Ablation]:
     def blurred(layers: Any, weight: Any, where: Any, reach: int, deblurred: bool) -> None:
         average(layers, weight, where, reach, False)
 
-    def followed(pixels: Any, rays: float, segments: float = 0) -> Any:
+    def followed(pixels: Any, rays: float) -> Any:
         directions = _traced_light._directions(rays, pixels, 1)
-        return _traced_light.LobeSamples(pixels, 1, directions, gathers=False, segments=segments)
+        return _traced_light.LobeSamples(pixels, 1, directions, gathers=False)
 
     average = _traced_light.average_pixels
     return [
         Ablation("tracing of narrow lobes",
                  [Change(lit_scene, "TRACED_ROUGHNESS", 0.0)], light=True, lobes=True),
         _lobes("rays drawn from beams", Change(traced_lobes, "GUIDED_SHARE", 0.0)),
+        _lobes("beams shared by neighbours", Change(traced_lobes, "GUIDED_RAYS", 1)),
         _lobes("rays split at rough faces", Change(_lobe_branches, "MOST_SCATTERED", 1)),
         _lobes("both ways at the first interfaces", Change(traced_lobes, "RayKind", OneWay)),
         _lobes("later directions spread evenly",
@@ -269,10 +270,10 @@ def _of_lobes() -> list[Ablation]:
                Change(traced_lobes.LobeTracer, "_is_uncached", all_cached)),
         _lobes("skin behind mirrored contacts",
                Change(traced_lobes.LobeTracer, "_subtract_skin_behind", _nothing)),
-        _lobes("further passes of skin", Change(_traced_light, "SKIN_SEGMENTS", 0.0)),
         _lobes("more rays around contacts", Change(_traced_light, "NEAR_RAYS", 0.03)),
         _lobes("more rays beside contacts", Change(_traced_light, "BESIDE_RAYS", 0.02)),
         _lobes("few rays from mirrored points", Change(_traced_light, "MIRRORED_SHARE", 1.0)),
+        _lobes("fewer samples of tails in contacts", Change(cached, "TAIL_SAMPLES", 1.0)),
         _lobes("averages far from contacts", Change(_traced_light, "SKIN_WIDTH", 0.0)),
         _lobes("averages beside contacts", Change(_traced_light, "BESIDE_WIDTH", 0.0)),
         _lobes("averages around contacts",

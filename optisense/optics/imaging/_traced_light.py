@@ -63,13 +63,7 @@ BESIDE_RANGE = 0.1
 """Distance from contacts as a fraction of the image width: 2 mm on GelSight Mini. The interfaces
 and the skin mirror contacts to the skin within it."""
 SKIN_RAYS = 0.4
-"""Number of rays in one pass from all other pixels that see the skin for each photon of the
-cache."""
-SKIN_SEGMENTS = 0.7
-"""Number of segments of these rays for each photon, up to which there are further passes. On
-GelSight Mini, whose rays mostly leave through the glass, there are two passes."""
-MOST_PASSES = 4
-"""Largest number of these passes."""
+"""Number of rays from all other pixels that see the skin for each photon of the cache."""
 MIRRORED_SHARE = 0.25
 """Number of rays from a point that the camera sees by reflection at an interface, as a share of
 those from a point that it sees directly. On the skin around a contact of GelSight Svelte of
@@ -105,8 +99,6 @@ class LobeSamples:
         directions: number of rays from each sample.
         gathers: whether the rays end on the skin that they meet (see `LobeTracer.trace`).
         passes: number of passes in which the samples draw rays.
-        segments: number of segments of rays, from coating to coating, up to which there are further
-            passes, with samples of their own.
     """
 
     pixels: NDArray[np.bool_]
@@ -114,7 +106,6 @@ class LobeSamples:
     directions: int
     gathers: bool = True
     passes: int = 1
-    segments: float = 0
 
     @classmethod
     def of_contacts(cls, pixels: NDArray[np.bool_], count: int, rays: float) -> LobeSamples:
@@ -126,9 +117,9 @@ class LobeSamples:
         return cls(pixels, count, directions, gathers=False, passes=passes)
 
     @classmethod
-    def of_skin(cls, pixels: NDArray[np.bool_], rays: float, segments: float = 0) -> LobeSamples:
+    def of_skin(cls, pixels: NDArray[np.bool_], rays: float) -> LobeSamples:
         """Return the samples of pixels outside contacts, which draw a number of rays together."""
-        return cls(pixels, 1, _directions(rays, pixels, 1), segments=segments)
+        return cls(pixels, 1, _directions(rays, pixels, 1))
 
 
 def _directions(rays: float, pixels: NDArray[np.bool_], count: int) -> int:
@@ -159,9 +150,7 @@ def _lobe_samples(plan: SamplingPlan, regions: PixelRegions, photons: int) -> li
     near = regions.near & ~(inside | bent)
     beside = regions.within(BESIDE_RANGE) & ~(inside | bent | near)
     hit = regions.rays.hit
-    skin = LobeSamples.of_skin(
-        ~(inside | bent | near | beside) & hit, SKIN_RAYS * photons, SKIN_SEGMENTS * photons
-    )
+    skin = LobeSamples.of_skin(~(inside | bent | near | beside) & hit, SKIN_RAYS * photons)
     edge = outline(hit) & ~(inside | hit)
     samples = [
         LobeSamples.of_skin(near & hit, NEAR_RAYS * photons),
@@ -260,11 +249,8 @@ def traced_layers(
     for each in _lobe_samples(plan, regions, cache.photons):
         if not each.pixels.any():
             continue
-        segments = 0
-        for number in range(max(each.passes, MOST_PASSES)):
-            segments += image.add(each, number)
-            if number + 1 >= each.passes and segments >= each.segments:
-                break
+        for number in range(each.passes):
+            image.add(each, number)
     layers = film.layers(width, height)
     smooth = np.zeros_like(layers)
     total = np.zeros((height, width, 1), dtype=np.float32)
@@ -287,8 +273,8 @@ class _Image:
     film: Film
     seed: int
 
-    def add(self, samples: LobeSamples, earlier: int) -> int:
-        """Add one pass of samples, and return the number of segments of the rays that start there.
+    def add(self, samples: LobeSamples, earlier: int) -> None:
+        """Add one pass of samples.
 
         Args:
             earlier: number of earlier passes.
@@ -298,20 +284,14 @@ class _Image:
         later = number + dr.opaque(mi.UInt32, earlier * samples.count)
         dr.eval(pixel, number, later)
         film.count(pixel)
-        if samples.segments > 0:
-            # The samples of several passes are spread over the pixel without a known number.
-            spots = film_samples(pixel, self.camera.width, later, seed_of(seed, 3))
-        else:
-            count = dr.opaque(mi.UInt32, samples.count, dr.width(pixel))
-            spots = film_samples(pixel, self.camera.width, number, seed_of(seed, 3), count)
-        segments = 0
+        count = dr.opaque(mi.UInt32, samples.count, dr.width(pixel))
+        spots = film_samples(pixel, self.camera.width, number, seed_of(seed, 3), count)
         for channel in scene.channels:
             points, mirrored = find_visible_points(
                 scene, self.camera, pixel, later, spots, seed_of(seed, 13), channel=channel
             )
             tracer = LobeTracer(self.cache, self.scenes, self.lamps, channel)
             rays = tracer.trace(points, samples.directions, samples.gathers)
-            segments += rays.segments
             _add_light(film, rays, points, scene.table, 1 / samples.directions)
             dr.eval(film.sums)
             if mirrored is not None:
@@ -319,7 +299,6 @@ class _Image:
                 rays = tracer.trace(mirrored, directions, samples.gathers)
                 _add_light(film, rays, mirrored, scene.table, 1 / directions)
                 dr.eval(film.sums)
-        return segments
 
 
 def _lit_rays(rays: LobeRays, groups: int) -> mi.UInt32:

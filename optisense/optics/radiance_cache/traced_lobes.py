@@ -91,7 +91,6 @@ class LobeRays:
             interface mirrors; of the others, it is the peaks of metallic lobes.
         light: radiance, 1/(mm^2 sr) for lights of 1 mW, that arrives along each ray: three channels
             of each light group, (3 groups n,).
-        segments: number of all segments of rays from coating to coating.
     """
 
     owner: mi.UInt32
@@ -99,7 +98,6 @@ class LobeRays:
     density: mi.Float
     whole: mi.Bool
     light: mi.Float
-    segments: int = 0
 
 
 @dataclass(frozen=True)
@@ -243,7 +241,6 @@ class LobeTracer:
             through = reflections < (1 if gathers else BRANCHED_SEGMENTS)
             kind = RayKind.CAMERA if through else RayKind.REFLECTION
             end, kept = follow_to_coating(scene, ray, weight, bits, kind, roulette=not gathers)
-            found.segments += dr.width(lane)
             if dr.width(kept) < FEWEST_LANES:
                 return
             lane, bits, read = (dr.gather(type(each), each, kept) for each in (lane, bits, read))
