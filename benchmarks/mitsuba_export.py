@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from optisense.errors import RenderError
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.bsdf import SMOOTH_ALPHA
 from optisense.optics.scene.emitters import Emitter, EmitterShape
+from optisense.optics.scene.interfaces import SMOOTH_ALPHA
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import CLEAR, Surface, SurfaceKind
 

@@ -60,7 +60,7 @@ class TestReflection:
         use_variant("auto")
         import mitsuba as mi
 
-        from optisense.optics.scene.bsdf import fresnel_metal as traced
+        from optisense.optics.scene.coating_bsdf import fresnel_metal as traced
 
         eta, k = (1.43, 0.922, 0.686), (7.508, 6.373, 5.635)
         for cosine in (0.05, 0.4, 0.9, 1.0):

@@ -18,7 +18,7 @@ from optisense.optics.radiance_cache.angular_variance import (
     sample_direction,
     two_discs,
 )
-from optisense.optics.scene.bsdf import CoatingBsdf, evaluate_coating
+from optisense.optics.scene.coating_bsdf import CoatingBsdf, evaluate_coating
 
 COUNT = 200_000
 TOWARDS = np.array([0.6, 0.0, 0.8])

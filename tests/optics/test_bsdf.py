@@ -9,16 +9,15 @@ import pytest
 from scipy import stats
 
 from benchmarks.mitsuba_export import surface_bsdf
-from optisense.optics.scene.bsdf import (
+from optisense.optics.scene.coating_bsdf import (
     CoatingBsdf,
     coating_density,
     evaluate_coating,
     peak_share,
-    refract,
     sample_coating,
-    sample_ggx,
-    sample_rough_interface,
 )
+from optisense.optics.scene.ggx import sample_ggx
+from optisense.optics.scene.interfaces import refract, sample_rough_interface
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
 SIGNIFICANCE = 0.001

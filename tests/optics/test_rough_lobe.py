@@ -12,8 +12,8 @@ from scipy.stats import chi2
 
 from optisense.design.reflectance import fresnel_dielectric, ggx_density, smith_shadowing
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.bsdf import sample_rough_interface
 from optisense.optics.scene.emitters import Emitter, EmitterShape
+from optisense.optics.scene.interfaces import sample_rough_interface
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
 INDEX = 1.49

@@ -15,7 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.scene.bsdf import coating_of, evaluate_coating
+from optisense.optics.scene.coating_bsdf import coating_of, evaluate_coating
 from optisense.optics.transport.camera_paths import VisiblePoints
 from optisense.optics.transport.photon_map import GROUP_MASK, PhotonMap
 

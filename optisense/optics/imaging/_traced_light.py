@@ -19,7 +19,7 @@ from optisense.optics.imaging.lamp_images import without_specks
 from optisense.optics.imaging.sampling import PixelRegions, SamplingPlan
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.traced_lobes import LobeRays, LobeTracer
-from optisense.optics.scene.bsdf import (
+from optisense.optics.scene.coating_bsdf import (
     CoatingBsdf,
     coating_of,
     evaluate_coating,

@@ -22,7 +22,12 @@ from optisense.optics.radiance_cache.angular_variance import (
 from optisense.optics.radiance_cache.beam_sums import beam_at
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
-from optisense.optics.scene.bsdf import coating_density, grey, half_vector_cosine, peak_share
+from optisense.optics.scene.coating_bsdf import (
+    coating_density,
+    grey,
+    half_vector_cosine,
+    peak_share,
+)
 
 SLOTS = 8
 """Number of beams that are drawn for each point. A beam of an eighth of the light that the point

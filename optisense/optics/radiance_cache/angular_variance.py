@@ -8,7 +8,7 @@ import drjit as dr
 import mitsuba as mi
 
 from optisense.optics.backend.sequences import unit_float
-from optisense.optics.scene.bsdf import (
+from optisense.optics.scene.coating_bsdf import (
     CoatingBsdf,
     evaluate_coating,
     metal_reflectance,

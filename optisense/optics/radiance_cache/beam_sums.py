@@ -17,7 +17,7 @@ from optisense.optics.radiance_cache.angular_variance import (
 from optisense.optics.radiance_cache.beams import Beams
 from optisense.optics.radiance_cache.lit_scene import TRACED_ROUGHNESS
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
-from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
+from optisense.optics.scene.coating_bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.photon_map import GROUP_MASK
 

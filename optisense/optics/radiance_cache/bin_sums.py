@@ -26,7 +26,7 @@ from optisense.optics.radiance_cache.angular_variance import (
 )
 from optisense.optics.radiance_cache.cache import BinnedLight
 from optisense.optics.radiance_cache.shading_points import ShadingPoints
-from optisense.optics.scene.bsdf import albedo_of, evaluate_coating, grey
+from optisense.optics.scene.coating_bsdf import albedo_of, evaluate_coating, grey
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.surface_cells import bin_axis, cell_at, plane_of

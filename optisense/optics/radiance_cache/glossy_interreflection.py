@@ -24,7 +24,7 @@ from optisense.optics.radiance_cache.shading_points import (
     interpolating_cell,
     may_be_cached,
 )
-from optisense.optics.scene.bsdf import coating_of, sample_coating
+from optisense.optics.scene.coating_bsdf import coating_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import plane_of

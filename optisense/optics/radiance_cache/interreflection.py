@@ -17,7 +17,7 @@ from optisense.optics.backend.sequences import STEPS_2D, next_random, unit_float
 from optisense.optics.radiance_cache._irradiance import irradiance
 from optisense.optics.radiance_cache.cache import BinnedLight, RadianceCache
 from optisense.optics.radiance_cache.shading_points import ShadingPoints, may_be_cached
-from optisense.optics.scene.bsdf import albedo_of, sample_coating
+from optisense.optics.scene.coating_bsdf import albedo_of, sample_coating
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import cell_at

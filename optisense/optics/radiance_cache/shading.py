@@ -26,10 +26,11 @@ from optisense.optics.radiance_cache.shading_points import (
     foot_of,
     interpolating_cell,
 )
-from optisense.optics.scene.bsdf import coating_of, surface_region
+from optisense.optics.scene.coating_bsdf import coating_of
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import SurfaceCells, bin_axis, cell_at, plane_of
+from optisense.optics.scene.surface_table import surface_region
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.camera_paths import VisiblePoints
 

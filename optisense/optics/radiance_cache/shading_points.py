@@ -9,7 +9,7 @@ import mitsuba as mi
 
 from optisense.optics.backend.sequences import richtmyer
 from optisense.optics.radiance_cache.cache import BinnedLight
-from optisense.optics.scene.bsdf import CoatingBsdf
+from optisense.optics.scene.coating_bsdf import CoatingBsdf
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 from optisense.optics.transport.camera_paths import VisiblePoints
 

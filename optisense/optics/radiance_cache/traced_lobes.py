@@ -38,7 +38,7 @@ from optisense.optics.radiance_cache.shading_points import (
     interpolating_cell,
     may_be_cached,
 )
-from optisense.optics.scene.bsdf import (
+from optisense.optics.scene.coating_bsdf import (
     coating_density,
     coating_of,
     evaluate_coating,
@@ -46,13 +46,12 @@ from optisense.optics.scene.bsdf import (
     half_vector_cosine,
     peak_share,
     sample_coating,
-    surface_kind,
-    surface_region,
 )
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Ray, leave
 from optisense.optics.scene.surface_cells import bin_axis, cell_at
+from optisense.optics.scene.surface_table import surface_kind, surface_region
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 from optisense.optics.transport.camera_paths import PathEnd, VisiblePoints
 from optisense.optics.transport.interact import RayKind

@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatingArray
 from optisense.geometry.connected import connected_components
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.scene.bsdf import SMOOTH_ALPHA, surface_table
+from optisense.optics.scene.interfaces import SMOOTH_ALPHA
+from optisense.optics.scene.surface_table import surface_table
 from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
 
 SMOOTH_FACE = 1 << 16

@@ -16,7 +16,6 @@ from optisense.optics.backend.arrays import floats
 from optisense.optics.backend.variant import one_scene_per_kernel
 from optisense.optics.scene._fine_scene import FineScene, fine_scene
 from optisense.optics.scene.assembly import Assembly, coating_surface, indenter_piece
-from optisense.optics.scene.bsdf import surface_table
 from optisense.optics.scene.contact_scenes import (
     ContactScenes,
     SensorPieces,
@@ -26,6 +25,7 @@ from optisense.optics.scene.contact_scenes import (
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Piece, RayScene
+from optisense.optics.scene.surface_table import surface_table
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind, is_coloured
 
 PILOT_COATING = Surface(

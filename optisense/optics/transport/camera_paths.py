@@ -16,8 +16,9 @@ import mitsuba as mi
 from optisense.optics.backend.arrays import FEWEST_LANES, gathered
 from optisense.optics.backend.sequences import folded_lattice, sequence_2d
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.bsdf import grey, surface_light
+from optisense.optics.scene.coating_bsdf import grey
 from optisense.optics.scene.ray_scene import Ray, RayScene, leave
+from optisense.optics.scene.surface_table import surface_light
 from optisense.optics.transport.interact import LobeSample, RayKind, interact
 
 

@@ -13,19 +13,15 @@ from enum import Enum
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.scene.bsdf import (
-    SMOOTH_ALPHA,
+from optisense.optics.scene.coating_bsdf import coating_of, fresnel_metal, sample_coating
+from optisense.optics.scene.interfaces import SMOOTH_ALPHA, refract, sample_rough_interface
+from optisense.optics.scene.ray_scene import Ray, RayScene, SurfaceHit, leave
+from optisense.optics.scene.surface_table import (
     channel_eta,
-    coating_of,
-    fresnel_metal,
     media_absorption,
-    refract,
-    sample_coating,
-    sample_rough_interface,
     surface_kind,
     surface_region,
 )
-from optisense.optics.scene.ray_scene import Ray, RayScene, SurfaceHit, leave
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 
 MAX_DEPTH = 64

@@ -24,7 +24,7 @@ from optisense.geometry.mesh import CREASE
 from optisense.geometry.shading_normals import smooth_corners
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.camera.projection import Pose, RayCamera
-from optisense.optics.scene.bsdf import refract
+from optisense.optics.scene.interfaces import refract
 from optisense.optics.scene.ray_scene import Piece, RayScene, leave
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport._ray_edges import Discontinuity, PathVertex, find_edges, walk
