@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.report.drawing import AMBER, BLUE, GREY, RED
+from optisense.figures import AMBER, BLUE, GREY, RED
 from paper.spread import Spread
 
 if TYPE_CHECKING:

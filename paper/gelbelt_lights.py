@@ -178,7 +178,7 @@ def tables(numbers: Values) -> list[Table]:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw pictures of the designs and of the objects, and scores over specularity."""
-    from optisense.report.drawing import new_figure
+    from optisense.figures import new_figure
 
     figure = new_figure(11.0, 8.4)
     grid = figure.add_gridspec(3, 6)

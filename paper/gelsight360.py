@@ -346,7 +346,7 @@ def _correlation(colourings: Values, way: str) -> str:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw the scores beside the paper's table, tips, and resins by both objectives."""
-    from optisense.report.drawing import new_figure
+    from optisense.figures import new_figure
 
     figure = new_figure(11.0, 6.4)
     axes = list(figure.subplots(2, 3).ravel())

@@ -205,7 +205,7 @@ def tables(numbers: Values) -> list[Table]:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw both objectives over specularity, and nine balls on each shape."""
-    from optisense.report.drawing import new_figure
+    from optisense.figures import new_figure
 
     figure = new_figure(11.0, 6.4)
     grid = figure.add_gridspec(2, 6)

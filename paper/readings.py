@@ -324,7 +324,7 @@ def notes(numbers: Values) -> list[str]:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw the number of readings over the number of statements that hold under them."""
-    from optisense.report.drawing import new_figure
+    from optisense.figures import new_figure
 
     figure = new_figure(7.0, 3.2)
     axes = figure.add_subplot()

@@ -145,7 +145,7 @@ def _cell(each: Values) -> str:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw each margin, in units of the largest margin of its conclusion."""
-    from optisense.report.drawing import AMBER, BLUE, GREY, RED, new_figure
+    from optisense.figures import AMBER, BLUE, GREY, RED, new_figure
 
     figure = new_figure(10.0, 4.6)
     axes = figure.subplots()

@@ -153,7 +153,7 @@ def tables(numbers: Values) -> list[Table]:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw the times as bars beside those of the paper."""
-    from optisense.report.drawing import AMBER, BLUE, GREY, new_figure
+    from optisense.figures import AMBER, BLUE, GREY, new_figure
 
     figure = new_figure(9.0, 3.8)
     axes = figure.subplots()

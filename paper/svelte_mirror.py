@@ -245,7 +245,7 @@ def notes(numbers: Values) -> list[str]:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw the courses of the searches, and pictures of a ball and a brick."""
-    from optisense.report.drawing import AMBER, BLUE, GREY, new_figure
+    from optisense.figures import AMBER, BLUE, GREY, new_figure
 
     figure = new_figure(11.0, 5.6)
     grid = figure.add_gridspec(2, 4)

@@ -218,7 +218,7 @@ def tables(numbers: Values) -> list[Table]:
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:
     """Draw errors, ratios and objectives over specularity."""
-    from optisense.report.drawing import new_figure
+    from optisense.figures import new_figure
 
     figure = new_figure(11.0, 6.4)
     axes = list(figure.subplots(2, 3).ravel())

@@ -6,21 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from optisense.figures import BLUE, RED, new_figure
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from optisense.objectives.score import Score
-
-DOT = "#1f6fb2"
-LINE = "#c0392b"
-
-
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def _square_grid(
@@ -33,7 +26,7 @@ def _square_grid(
     """
     across = int(np.ceil(count**0.5))
     down = -(-count // across)
-    figure = _figure(width * across + beside, height * down)
+    figure = new_figure(width * across + beside, height * down)
     grid = figure.subplots(down, across, squeeze=False, sharey=sharey)
     for axes in grid.ravel()[count:]:
         axes.set_axis_off()
@@ -42,7 +35,7 @@ def _square_grid(
 
 def draw_failure(score: Score) -> Figure:
     """Draw the reason why there is no score."""
-    figure = _figure(6, 1.2)
+    figure = new_figure(6, 1.2)
     figure.text(
         0.5, 0.5, f"{score.name} failed: {score.failure}", ha="center", va="center", wrap=True
     )
@@ -56,9 +49,9 @@ def draw_parts(score: Score) -> Figure:
         for key, value in score.parts.items()
         if isinstance(value, int | float) and not isinstance(value, bool)
     }
-    figure = _figure(6, 0.8 + 0.4 * len(numbers))
+    figure = new_figure(6, 0.8 + 0.4 * len(numbers))
     axes = figure.subplots()
-    bars = axes.barh(list(numbers), list(numbers.values()), color=DOT)
+    bars = axes.barh(list(numbers), list(numbers.values()), color=BLUE)
     axes.bar_label(bars, fmt="%.4g", padding=3)
     axes.invert_yaxis()
     axes.margins(x=0.15)
@@ -74,13 +67,13 @@ def draw_rgb2normal(score: Score) -> Figure:
     lines = score.arrays["lines"][typical]
     columns = min(4, len(lines))
     rows = -(-len(lines) // columns)
-    figure = _figure(12, 2.9 * rows + 2.6)
+    figure = new_figure(12, 2.9 * rows + 2.6)
     upper, lower = figure.subfigures(2, 1, squeeze=False, height_ratios=[2.9 * rows, 2.6])[:, 0]
     grid = upper.subplots(rows, columns, sharex=True, squeeze=False).ravel()
     for axes, (angle, fit) in zip(grid, lines.items(), strict=False):
-        axes.plot(fit.angles, fit.colours, "o", ms=3, color=DOT)
+        axes.plot(fit.angles, fit.colours, "o", ms=3, color=BLUE)
         ends = np.array([fit.angles.min(), fit.angles.max()])
-        axes.plot(ends, fit.intercept + fit.slope * ends, color=LINE, lw=1.2)
+        axes.plot(ends, fit.intercept + fit.slope * ends, color=RED, lw=1.2)
         axes.set_title(f"{angle:g}°: R² = {fit.linearity:.3f}", fontsize=10)
         axes.set_xlabel("signed angle of the normal (°)")
     grid[0].set_ylabel("dominant colour")
@@ -99,7 +92,7 @@ def draw_rgb2normal(score: Score) -> Figure:
 def draw_normdiff(score: Score) -> Figure:
     """Draw confusion over the sphere of normals, seen from above, and its two parts."""
     table = {key: np.asarray(value) for key, value in score.parts["confusion_map"].items()}
-    figure = _figure(12, 4.2)
+    figure = new_figure(12, 4.2)
     titles = {
         "confusion": "confusion (°)",
         "theta_range": "range of polar angles (°)",
@@ -122,7 +115,7 @@ def draw_normdiff(score: Score) -> Figure:
 def draw_aoap(score: Score) -> Figure:
     """Draw the cosine between each pixel's ray and the surface normal."""
     cosine = np.where(score.arrays["hit"], score.arrays["cosine"], np.nan)
-    figure = _figure(9, 4.2)
+    figure = new_figure(9, 4.2)
     picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
     degrees = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
     seen = degrees[np.isfinite(degrees)]
@@ -143,12 +136,12 @@ def draw_projection_warping(score: Score) -> Figure:
     total = np.where(known, areas, 0).sum(axis=2)
     mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
     relative = mean / score.parts["mean_area"]
-    figure = _figure(9, 4.2)
+    figure = new_figure(9, 4.2)
     picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
     low, high = (float(x) for x in np.nanpercentile(relative, (1, 99)))
     limits = min(low, 0.9), max(high, 1.1)
     _map(figure, picture, relative, "area over mean", *limits)
-    histogram.hist(areas[known] / score.parts["mean_area"], bins=50, range=limits, color=DOT)
+    histogram.hist(areas[known] / score.parts["mean_area"], bins=50, range=limits, color=BLUE)
     histogram.set_xlabel("area over mean")
     histogram.set_ylabel("triangles")
     return figure
@@ -176,7 +169,7 @@ def draw_depth(score: Score) -> Figure:
     figure, grid = _square_grid(len(profiles), 2.6, 1.9, sharey=True)
     for number, (axes, each) in enumerate(zip(grid.ravel(), profiles, strict=False)):
         axes.plot(each["true"], color="#888888", lw=2.5, label="true")
-        axes.plot(each["read"], color=LINE, lw=1.2, label="read")
+        axes.plot(each["read"], color=RED, lw=1.2, label="read")
         axes.set_title(f"{number + 1}: {places[number]['error']:.3f} mm", fontsize=10)
         axes.set_xticks([])
         if number % grid.shape[1] == 0:
@@ -190,7 +183,7 @@ def draw_depth(score: Score) -> Figure:
 def draw_coverage(score: Score) -> Figure:
     """Draw the pixels that see the sensing surface, and the share of the surface that they see."""
     hit = score.arrays["hit"]
-    figure = _figure(9, 4.2)
+    figure = new_figure(9, 4.2)
     picture, shares = figure.subplots(1, 2, width_ratios=[2, 1])
     picture.imshow(hit, cmap="Blues_r", vmin=0, vmax=1.4, interpolation="nearest")
     picture.set_xticks([])
@@ -199,7 +192,7 @@ def draw_coverage(score: Score) -> Figure:
     names = ("area of\nthe surface", "triangles of\nthe surface", "pixels of\nthe picture")
     parts = score.parts
     values = (score.value, parts["by_triangles"], parts["pixels_that_see_the_surface"])
-    bars = shares.bar(names, [100 * value for value in values], color=DOT)
+    bars = shares.bar(names, [100 * value for value in values], color=BLUE)
     shares.bar_label(bars, fmt="%.1f %%", padding=2)
     shares.set_ylim(0, 110)
     shares.set_ylabel("seen (%)")
@@ -238,13 +231,13 @@ def _map_and_histogram(
     The upper end of the scale is the 99th percentile, but at least `least`.
     """
     known = values[np.isfinite(values)]
-    figure = _figure(9, 4.2)
+    figure = new_figure(9, 4.2)
     picture, histogram = figure.subplots(1, 2, width_ratios=[2, 1])
     most = max(least, float(np.percentile(known, 99)))
     _map(figure, picture, values, label, low, most)
     weights = np.full(len(known), 100 / len(known))
     histogram.hist(np.clip(known, low, most), bins=50, range=(low, most), weights=weights)
-    histogram.axvline(score.value, color=LINE, lw=1.2)
+    histogram.axvline(score.value, color=RED, lw=1.2)
     histogram.set_xlabel(label)
     histogram.set_ylabel(counted)
     histogram.set_title(title, fontsize=10)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.design.section import cut
-from optisense.report.drawing import BLUE, GREY, PALE, RED, new_figure
+from optisense.figures import BLUE, GREY, PALE, RED, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

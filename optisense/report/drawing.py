@@ -17,16 +17,6 @@ if TYPE_CHECKING:
 DOTS_PER_INCH = 110
 """Resolution of figures, dots per inch, which makes them as wide as the page's text."""
 
-BLUE, RED, GREY, PALE, AMBER = "#1f6fb2", "#c0392b", "#7b8794", "#c6d4e1", "#d98c1f"
-"""Colours of trials, the best trial, the start, backgrounds, and failures."""
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Return an empty figure; sizes are in inches."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
 
 def legend_above(axes: Axes, columns: int = 2) -> None:
     """Draw a legend above a plot, where it covers nothing of it."""

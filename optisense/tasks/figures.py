@@ -8,33 +8,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
+from optisense.figures import BLUE, RED, new_figure
 from optisense.tasks._perception import PerceptionResult
 from optisense.tasks._reconstruction import ReconstructionResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DOT = "#1f6fb2"
-LINE = "#c0392b"
 WORST_ANGLE = 30.0
 """Error of a normal (degrees) at the end of the colour scale, larger than the mean error of a flat
 reading (about 20 degrees)."""
 
 
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 def draw_perception(result: PerceptionResult) -> Figure:
     """Draw predicted against true targets, each predicted by a forest that was not fitted to it."""
     targets, read = result.samples.targets, result.reading.predictions
-    figure = _figure(1.2 + 4.2 * targets.shape[1], 4.8)
+    figure = new_figure(1.2 + 4.2 * targets.shape[1], 4.8)
     for number, axes in enumerate(figure.subplots(1, targets.shape[1], squeeze=False)[0]):
         ends = [targets[:, number].min(), targets[:, number].max()]
-        axes.plot(ends, ends, color=LINE, lw=1)
-        axes.plot(targets[:, number], read[:, number], "o", ms=3, color=DOT, alpha=0.7)
+        axes.plot(ends, ends, color=RED, lw=1)
+        axes.plot(targets[:, number], read[:, number], "o", ms=3, color=BLUE, alpha=0.7)
         error = np.abs(read - targets)[:, number].mean()
         name = result.targets[number].replace("_", " ")
         axes.set_title(f"{name}: mean error {error:.2g} {result.unit}", fontsize=10)
@@ -58,7 +51,7 @@ def draw_reconstruction(result: ReconstructionResult, axes: FloatArray) -> Figur
     """
     rows = len(result.objects)
     titles = ("picture", "true normals", "read normals", "normal error (°)")
-    figure = _figure(16, 2.15 * rows + 0.6)
+    figure = new_figure(16, 2.15 * rows + 0.6)
     grid = figure.subplots(rows, 6, squeeze=False)
     for line, (name, each) in zip(grid, result.objects.items(), strict=True):
         deepest = float(np.nanmax(each.true_depth[each.mask]))
