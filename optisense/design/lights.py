@@ -13,7 +13,8 @@ from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector, is_left_out
 
 MOST_LIGHTS = 10_000
-"""Largest number of lights of one group; the built-in sensors have at most some dozens."""
+"""Largest number of lights of one group; the built-in sensors have at most some dozens, and a pitch
+in metres would give more."""
 
 
 class Light(Model):

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from optisense.errors import RenderError
 from optisense.optics.ledger import cells_in_view
 from optisense.optics.scene.surface_cells import surface_samples
+from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photons import TargetCells
 from optisense.optics.transport.place_light import (
-    BATCHES,
     TILT_BINS,
     TURN_BINS,
     Disc,

@@ -105,6 +105,15 @@ def box_around(where: NDArray[np.bool_], margin: int) -> tuple[slice, slice]:
     )
 
 
+def averaged_twice(image: NDArray[np.floating], side: int) -> NDArray[np.floating]:
+    """Return an image (h, w) averaged twice over a square of an odd side (pixels); it is 0 beyond
+    its edges.
+    """
+    for _ in range(2):
+        image = ndimage.uniform_filter(image, side, mode="constant")
+    return image
+
+
 def average_pixels(
     layers: NDArray[np.float32],
     samples: NDArray[np.float32],
@@ -122,19 +131,15 @@ def average_pixels(
     part = box_around(where, reach // 2)
     where = where[part]
 
-    def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
-        for _ in range(2):
-            image = ndimage.uniform_filter(image, reach, mode="constant")
-        return image
-
     counts = samples[part] * where
-    near = around(counts)
+    near = averaged_twice(counts, reach)
     share = np.divide(1, near, out=np.zeros_like(near), where=where & (near > 0))
     for layer in layers:
         for k in range(3):
             values = layer[*part, k]
             if values.any():
-                mean = around(values * counts) * share
+                mean = averaged_twice(values * counts, reach) * share
                 if deblurred:
-                    mean = np.maximum(2 * mean - around(mean * counts) * share, 0)
+                    again = averaged_twice(mean * counts, reach) * share
+                    mean = np.maximum(2 * mean - again, 0)
                 layer[*part, k] = np.where(where, mean, values)

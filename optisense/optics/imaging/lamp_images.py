@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging._film import Film, box_around, repeated
+from optisense.optics.imaging._film import Film, averaged_twice, box_around, repeated
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.transport.camera_paths import film_samples, find_visible_points
@@ -163,17 +163,12 @@ def _spread(
 ) -> NDArray[np.float32]:
     """Return layers as `without_specks` does, with a kernel of two squares of a side (pixels)."""
 
-    def around(image: NDArray[np.floating]) -> NDArray[np.floating]:
-        for _ in range(2):
-            image = ndimage.uniform_filter(image, side, mode="constant")
-        return image
-
     # With these factors (h, w) on both sides of the kernel, its sum is 1 for the light that leaves
     # a pixel, and nearly so for the light that arrives: even light stays even at an edge.
     arriving = leaving = region.astype(np.float64)
     for _ in range(BALANCING_STEPS):
         arriving = np.sqrt(arriving * leaving)
-        near = around(arriving)
+        near = averaged_twice(arriving, side)
         leaving = np.divide(1.0, near, out=np.zeros_like(near), where=region)
     spread = np.zeros_like(layers)
     for layer, found in zip(layers, spread, strict=True):
@@ -188,7 +183,8 @@ def _spread(
             found[...] = layer
             continue
         for k in range(3):
-            found[..., k] = around(lone[..., k].astype(np.float64) * leaving) * arriving
+            light = lone[..., k].astype(np.float64) * leaving
+            found[..., k] = averaged_twice(light, side) * arriving
         if layer.min() >= 0:
             np.maximum(found, 0.0, out=found)  # rounding gives -1e-17
         found += layer * kept

@@ -22,16 +22,13 @@ from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
 from optisense.optics.transport.interact import LobeSample, RayKind, interact
+from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photon_map import GROUP_MASK
 from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, Flight, TargetCells, launch
 
 TILT_BINS, TURN_BINS = 9, 12
 """Numbers of bins of the angle of incidence (10 degrees each) and of azimuth (30 degrees each), as
 fine as a chart of directions shows them."""
-
-BATCHES = 16
-"""Number of independent parts of the photons, whose standard deviation gives the noise. With 16,
-the estimate of the noise is itself known to 18 % (1 / sqrt(2 * 15))."""
 
 
 class LightWay(IntEnum):

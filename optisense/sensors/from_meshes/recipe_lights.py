@@ -9,12 +9,10 @@ from pydantic import ConfigDict, Field, PlainValidator, model_validator
 from optisense.design import Light
 from optisense.design.colour import NAMED_COLOURS
 from optisense.design.fields import Count, Model, Name, NonNegative, Number, Positive, Vector
+from optisense.design.lights import MOST_LIGHTS
 from optisense.near import suggestion
 from optisense.sensors.from_meshes.directions import Direction, Side, Way, or_words
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference, Turn, Units
-
-MOST_LIGHTS = 10_000
-"""Largest number of lights in a group; a larger one is an error, for example a pitch in metres."""
 
 Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
 
