@@ -35,8 +35,9 @@ more than a sensor is simulated with; the largest mesh of the built-in sensors h
 MOST_STEP = 64 * MEBIBYTE
 """Largest size of a STEP file, bytes: the CAD models of sensors have up to some 20 MiB."""
 
-MOST_IES = 16 * MEBIBYTE
-"""Largest size of an IES file, bytes: a lamp that was measured at every half degree has 2 MiB."""
+MOST_DATA = 16 * MEBIBYTE
+"""Largest size of a file of measured values that a kind of emitter, material or camera names,
+bytes: the IES file of a lamp that was measured at every half degree has 2 MiB."""
 
 MOST_TEXT = 16 * MEBIBYTE
 """Largest size of a YAML file, bytes: a design whose cages have 8000 control points has 1 MiB."""

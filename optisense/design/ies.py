@@ -14,7 +14,7 @@ import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.errors import LibraryError
-from optisense.untrusted_files import MOST_IES, read_bytes
+from optisense.untrusted_files import MOST_DATA, read_bytes
 
 MAX_VALUES = 1_200_000
 """Largest number of candela values of one IES file. A table of one value per quarter degree over
@@ -65,7 +65,7 @@ def read_ies(path: str | Path) -> IesProfile:
             message names the line.
     """
     path = Path(path)
-    data = read_bytes(path, MOST_IES, LibraryError, "the IES file")
+    data = read_bytes(path, MOST_DATA, LibraryError, "the IES file")
     return parse_ies(data.decode("latin-1"), str(path))
 
 

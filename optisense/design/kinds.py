@@ -14,7 +14,7 @@ from optisense.design.fields import IN_FOLDER, Model
 from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
 from optisense.text import brief
-from optisense.untrusted_files import MOST_IES, inside, read_bytes
+from optisense.untrusted_files import MOST_DATA, inside, read_bytes
 
 
 class KindModel(Model):
@@ -139,7 +139,7 @@ class KindModel(Model):
             LibraryError: a file can't be read.
         """
         return {
-            file: read_bytes(self.path(field), MOST_IES, LibraryError)
+            file: read_bytes(self.path(field), MOST_DATA, LibraryError)
             for field, file in self.files().items()
         }
 

@@ -38,8 +38,6 @@ class Sphere(IndenterKind):
     """
 
     kind: ClassVar[str] = "sphere"
-    title: ClassVar[str] = "Sphere"
-    help: ClassVar[str] = "A ball."
     convex: ClassVar[bool] = True
 
     radius: float = quantity("mm", "The radius of the ball.", low=SMALLEST, high=LARGEST)
@@ -95,8 +93,6 @@ class Cylinder(IndenterKind):
     """
 
     kind: ClassVar[str] = "cylinder"
-    title: ClassVar[str] = "Cylinder"
-    help: ClassVar[str] = "A cylinder that lies on its side."
     convex: ClassVar[bool] = True
 
     radius: float = quantity("mm", "The radius of the cylinder.", low=SMALLEST, high=LARGEST)
@@ -142,8 +138,6 @@ class Plane(IndenterKind):
     """
 
     kind: ClassVar[str] = "plane"
-    title: ClassVar[str] = "Plane"
-    help: ClassVar[str] = "A square plate, flat or tilted."
     convex: ClassVar[bool] = True
 
     tilt_x: float = quantity("degrees", "The turn about the u axis.", 0.0, low=-89.9, high=89.9)
@@ -173,8 +167,6 @@ class MeshIndenter(IndenterKind):
     """
 
     kind: ClassVar[str] = "mesh"
-    title: ClassVar[str] = "Mesh"
-    help: ClassVar[str] = "A mesh file (OBJ, STL, PLY); its lowest point touches first."
 
     source: TriangleMesh | str | Path
     scale: float = quantity("", "The factor from the file's unit to mm.", 1.0, low=ABOVE_ZERO)

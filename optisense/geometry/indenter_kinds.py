@@ -2,9 +2,9 @@
 the studio.
 
 A kind is one class. Its numbers are the fields of a dataclass, each made by `quantity`, which holds
-their units, limits and help; from them follow the text form (`cylinder:2,10`), the form of requests
-(`{"kind": "cylinder", "radius": 2}`) and the controls of front ends. The kinds of this package are
-in `optisense/geometry/_indenters.py`; docs/extending.md adds one.
+their units, limits and help; from them follow the text form (`cylinder:2,10`) and the form of
+requests (`{"kind": "cylinder", "radius": 2}`). The kinds of this package are in `_indenters.py` and
+`objects/_catalogue.py` of this folder; docs/extending.md adds one.
 """
 
 from __future__ import annotations
@@ -116,14 +116,10 @@ class IndenterKind(ABC):
 
     Attributes:
         kind: the name in text and requests, in lower case.
-        title: display name.
-        help: description, one sentence.
         convex: whether it is convex, so that no part of its surface can shade another.
     """
 
     kind: ClassVar[str]
-    title: ClassVar[str]
-    help: ClassVar[str]
     convex: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -163,9 +159,10 @@ class IndenterKind(ABC):
         except ValueError:
             values = [math.nan] * (len(fields) + 1)
         if not needed <= len(values) <= len(fields):
-            form = ",".join(
-                each.name if each.default is MISSING else f"[{each.name}]" for each in fields
-            )
+            names = [each.name.upper() for each in fields]
+            form = ",".join(names[:needed]) + "".join(f"[,{name}]" for name in names[needed:])
+            if not needed:
+                form = form.replace(",", "", 1)
             raise ContactError(
                 f"a {cls.kind} can't be read from '{text}'", hint=f"Write {cls.kind}:{form}"
             )

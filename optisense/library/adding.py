@@ -22,7 +22,7 @@ from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
 from optisense.library.reading import KINDS, Kind, files_of, kind_of, make_entry, read_entry
 from optisense.library.tuning import DAYLIGHT, read_tuning
 from optisense.near import suggestion
-from optisense.untrusted_files import MOST_IES, read_bytes
+from optisense.untrusted_files import MOST_DATA, read_bytes
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
@@ -117,7 +117,7 @@ def add_ies(
     file = Path(file)
     name = file.stem if name is None else name
     check_new_name(name)
-    data = read_bytes(file, MOST_IES, LibraryError, "the IES file")
+    data = read_bytes(file, MOST_DATA, LibraryError, "the IES file")
     parse_ies(data.decode("latin-1"), str(file))
     if source is None:
         source = Source(status=Status.ASSUMED, source="given when the light was added")

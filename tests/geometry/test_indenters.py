@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from optisense.errors import ContactError
-from optisense.geometry import Cylinder, Indenter, MeshIndenter, Plane, Sphere, TriangleMesh
+from optisense.geometry import (
+    Cylinder,
+    Indenter,
+    MeshIndenter,
+    Plane,
+    Sphere,
+    TriangleMesh,
+    parse_contact,
+)
 
 
 def dense_points(mesh: TriangleMesh) -> np.ndarray:
@@ -92,3 +100,17 @@ def test_a_radius_must_be_a_length(radius: float) -> None:
         Sphere(radius)
     with pytest.raises(ContactError, match="radius"):
         Cylinder(radius)
+
+
+@pytest.mark.parametrize(
+    ("text", "form"),
+    [
+        ("sphere:", "sphere:RADIUS"),
+        ("cylinder:1,2,3,4", "cylinder:RADIUS[,LENGTH][,ANGLE]"),
+        ("plane:1,2,3,4", "plane:[TILT_X][,TILT_Y][,SIZE]"),
+    ],
+)
+def test_a_text_of_too_few_or_many_numbers_is_shown_its_form(text: str, form: str) -> None:
+    with pytest.raises(ContactError) as raised:
+        parse_contact(f"{text}@0,0:0.5")
+    assert raised.value.hint == f"Write {form}"

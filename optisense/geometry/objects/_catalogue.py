@@ -195,8 +195,6 @@ class ObjectIndenter(IndenterKind):
     """
 
     kind: ClassVar[str] = "object"
-    title: ClassVar[str] = "Object"
-    help: ClassVar[str] = "A known thing: " + ", ".join(OBJECTS) + "."
 
     name: str
     scale: float = quantity("", "The factor on the object's real size.", 1.0, low=0.01, high=100.0)
