@@ -291,10 +291,11 @@ def sections(before: SensorDesign, after: SensorDesign) -> Figure:
             axes.plot(*spots.T, "o", ms=4, mfc=found.colours[name], mec=colour, mew=1.0)
         axes.plot(*found.camera, "s", ms=6, color=colour)
         axes.plot([], [], color=colour, ls=style, label=label)
-    axes.set_aspect("equal")
+    # Axes of a fixed shape would be moved after the layout has made room for the labels.
+    axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("mm")
     axes.set_ylabel("mm, along the camera's view")
-    axes.legend(fontsize=9, loc="upper left", bbox_to_anchor=(1.01, 1.0))
+    legend_above(axes)
     return figure
 
 

@@ -17,6 +17,7 @@ from optisense.report import _study_figures as study_figures
 from optisense.report._balls import Ball
 from optisense.report._cage_changes import cage_changes
 from optisense.report.before_after import DesignView, RayFigures
+from optisense.report.drawing import figure_uri
 from optisense.report.study import render_study, write_study_report
 from optisense.search import Around, CagePoints, SearchResult, Study, search
 
@@ -129,6 +130,16 @@ def test_columns_that_an_interruption_leaves_empty_are_left_out(tmp_path: Path) 
     assert "was interrupted before it scored the best trials with fresh seeds" in text
     done = render_study(search(mini, space, opposite, method="random", budget=3).study)
     assert "after, fresh seeds</th>" in done
+
+
+def test_the_sections_of_two_designs_are_drawn_whole() -> None:
+    """Labels and legend lie in the picture."""
+    design = ots.load("digit")
+    figure = study_figures.sections(design, design)
+    figure_uri(figure)  # draws it once
+    drawn = figure.get_tightbbox()
+    assert drawn.min.min() >= 0.0
+    assert (drawn.max <= figure.get_size_inches()).all()
 
 
 def test_a_moved_cage_is_drawn_and_not_listed_number_by_number() -> None:
