@@ -143,8 +143,12 @@ def _print(found: Tolerance) -> None:
             f"± {each.noise:.2g}" if each.noise > 0.0 else "",
         )
     output.print(table)
+    output.print(f"{found.sensors} sensors were scored")
     for name, each in found.results.items():
-        _print_shares(name, each)
+        if each.deviation != 0.0:
+            _print_shares(name, each)
+        if each.caveat:
+            output.print(f"{name}: {each.caveat}")
     for reason, count in sorted(found.failures.items(), key=lambda item: -item[1]):
         output.print(f"{count} of {found.sensors} sensors fail: {reason}")
 

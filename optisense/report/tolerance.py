@@ -67,9 +67,10 @@ def spread_figure(name: str, found: ScoreDistribution) -> Figure:
         right.barh(names, values, color=BLUE, alpha=0.7)
         reach = np.maximum(np.nan_to_num(ends), 0.0).T
         right.errorbar(values, names, xerr=reach, fmt="none", ecolor="#333", capsize=3, lw=1)
-    noise = noise_share(found)
-    if noise > 0.0:
-        right.axvline(noise, color=GREY, ls=":", lw=1.4, label="noise of the image alone")
+    if found.noise_share > 0.0:
+        right.axvline(
+            found.noise_share, color=GREY, ls=":", lw=1.4, label="noise of the image alone"
+        )
         legend_above(right)
     right.invert_yaxis()
     right.set_xlim(left=0.0)
@@ -84,13 +85,6 @@ def shown_size(path: str, size: float) -> str:
     return f"{size:g}{unit}" if unit == "°" else f"{size:g} {unit}".rstrip()
 
 
-def noise_share(found: ScoreDistribution) -> float:
-    """Return the share of the variance that is due to the noise of the image; at most 1."""
-    if not (found.noise > 0.0 and found.deviation > 0.0):
-        return 0.0
-    return min(1.0, (found.noise / found.deviation) ** 2)
-
-
 def _objective(name: str, found: ScoreDistribution) -> dict[str, Any]:
     return {
         "name": name,
@@ -100,7 +94,8 @@ def _objective(name: str, found: ScoreDistribution) -> dict[str, Any]:
         "figure": figure_uri(spread_figure(name, found)),
         "percentiles": [(key.upper(), *_cells(each)) for key, each in found.percentiles.items()],
         "shares": _shares(found.shares),
-        "noise_share": f"{noise_share(found):.2f}" if noise_share(found) > 0.0 else "",
+        "noise_share": f"{found.noise_share:.2f}" if found.noise_share > 0.0 else "",
+        "caveat": found.caveat,
     }
 
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.cli import app
 from optisense.design import SensorDesign, set_value
-from optisense.report.tolerance import noise_share, render_tolerance, shown_size, spread_figure
+from optisense.report.tolerance import render_tolerance, shown_size, spread_figure
 from optisense.search import ToleranceDistribution
 from optisense.search.tolerance.analysis import Tolerance, tolerance
 
@@ -60,7 +60,8 @@ def test_failures_are_told_as_text(found: Tolerance) -> None:
 def test_without_noise_none_is_spoken_of(found: Tolerance) -> None:
     """A function of the design gives the same for all seeds."""
     assert found.results["score"].noise == 0.0
-    assert noise_share(found.results["score"]) == 0.0
+    assert found.results["score"].noise_share == 0.0
+    assert found.results["score"].caveat == ""
     assert "noise" not in render_tolerance(found)
 
 

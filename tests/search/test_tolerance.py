@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -271,3 +272,19 @@ def test_shares_stay_below_1_and_tell_their_standard_error() -> None:
     assert 10 <= above <= 30
     told, true = np.mean([each[0] for each in errors]), np.std([each[1] for each in errors])
     assert told == pytest.approx(true, rel=0.5)
+
+
+def test_errors_that_change_nothing_have_no_share(grey: SensorDesign) -> None:
+    result = tolerance(grey, lambda design: 1.0, {"coating.reflectance.r": 0.1}, sensors=8)
+    (found,) = result.results.values()
+    assert found.deviation == 0.0
+    assert [share and share.value for share in found.shares.values()] == [0.0]
+    assert found.caveat == "the score does not depend on these errors"
+
+
+def test_shares_of_mostly_noise_are_said_to_tell_nothing(result: Tolerance) -> None:
+    found = next(iter(result.results.values()))
+    assert found.caveat == ""
+    noisy = replace(found, noise=0.6 * found.deviation)
+    assert noisy.noise_share == pytest.approx(0.36)
+    assert "36 % of the variance is noise" in noisy.caveat

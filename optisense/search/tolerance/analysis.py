@@ -46,6 +46,10 @@ NOISE_SEEDS = 3
 OWN_SCORES = 1 + NOISE_SEEDS
 """Number of scores of the nominal design, which come before those of manufactured sensors."""
 
+MOST_NOISE_SHARE = 0.25
+"""Share of the noise in the variance above which the shares of errors count as unknown: noise of
+half the standard deviation adds as much to each share, whatever the error does."""
+
 PERCENTILES = {"p10": LOW, "p50": MIDDLE, "p90": HIGH}
 
 POSITION, ANGLE, SPECULARITY, CAGE_POINT, INDEX = 0.1, 2.0, 0.05, 0.05, 0.005
@@ -85,6 +89,25 @@ class ScoreDistribution:
         """Standard deviation of the scores, without failed sensors; NaN for less than two."""
         known = self.scores[np.isfinite(self.scores)]
         return deviation_of(known.ravel().tolist())
+
+    @property
+    def noise_share(self) -> float:
+        """Share of the variance that is due to the noise of the image; at most 1."""
+        if not (self.noise > 0.0 and self.deviation > 0.0):
+            return 0.0
+        return min(1.0, (self.noise / self.deviation) ** 2)
+
+    @property
+    def caveat(self) -> str:
+        """Text that says why the shares tell nothing; empty if they do."""
+        if self.deviation == 0.0:
+            return "the score does not depend on these errors"
+        if self.noise_share > MOST_NOISE_SHARE:
+            return (
+                f"{100 * self.noise_share:.0f} % of the variance is noise of the image, so that "
+                "the shares do not tell which error matters: use more photons"
+            )
+        return ""
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,9 @@ def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
     """
     values = np.asarray(scores, dtype=np.float64)
     if values.shape[1] == 1:
-        return Estimate(1.0, 1.0, 1.0)
+        known = values[np.isfinite(values)]
+        whole = float((known != known[:1]).any())
+        return Estimate(whole, whole, whole)
     known = np.isfinite(values[:, 0]) & np.isfinite(values[:, 1 + source])
     if known.sum() < LEAST_PAIRS:
         return None
