@@ -17,6 +17,10 @@ MOST_CAUSES = 4
 report lists more.
 """
 
+CERTAINTY = 2.0
+"""Number of standard errors up to which a gain counts as noise: of designs that are no better, one
+in forty exceeds it."""
+
 MOST_VALUES = 12
 """Largest number of parameters of the best trial that are printed, so that the result fits on a
 screen; all are in the study.
@@ -74,7 +78,7 @@ def print_result(result: SearchResult, out: Path) -> None:
         return
     name = study.objective
     said = "best so far" if result.interrupted else "best"
-    output.print(f"{said}: trial {best.number}, {name} {_headline(best, start)}")
+    output.print(f"{said}: trial {best.number}, {name} {headline(best, start)}")
     if best.unbiased_score != best.score:
         by = "its coarse score" if study.settings.coarse_first else "the search's own seed"
         output.print(f"  {best.score:.4g} by {by}, which selected it")
@@ -92,7 +96,8 @@ def print_result(result: SearchResult, out: Path) -> None:
     if _several(result):
         _print_front(result)
     if best.is_start:
-        output.print("no trial is better than the start")
+        by = f" by {name}, the first objective" if _several(result) else ""
+        output.print(f"no trial is better than the start{by}")
     elif not result.interrupted:
         output.print(f"Apply it:   optisense apply {out} --trial best --out better", style="dim")
         output.print(f"Verify it:  optisense verify {out}", style="dim")
@@ -112,16 +117,31 @@ def _print_nearest(trials: Sequence[Trial]) -> None:
         output.print(f"  {line}")
 
 
-def _headline(best: Trial, start: Trial | None) -> str:
+def headline(best: Trial, start: Trial | None) -> str:
     """Return the best score and the start's, by fresh seeds if they were scored."""
-    text = f"{best.unbiased_score:.4g}"
+    text = f"{best.unbiased_score:.4g}{_spread(best)}"
     if best.unbiased_score != best.score:
-        spread = best.fresh_spread()
-        text += f" ± {spread:.2g}" if math.isfinite(spread) else ""
         text += " with fresh seeds"
     if start is not None and math.isfinite(start.unbiased_score):
-        text += f" (start {start.unbiased_score:.4g})"
+        text += f" (start {start.unbiased_score:.4g}{_spread(start)})"
+        if not best.is_start and _is_noise(best, start):
+            text += "; the gain is within the noise"
     return text
+
+
+def _spread(trial: Trial) -> str:
+    """Return the standard deviation of the score over fresh seeds; empty if it is unknown."""
+    spread = trial.fresh_spread()
+    return f" ± {spread:.2g}" if math.isfinite(spread) else ""
+
+
+def _is_noise(best: Trial, start: Trial) -> bool:
+    """Return whether the best score exceeds the start's by no more than `CERTAINTY` standard errors
+    of their means over fresh seeds.
+    """
+    errors = [each.fresh_spread() / len(each.fresh) ** 0.5 for each in (best, start) if each.fresh]
+    noise = math.hypot(*errors) if len(errors) == 2 else math.nan
+    return best.unbiased_score - start.unbiased_score <= CERTAINTY * noise
 
 
 def _failures(failed: Sequence[Trial]) -> str:

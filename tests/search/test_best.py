@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
 import pytest
 
+from optisense.cli.search_result import headline
 from optisense.design import SensorDesign
 from optisense.search import SearchResult, search
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.search.study.best import best_of, distance, tie_note, tied
+from optisense.search.study.study import front_among
 from optisense.search.study.trial import Trial
 
 
@@ -67,6 +70,28 @@ def test_the_start_wins_ties(space: BoundSpace) -> None:
     assert "does not depend on the parameters" in str(tie_note(trials[:4]))
 
 
+def test_scores_that_differ_by_rounding_are_equal(space: BoundSpace) -> None:
+    """Dimming all lights alike changes a score of 0.97 by some 1e-9."""
+    trials = [trial(space, 0, [0.0, 0.0, 0], 0.97333448846)]
+    trials += [trial(space, k, [0.1 * k, 0.0, 0], 0.97333448846 + 3e-8 * k) for k in range(1, 4)]
+    best = best_of(trials)
+    assert best is not None and best.is_start
+    assert len(tied(trials)) == 4
+    trials.append(trial(space, 4, [0.9, 0.0, 0], 0.97334))
+    best = best_of(trials)
+    assert best is not None and best.number == 4
+    assert tie_note(trials) is None
+
+
+def test_rounding_puts_no_trial_on_the_front(space: BoundSpace) -> None:
+    scores = [(1.0, 0.2785), (0.9, 0.27850001), (0.8, 0.3)]
+    trials = [
+        Trial(k, 0, np.array([0.1 * k, 0.0, 0]), Outcome({"s": a, "t": b}), space, "s")
+        for k, (a, b) in enumerate(scores, 1)
+    ]
+    assert [each.number for each in front_among(trials, ["s", "t"])] == [1, 3]
+
+
 def test_one_best_trial_is_no_tie(space: BoundSpace) -> None:
     trials = [trial(space, k, [0.1 * k, 0.0, 0], float(k)) for k in range(4)]
     assert tie_note(trials) is None
@@ -85,3 +110,16 @@ def test_a_search_tells_its_ties_the_same_way_each_time(mini: SensorDesign) -> N
     assert first.best.values == second.best.values == {"coating.specularity": 0.5}
     assert first.notes == second.notes
     assert json.dumps(first.notes).count("6 trials share the best score") == 1
+
+
+def test_a_gain_within_the_noise_is_told(space: BoundSpace) -> None:
+    def scored(number: int, scores: list[float]) -> Trial:
+        fresh = {seed: Outcome({"s": score}) for seed, score in enumerate(scores)}
+        return replace(trial(space, number, [0.1 * number, 0.0, 0], 2.0), fresh=fresh)
+
+    start, best = scored(0, [0.97, 0.98, 0.99]), scored(1, [0.975, 0.985, 0.995])
+    assert headline(best, start) == (
+        "0.985 ± 0.01 with fresh seeds (start 0.98 ± 0.01); the gain is within the noise"
+    )
+    best = scored(1, [1.075, 1.085, 1.095])
+    assert headline(best, start) == "1.085 ± 0.01 with fresh seeds (start 0.98 ± 0.01)"

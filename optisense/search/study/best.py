@@ -4,10 +4,10 @@ A trial that breaks a condition of the study is never the best. If trials were s
 fresh seeds, the means over these decide whether it breaks one.
 
 The best trial has the highest score by fresh seeds if some trials were scored so, else the highest
-score by the study's seed. Of trials with equal scores the one nearest to the start is the best,
-since it changes least, and of equally near ones the one that was proposed first. So the start
-itself wins every tie, and the same trials always have the same best one, in whatever order workers
-finished.
+score by the study's seed. Scores that differ by rounding alone (`EQUAL`) are equal. Of trials with
+equal scores the one nearest to the start is the best, since it changes least, and of equally near
+ones the one that was proposed first. So the start itself wins every tie, and the same trials always
+have the same best one, in whatever order workers finished.
 """
 
 from __future__ import annotations
@@ -16,9 +16,28 @@ import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from optisense.search.space.parameters import Choice
 from optisense.search.study.trial import Trial
+
+EQUAL = 1e-6
+"""Relative difference of scores up to which they count as equal. Pictures are computed in single
+precision, so that dimming all lights alike changes a score by up to 1e-7; no two sensors differ
+noticeably by a millionth of a score."""
+
+
+def without_rounding(scores: ArrayLike) -> NDArray[np.float64]:
+    """Return scores (k,) of which those that differ by rounding alone (`EQUAL`) are the same: the
+    highest of them.
+    """
+    found = np.array(scores, dtype=np.float64)
+    highest = np.nan
+    for number in np.argsort(-found):
+        if not found[number] >= highest - EQUAL * abs(highest):
+            highest = found[number]
+        found[number] = highest
+    return found
 
 
 def distance(trial: Trial) -> float:
@@ -36,7 +55,11 @@ def distance(trial: Trial) -> float:
 def ranked(trials: Iterable[Trial]) -> list[Trial]:
     """Return the trials scored by the study's seed that break no condition, the best first."""
     fine = [trial for trial in trials if math.isfinite(trial.score) and trial.is_feasible]
-    return sorted(fine, key=lambda trial: (-trial.score, distance(trial), trial.number))
+    scores = without_rounding([trial.score for trial in fine]).tolist()
+    order = sorted(
+        zip(scores, fine, strict=True), key=lambda it: (-it[0], distance(it[1]), it[1].number)
+    )
+    return [trial for _, trial in order]
 
 
 def best_of(trials: Sequence[Trial]) -> Trial | None:
@@ -44,8 +67,8 @@ def best_of(trials: Sequence[Trial]) -> Trial | None:
     fine = ranked(trials)
     again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
     if again:
-        # `min` returns the first of equals, and `fine` is in the order of the rule.
-        return min(again, key=lambda trial: (-trial.fresh_score(), -trial.score))
+        # `argmax` returns the first of equals, and `fine` is in the order of the rule.
+        return again[int(without_rounding([trial.fresh_score() for trial in again]).argmax())]
     if any(trial.fresh for trial in trials):
         return None  # the rescored ones break conditions, and the others are not rescored
     return fine[0] if fine else None
@@ -69,13 +92,13 @@ def tied(trials: Sequence[Trial]) -> list[Trial]:
     best = best_of(trials)
     if best is None:
         return []
-    fresh = best.fresh_score()
+    fine = ranked(trials)
+    place = fine.index(best)
+    scores = without_rounding([trial.score for trial in fine])
+    fresh = without_rounding([trial.fresh_score() for trial in fine])
     points: dict[bytes, Trial] = {best.vector.tobytes(): best}
-    for trial in ranked(trials):
-        own = trial.fresh_score()
-        worse = math.isfinite(own) and math.isfinite(fresh) and own < fresh
-        if trial.score == best.score and not worse:
-            points.setdefault(trial.vector.tobytes(), trial)
+    for number in np.flatnonzero((scores == scores[place]) & ~(fresh < fresh[place])):
+        points.setdefault(fine[number].vector.tobytes(), fine[number])
     return list(points.values())
 
 

@@ -27,7 +27,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.methods.dominance import front as front_of
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.search_space import BoundSpace, SearchSpace
-from optisense.search.study.best import best_of, nearest
+from optisense.search.study.best import best_of, nearest, without_rounding
 from optisense.search.study.folder import (
     STORE_FILE,
     listed,
@@ -392,11 +392,12 @@ def _shown(name: str, *, rays_only: bool) -> tuple[str, ...]:
 def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:
     """Return the trials that no other one dominates, the best in the first objective first.
 
-    Trials that break a condition are left out.
+    Trials that break a condition are left out. Scores that differ by rounding alone are equal.
     """
     trials = [trial for trial in trials if trial.is_feasible]
     if not trials:
         return []
-    values = np.array([[trial.scores.get(name, np.nan) for name in names] for trial in trials])
+    scores = [[trial.scores.get(name, np.nan) for trial in trials] for name in names]
+    values = np.stack([without_rounding(each) for each in scores], axis=1)
     chosen = [trials[number] for number in front_of(values)]
     return sorted(chosen, key=lambda trial: -trial.score)

@@ -89,8 +89,8 @@ def total_effect(scores: ArrayLike, source: int) -> Estimate | None:
     """
     values = np.asarray(scores, dtype=np.float64)
     if values.shape[1] == 1:
-        known = values[np.isfinite(values)]
-        whole = float((known != known[:1]).any())
+        scored = values[np.isfinite(values)]
+        whole = float((scored != scored[:1]).any())
         return Estimate(whole, whole, whole)
     known = np.isfinite(values[:, 0]) & np.isfinite(values[:, 1 + source])
     if known.sum() < LEAST_PAIRS:
