@@ -15,6 +15,7 @@ from optisense.commands.options import (
     Photons,
     Resolution,
     Seed,
+    read_resolution,
 )
 from optisense.quality import LEVELS, photons_of
 
@@ -23,14 +24,19 @@ ScorePhotons = Annotated[
 ]
 
 
-def _with_photons(settings: dict[str, Any]) -> dict[str, Any]:
-    """Return the settings with the photons, if there are any, as a number."""
-    given = settings.get("photons")
-    return settings if given is None else {**settings, "photons": photons_of(given)}
+def _read(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings with photons as a number, and resolutions as width and height."""
+    found = dict(settings)
+    if found.get("photons") is not None:
+        found["photons"] = photons_of(found["photons"])
+    for name in ("resolution", "ray_resolution"):
+        if isinstance(found.get(name), str):
+            found[name] = list(read_resolution(found[name]))
+    return found
 
 
 ObjectiveSettings = Annotated[
-    NamedValues, AfterValidator(_with_photons), OptionNotation("NAME=VALUE", ("--set",))
+    NamedValues, AfterValidator(_read), OptionNotation("NAME=VALUE", ("--set",))
 ]
 
 
@@ -55,7 +61,7 @@ class ScoreOptions(CommandOptions):
         if self.photons is not None:
             found["photons"] = self.photons
         if self.resolution is not None:
-            found["resolution"] = found["ray_resolution"] = self.resolution
+            found["resolution"] = found["ray_resolution"] = list(self.resolution)
         return found
 
 

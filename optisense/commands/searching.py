@@ -9,20 +9,17 @@ from pydantic import Field
 
 from optisense.commands.options import (
     MOST_ITEMS,
-    CommandOptions,
     NamedValues,
     OptionNotation,
     Seed,
 )
-from optisense.commands.scoring import ObjectiveSettings, ScoreOptions
+from optisense.commands.scoring import ScoreOptions
 
 if TYPE_CHECKING:
     from optisense.search import Plan
 
-ScoreSettings = ScoreOptions.model_fields["settings"]
 
-
-class SearchOptions(CommandOptions):
+class SearchOptions(ScoreOptions):
     """Options of a search: parameters, objectives, method. None is the default of a new study."""
 
     vary: Annotated[list[str], OptionNotation("PATH=LO:HI[:N]")] = Field(
@@ -55,7 +52,6 @@ class SearchOptions(CommandOptions):
     seed: Annotated[Seed, OptionNotation("N", usual="0")] | None = Field(
         None, description="The same seed gives the same search."
     )
-    settings: ObjectiveSettings = Field({}, description=ScoreSettings.description)
     options: Annotated[NamedValues, OptionNotation("NAME=VALUE", ("--option",))] = Field(
         {},
         description="An option of the method, such as sigma=0.1 or population=20. May be given "
@@ -101,8 +97,9 @@ class SearchOptions(CommandOptions):
             rule.loaded  # noqa: B018  a missing file is an error now, and not in trials
         space = SearchSpace(parse_space(self.vary), rules)
         errors = parse_errors(self.errors) if self.errors else None
-        names = ("method", "options", "budget", "seed", "settings", "samples")
+        names = ("method", "options", "budget", "seed", "samples")
         given = {name: getattr(self, name) for name in names}
+        given["settings"] = self.for_objectives()
         return Plan(
             space=space,
             goals=self.objectives,
@@ -134,6 +131,7 @@ class SearchOptions(CommandOptions):
             "coarse_first": True if self.coarse_first else None,
             "requirements": [str(each) for each in requirements_of(self.require)],
         }
-        for name in ("method", "options", "seed", "settings", "samples"):
+        for name in ("method", "options", "seed", "samples"):
             found[name] = getattr(self, name)
+        found["settings"] = self.for_objectives()
         return {name: value for name, value in found.items() if value not in (None, {}, [])}

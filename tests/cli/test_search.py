@@ -71,6 +71,21 @@ def test_a_rule_that_is_not_there_is_told_before_the_first_trial(
         assert not (tmp_path / "study").exists()
 
 
+def test_sizes_and_photons_are_given_as_for_a_score(tmp_path: Path) -> None:
+    words = ("gelsight-mini-ideal", "--vary", "coating.specularity=0:1:2", "-b", "aoap")
+    out = tmp_path / "study"
+    result = run(*words, "--method", "grid", "--resolution", "40x30", "--photons", "draft",
+                 "--out", out)  # fmt: skip
+    assert result.exit_code == 0, result.output
+    settings = Study.open(out).settings.settings
+    assert settings == {"photons": 60_000, "resolution": [40, 30], "ray_resolution": [40, 30]}
+    again = run("--resume", "--out", out, "--set", "resolution=40x30",
+                "--set", "ray_resolution=40x30", "--photons", "draft")  # fmt: skip
+    assert again.exit_code == 0, again.output
+    other = run(*words, "--set", "resolution=40", "--out", tmp_path / "other")
+    assert other.exit_code != 0 and "resolution" in other.output
+
+
 def test_the_study_holds_all_trials(study: Path) -> None:
     opened = Study.open(study)
     assert len(opened.trials) == 12
