@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -10,6 +11,8 @@ from functools import partial
 
 import numpy as np
 
+from optisense.array_types import FloatArray
+from optisense.errors import SearchError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
@@ -153,7 +156,7 @@ class StudyRun:
         known = self.study.store.last_generation()
         generation = 0
         while True:
-            asked = self.method.ask()
+            asked = self._ask()
             rows = self.study.store.rows(generation) if generation <= known else []
             self._check_proposals(asked, rows)
             room = self.limit - self.study.store.proposed_before(generation)
@@ -171,6 +174,42 @@ class StudyRun:
             self.method.tell(np.array([row.vector for row in whole]), outcomes)
             generation = self._generations = generation + 1
             self._watch_reading()
+
+    def _ask(self) -> FloatArray:
+        """Return the next generation (k, n) of the method.
+
+        Coordinates that miss a bound or a whole number by rounding are moved onto it.
+
+        Raises:
+            SearchError: the method proposes anything but points of the space.
+        """
+        space, given, name = self.study.space, self.method.ask(), self.study.settings.method
+        hint = "The method must be repaired: its ask() must return points (k, n) of its space"
+        try:
+            asked = np.asarray(given, dtype=np.float64)
+            if asked.ndim and not len(asked):
+                return np.empty((0, space.size))
+            _, size = asked.shape
+            if size != space.size:
+                raise ValueError
+        except (TypeError, ValueError):  # no numbers, or not one point a row
+            told = (
+                f"an array {given.shape}" if isinstance(given, np.ndarray) else reprlib.repr(given)
+            )
+            message = f"the method {name} proposes {told} instead of points (k, {space.size})"
+            raise SearchError(message, hint=hint) from None
+        near = np.clip(np.where(space.discrete, np.round(asked), asked), space.lower, space.upper)
+        rounded = (near != asked) & (
+            np.abs(near - asked) <= SAME_POINT * (space.upper - space.lower)
+        )
+        points = np.where(rounded, near, asked)
+        for point in points:
+            try:
+                space.check(point)
+            except SearchError as error:
+                message = f"the method {name} proposes a point outside the space: {error.message}"
+                raise SearchError(message, where=error.where, hint=hint) from None
+        return points
 
     def _watch_reading(self, *, last: bool = False) -> None:
         """Read the best design so far, unless the method looks for a front."""
