@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any, overload
 from optisense.design import SensorDesign
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import ObjectiveError
+from optisense.keyword_types import as_type
 from optisense.near import suggestion
 from optisense.objectives.combined import resolve
 from optisense.objectives.evaluation import Evaluation, ProgressCallback
 from optisense.objectives.registry import Objective, pixels_read
 from optisense.objectives.score import Score
 from optisense.objectives.scoring import run_objective
-from optisense.objectives.settings import Settings, is_number
+from optisense.objectives.settings import Settings
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -93,7 +94,8 @@ def split_settings(
     """Divide settings into those of images and rays, and those of each objective, by objective.
 
     Raises:
-        ObjectiveError: a setting is unknown; the message names a near match.
+        ObjectiveError: a setting is unknown (the message names a near match), or has another type
+            than its default.
     """
     known = {field.name for field in fields(Settings)}
     wanted = list(objectives)
@@ -109,24 +111,13 @@ def split_settings(
             raise ObjectiveError(f"there is no setting '{key}'", hint=hint)
     for each in wanted:
         for key, value in own[each.name].items():
-            _check_kind(key, value, each.settings[key])
+            try:
+                own[each.name][key] = as_type(value, (type(each.settings[key]),))
+            except ValueError as wanted:
+                raise ObjectiveError(
+                    f"the setting '{key}' is {value!r}", hint=f"Give {wanted}"
+                ) from None
     return shared, own
-
-
-def _check_kind(name: str, value: Any, default: Any) -> None:
-    """Check that a setting has the kind of its default: number, truth value or text."""
-    if isinstance(default, bool):
-        kind, fits = "true or false", isinstance(value, bool)
-    elif isinstance(default, int):
-        kind, fits = "a whole number", is_number(value) and value == int(value)
-    elif isinstance(default, float):
-        kind, fits = "a number", is_number(value)
-    elif isinstance(default, str):
-        kind, fits = "a word", isinstance(value, str)
-    else:
-        return
-    if not fits:
-        raise ObjectiveError(f"the setting '{name}' is {value!r}", hint=f"Give {kind}")
 
 
 def _model(sensor: OpticalModel | SensorDesign) -> OpticalModel:

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from optisense.design.camera_checks import LEAST_PICTURE, LEAST_SKIN
 from optisense.errors import ObjectiveError
+from optisense.keyword_types import is_number
 from optisense.mechanics.skins import CONFORMING, SKINS
 from optisense.quality import LEVELS, MOST_PHOTONS, photons_of
 
@@ -110,11 +111,6 @@ class Settings:
             )
         if self.places is not None:
             object.__setattr__(self, "places", _pairs(self.places))
-
-
-def is_number(value: Any) -> bool:
-    """Return whether a value is a finite real number, and not a truth value."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def refuse_outside(

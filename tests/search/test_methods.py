@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import Method, Problem, find, make, names, register
+from optisense.search.methods._registry import METHODS
 from optisense.search.methods.base import values_to_maximise
 from optisense.search.methods.dominance import front
 from optisense.search.space.search_space import BoundSpace, SearchSpace
@@ -249,8 +251,76 @@ def test_bad_names_and_options_are_told(two_numbers: BoundSpace) -> None:
     assert "sigma" in str(told.value)
     with pytest.raises(SearchError, match="sigma is 2"):
         make("cma-es", problem, {"sigma": 2})
-    with pytest.raises(SearchError, match="wrong type"):
-        make("cma-es", problem, {"sigma": "wide"})
+
+
+@pytest.mark.parametrize(
+    ("method", "option", "value", "wanted"),
+    [
+        ("cma-es", "sigma", "abc", "a number"),
+        ("cma-es", "population", 3.5, "a whole number"),
+        ("cma-es", "population", "many", "a whole number"),
+        ("cma-es", "restarts", True, "a whole number"),
+        ("gradient", "starts", 2.5, "a whole number"),
+        ("gradient", "memory", None, "a whole number"),
+    ],
+)
+def test_an_option_of_another_type_is_named(
+    two_numbers: BoundSpace, method: str, option: str, value: object, wanted: str
+) -> None:
+    with pytest.raises(SearchError) as told:
+        make(method, Problem(two_numbers, ("s",), 100), {option: value})
+    assert told.value.message == f"the option '{option}' of {method} is {value!r}"
+    assert told.value.hint == f"Give {wanted}"
+
+
+def test_a_whole_number_may_be_written_with_a_point(two_numbers: BoundSpace) -> None:
+    points = make("cma-es", Problem(two_numbers, ("s",), 100), {"population": 6.0}).ask()
+    assert points.shape == (6, 2)
+    make("cma-es", Problem(two_numbers, ("s",), 100), {"population": None, "sigma": 1})
+
+
+class Choosy(Method):
+    """A method with options that may be a word or a number, or that have no type."""
+
+    name = "choosy"
+    summary = "a test"
+
+    def __init__(self, problem: Problem, step: float | str = "auto", count: Any = None) -> None:
+        super().__init__(problem)
+        self.step, self.count = step, 4 if count is None else int(count)
+
+    def ask(self) -> FloatArray:
+        return np.empty((0, self.space.size))
+
+    def tell(self, vectors: FloatArray, outcomes: object) -> None:
+        pass
+
+
+class Broken(Choosy):
+    """A method whose constructor fails."""
+
+    name = "broken"
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem, count=[])
+
+
+def test_errors_in_a_constructor_are_told(two_numbers: BoundSpace) -> None:
+    problem = Problem(two_numbers, ("s",), 100)
+    with METHODS.forgetting():
+        register(Choosy)
+        register(Broken)
+        for step in (0.5, 2, "auto"):
+            assert make("choosy", problem, {"step": step}).step == step  # type: ignore[attr-defined]
+        with pytest.raises(SearchError, match=r"is True\. Give a number or a word"):
+            make("choosy", problem, {"step": True})
+        for count in ("x", []):
+            with pytest.raises(SearchError, match="option of choosy has the wrong type") as told:
+                make("choosy", problem, {"count": count})
+            assert told.value.hint == f"Check count={count}"
+        with pytest.raises(SearchError, match="broken can't be set up: TypeError") as told:
+            make("broken", problem)
+    assert f"{__file__}:" in str(told.value.where)
 
 
 def test_other_packages_bring_methods(two_numbers: BoundSpace) -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import inspect
 from typing import Any
 
-from optisense.errors import SearchError
+from optisense.errors import OptiSenseError, SearchError
+from optisense.keyword_types import as_type, types_of
 from optisense.near import suggestion
+from optisense.objectives.files import place_of
 from optisense.registry import Registry
 from optisense.search.methods.base import Method, Problem
 
@@ -41,15 +43,50 @@ def make(name: str, problem: Problem, options: dict[str, Any] | None = None) -> 
     """Return an instance of a method for a problem.
 
     Raises:
-        SearchError: the name or an option is unknown, or the problem does not fit the method.
+        SearchError: the name or an option is unknown, an option has the wrong type, the problem
+            does not fit the method, or the constructor of another package's method fails.
     """
     kind = find(name)
-    known = list(inspect.signature(kind.__init__).parameters)[2:]
-    for key in options or {}:
+    given = _typed_options(name, kind, options or {})
+    try:
+        return kind(problem, **given)
+    except OptiSenseError:
+        raise
+    except Exception as error:
+        if given and isinstance(error, TypeError | ValueError):
+            raise SearchError(
+                f"an option of {name} has the wrong type or value: {error}",
+                hint="Check " + ", ".join(f"{key}={value}" for key, value in given.items()),
+            ) from error
+        if kind.name in METHODS.built_in:
+            raise
+        raise SearchError(
+            f"the method {name} can't be set up: {type(error).__name__}: {error}",
+            where=place_of(error),
+            hint="The method must be repaired",
+        ) from error
+
+
+def _typed_options(name: str, kind: type[Method], options: dict[str, Any]) -> dict[str, Any]:
+    """Return options of a method in the types of its constructor's arguments.
+
+    Raises:
+        SearchError: an option is unknown, or has another type.
+    """
+    try:
+        signature = inspect.signature(kind.__init__, eval_str=True)
+    except Exception:  # a name of an annotation may be known to type checkers only
+        signature = inspect.signature(kind.__init__)
+    known = dict(list(signature.parameters.items())[2:])
+    given = {}
+    for key, value in options.items():
         if key not in known:
             hint = suggestion(key, known) or f"{name} takes no options"
             raise SearchError(f"{name} has no option '{key}'", hint=hint)
-    try:
-        return kind(problem, **(options or {}))
-    except TypeError as error:
-        raise SearchError(f"an option of {name} has the wrong type: {error}") from error
+        try:
+            given[key] = as_type(value, types_of(known[key]))
+        except ValueError as wanted:
+            raise SearchError(
+                f"the option '{key}' of {name} is {value!r}", hint=f"Give {wanted}"
+            ) from None
+    return given

@@ -119,8 +119,8 @@ class Gradient(Method):
             )
         if starts < 1:
             raise SearchError(f"there are {starts} starts", hint="Give 1 or more")
-        self.resolution, self.memory = int(resolution), int(memory)
-        self._starts = _starts(problem, int(starts))
+        self.resolution, self.memory = resolution, memory
+        self._starts = _starts(problem, starts)
         self.source = source_of(problem)
         self.parts = moving_parts(problem.space) if self.source is GradientSource.RAYS else []
         self._differences = TrialDifferences(problem, self.requirements)

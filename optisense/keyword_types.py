@@ -1,0 +1,50 @@
+"""Types of keyword arguments that users set by name: settings of objectives, options of methods."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Sequence
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin
+
+WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "a word"}
+"""What a user is asked to give for an argument of each type."""
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a finite real number, and not a truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def types_of(argument: inspect.Parameter) -> tuple[Any, ...]:
+    """Return the types of an argument: those of its annotation, or that of its default if it has no
+    annotation or one that could not be evaluated.
+    """
+    noted = argument.annotation
+    if noted is argument.empty or isinstance(noted, str):
+        default = argument.default
+        return () if default is None or default is argument.empty else (type(default),)
+    return get_args(noted) if get_origin(noted) in (Union, UnionType) else (noted,)
+
+
+def as_type(value: Any, types: Sequence[Any]) -> Any:
+    """Return a value for an argument of some types; 4.0 as 4 if it has to be a whole number.
+
+    A value is returned as it is if one of the types is neither of `WORDS` nor None's.
+
+    Raises:
+        ValueError: the value has none of the types; the message says what to give.
+    """
+    known = (*WORDS, NoneType)
+    if not types or not all(kind in known for kind in types):
+        return value
+    if value is None or isinstance(value, bool | str):
+        if type(value) in types:
+            return value
+    elif is_number(value):
+        if float in types or (int in types and isinstance(value, int)):
+            return value
+        if int in types and value == int(value):
+            return int(value)
+    raise ValueError(" or ".join(WORDS[kind] for kind in types if kind in WORDS))
