@@ -346,6 +346,32 @@ def test_other_packages_bring_methods(two_numbers: BoundSpace) -> None:
         register(Grid)
 
 
+def test_what_is_no_method_is_refused_when_it_is_registered() -> None:
+    class NoMethod:
+        summary = "a test"
+
+    class Nameless(Method):
+        summary = "a test"
+
+        def ask(self) -> FloatArray:
+            return np.empty((0, self.space.size))
+
+    class Undescribed(Choosy):
+        name = "undescribed"
+        summary = ""
+
+    with METHODS.forgetting():
+        for given in (NoMethod, len, 4):
+            with pytest.raises(SearchError, match="is not a subclass of Method"):
+                register(given)  # type: ignore[arg-type]
+        with pytest.raises(SearchError, match="'Nameless' has no name and no tell"):
+            register(Nameless)
+        with pytest.raises(SearchError, match="'Undescribed' has no summary"):
+            register(Undescribed)
+        with pytest.raises(SearchError, match="is not a subclass of Method"):
+            METHODS.register("mine", NoMethod)  # type: ignore[arg-type]  # as an entry point does
+
+
 @pytest.fixture(scope="module")
 def mini_free(mini: object) -> BoundSpace:
     return SearchSpace({"coating.specularity": (0.0, 1.0)}).bind(mini)  # type: ignore[arg-type]

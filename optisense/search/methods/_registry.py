@@ -9,8 +9,29 @@ from optisense.errors import OptiSenseError, SearchError
 from optisense.keyword_types import as_type, types_of
 from optisense.near import suggestion
 from optisense.objectives.files import place_of
-from optisense.registry import Registry
+from optisense.registry import Registry, place_of_definition
 from optisense.search.methods.base import Method, Problem
+
+
+def _check(name: str, kind: Any) -> None:
+    if not (isinstance(kind, type) and issubclass(kind, Method)):
+        raise SearchError(
+            f"the search method '{name}' is not a subclass of Method",
+            hint="Derive its class from optisense.search.methods.Method",
+        )
+    lacking = [each for each in ("name", "summary") if not _is_text(getattr(kind, each, None))]
+    lacking += sorted(getattr(kind, "__abstractmethods__", ()))
+    if lacking:
+        raise SearchError(
+            f"the search method '{name}' has no {' and no '.join(lacking)}",
+            where=place_of_definition(kind),
+            hint="Its class needs the texts name and summary, and the methods ask and tell",
+        )
+
+
+def _is_text(value: object) -> bool:
+    return isinstance(value, str) and value.strip() != ""
+
 
 METHODS: Registry[type[Method]] = Registry(
     "search method",
@@ -25,6 +46,7 @@ METHODS: Registry[type[Method]] = Registry(
         "light-colours": "optisense.search.methods._light_colours:LightColours",
         "types": "optisense.search.methods._light_types:LightTypes",
     },
+    _check,
 )
 
 find, names = METHODS.find, METHODS.names
@@ -34,8 +56,9 @@ def register(method: type[Method]) -> type[Method]:
     """Add a method under its `name`; usable as a class decorator.
 
     Raises:
-        SearchError: another method has this name.
+        SearchError: another method has this name, or the class is no complete method.
     """
+    _check(getattr(method, "__name__", repr(method)), method)
     return METHODS.register(method.name, method)
 
 
