@@ -37,7 +37,7 @@ SENSORS: Registry[Callable[[], SensorDesign]] = Registry(
 """Functions that build a sensor with its default dimensions; other packages add theirs under the
 entry-point group `optisense.sensors`."""
 
-BUILT_IN = "builtin:"
+BUILT_IN_PREFIX = "builtin:"
 
 
 def build(name: str) -> SensorDesign:
@@ -68,14 +68,15 @@ def load(name_or_folder: str | Path) -> SensorDesign:
         OptiSenseError: there is neither, there are both, or the design can't be read.
     """
     text = str(name_or_folder)
-    if text.startswith(BUILT_IN):
-        return build(text.removeprefix(BUILT_IN))
+    if text.startswith(BUILT_IN_PREFIX):
+        return build(text.removeprefix(BUILT_IN_PREFIX))
     path = Path(name_or_folder)
     if isinstance(name_or_folder, str) and text in SENSORS:
         if path.is_dir():
             raise DesignError(
                 f"'{text}' is a built-in sensor and also a folder here",
-                hint=f"Write ./{text} for the folder, {BUILT_IN}{text} for the built-in sensor",
+                hint=f"Write ./{text} for the folder, {BUILT_IN_PREFIX}{text} for the built-in "
+                "sensor",
             )
         return build(text)
     if not path.exists():

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from optisense.objectives import BUILT_IN, names, registry
-from optisense.objectives.registry import FURTHER
+from optisense.objectives import registry
 from optisense.objectives.testing import ObjectiveContract
 
 OWN = '''
@@ -109,5 +108,5 @@ def test_no_objective_of_the_package_goes_without_the_contract() -> None:
     }
     # The sensor of the contract has no bent part.
     by_shape = {"bend_radius", "draft", "clearance", "cage_roughness"}
-    own = ({*BUILT_IN, *FURTHER} & {*names()}) - by_shape
+    own = {*registry.OBJECTIVES.built_in} - by_shape
     assert own <= tested

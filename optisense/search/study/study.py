@@ -379,10 +379,10 @@ def _shown(name: str, *, rays_only: bool) -> tuple[str, ...]:
     """
     from optisense.objectives.combined import objective_of
     from optisense.objectives.named import is_plain
-    from optisense.objectives.registry import BUILT_IN, FURTHER
+    from optisense.objectives.registry import OBJECTIVES
 
     try:
-        known = name in (*BUILT_IN, *FURTHER) or not is_plain(name)
+        known = name in OBJECTIVES.built_in or not is_plain(name)
         measured = objective_of(name) if known else None
         return measured.beside if measured and (measured.rays_only or not rays_only) else ()
     except ObjectiveError:  # an expression with an objective that is not installed
