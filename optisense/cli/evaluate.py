@@ -34,6 +34,16 @@ REPORT_FILE = "scores.html"
 
 
 @handles_errors
+def _print_objectives(wanted: bool) -> None:
+    if wanted:
+        from optisense.objectives import find, names
+
+        for name in names():
+            output.print(f"{name:<14} {find(name).summary}")
+        raise typer.Exit
+
+
+@handles_errors
 def evaluate(
     design: DesignArgument,
     *,
@@ -45,6 +55,15 @@ def evaluate(
     ] = False,
     as_json: Annotated[bool, json_option("Print JSON with all parts instead of a table.")] = False,
     variant: VariantOption = "auto",
+    list_objectives: Annotated[
+        bool,
+        typer.Option(
+            "--objectives",
+            callback=_print_objectives,
+            is_eager=True,
+            help="List the objectives and exit.",
+        ),
+    ] = False,
 ) -> None:
     """Score a sensor: how well its images show the shape of what touches it.
 

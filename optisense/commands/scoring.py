@@ -71,8 +71,9 @@ class EvaluateOptions(ScoreOptions):
     objectives: Annotated[list[str], OptionNotation("NAME", ("--objective", "-b"), "all four")] = (
         Field(
             [],
-            description="rgb2normal, normdiff, aoap, 2to3pw, one that an installed package "
-            "brings, or your own as FILE.py:FUNCTION. May be given several times.",
+            description="rgb2normal, normdiff, aoap, 2to3pw, another one (--objectives lists all; "
+            "docs/objectives.md describes them), or your own as FILE.py:FUNCTION. May be given "
+            "several times.",
         )
     )
     seed: Seed = Field(0, description="The same seed gives the same scores.")

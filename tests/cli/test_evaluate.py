@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 from warm_python import programs
 
 from optisense.cli import app
+from optisense.objectives import names
 
 SMALL = ("--resolution", "120x90", "--photons", "50000", "--set", "places=[[0,0],[3,2]]")
 RAYS = ("--objective", "aoap", "--objective", "2to3pw")
@@ -32,6 +33,12 @@ def evaluate(*arguments: str, design: str = "gelsight-mini-ideal") -> tuple[int,
     result = CliRunner().invoke(app, ["evaluate", design, *arguments])
     assert "Traceback" not in result.output
     return result.exit_code, result.stdout, result.stderr
+
+
+def test_objectives_are_listed_without_a_design() -> None:
+    result = CliRunner().invoke(app, ["evaluate", "--objectives"])
+    assert result.exit_code == 0, result.output
+    assert [line.split()[0] for line in result.stdout.splitlines()] == names()
 
 
 @pytest.fixture(scope="module")
@@ -159,6 +166,7 @@ def test_an_output_folder_that_is_a_file_is_an_error_before_the_work(tmp_path: P
 PRESSED = """
 import signal, sys
 from optisense.cli import app
+from optisense.objectives import names
 from optisense import objective
 
 def pressed(evaluation):
