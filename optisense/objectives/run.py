@@ -113,9 +113,9 @@ def split_settings(
         for key, value in own[each.name].items():
             try:
                 own[each.name][key] = as_type(value, (type(each.settings[key]),))
-            except ValueError as wanted:
+            except ValueError as needed:
                 raise ObjectiveError(
-                    f"the setting '{key}' is {value!r}", hint=f"Give {wanted}"
+                    f"the setting '{key}' is {value!r}", hint=f"Give {needed}"
                 ) from None
     return shared, own
 
