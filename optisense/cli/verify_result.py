@@ -24,7 +24,7 @@ def print_verification(found: Verification) -> None:
             f"{change.before:.{digits}f} {unit}",
             f"{change.after:.{digits}f} {unit}",
             f"{change.change:+.{digits}f}",
-            f"{change.low:+.{digits}f} to {change.high:+.{digits}f}",
+            change.interval(digits),
         )
     one, other = found.views
     table.add_row("skin in view", f"{100 * one.coverage:.0f} %", f"{100 * other.coverage:.0f} %")

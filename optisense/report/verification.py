@@ -109,7 +109,7 @@ def _change(label: str, change: ErrorChange, digits: int) -> list[str]:
         f"{change.before:.{digits}f}",
         f"{change.after:.{digits}f}",
         f"{change.change:+.{digits}f}",
-        f"{change.low:+.{digits}f} to {change.high:+.{digits}f}",
+        change.interval(digits),
     ]
 
 

@@ -144,8 +144,9 @@ class _Maker:
         self._failed = {int(row["index"]) for row in read_failures(folder)}
 
     def done(self) -> set[int]:
-        """Return the indices of finished and of failed samples."""
-        return self._labelled | self._failed
+        """Return the indices of finished and of failed samples, without those that lack a file."""
+        lacking = {labels["index"] for labels in Dataset.load(self._folder).lacking()}
+        return (self._labelled | self._failed) - lacking
 
     def undamaged(self) -> set[int]:
         """Return the indices of `done` except those with damage; restore a damaged background."""

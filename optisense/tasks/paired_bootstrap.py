@@ -52,6 +52,14 @@ class ErrorChange:
             return BETTER
         return WORSE if self.low > 0.0 else INCONCLUSIVE
 
+    def interval(self, digits: int) -> str:
+        """Return the interval with a number of digits after the point, as text; "unknown" for one
+        object, as only the differences between objects tell it.
+        """
+        if self.objects < 2:
+            return "unknown"
+        return f"{self.low:+.{digits}f} to {self.high:+.{digits}f}"
+
     def to_dict(self) -> dict[str, float | str | int]:
         """Return all values, ready for JSON."""
         return {

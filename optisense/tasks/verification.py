@@ -165,8 +165,7 @@ class Verification:
         second = self.names[1]
         numbers = (
             f"the error of normals is {normals.after:.1f} degrees instead of "
-            f"{normals.before:.1f} (95 % interval of the change {normals.low:+.1f} to "
-            f"{normals.high:+.1f})"
+            f"{normals.before:.1f} (95 % interval of the change {normals.interval(1)})"
         )
         if self.verdict != INCONCLUSIVE:
             beside = {

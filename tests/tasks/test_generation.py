@@ -50,6 +50,21 @@ def assert_same(one: Dataset, other: Dataset) -> None:
             assert np.array_equal(getattr(a, name), getattr(b, name), equal_nan=True)
 
 
+def test_missing_and_damaged_samples_are_made_again(
+    made: Dataset, mini: OpticalModel, tmp_path: Path
+) -> None:
+    folder = tmp_path / "copy"
+    shutil.copytree(made.folder, folder)
+    (folder / made.labels[0]["file_name"]).unlink()
+    assert_same(made, generate(mini, folder, COUNT, SETTINGS))
+    arrays = folder / made.labels[1]["arrays"]
+    arrays.write_bytes(arrays.read_bytes()[:100])
+    damaged = generate(mini, folder, COUNT, SETTINGS)  # which reads no sample
+    with pytest.raises(TaskError, match="sample 1"):
+        damaged[1]
+    assert_same(made, generate(mini, folder, COUNT, SETTINGS, mend=True))
+
+
 def test_labels_are_true(made: Dataset, mini: OpticalModel) -> None:
     assert len(made) == COUNT
     rays = mini.chief_rays((60, 45))

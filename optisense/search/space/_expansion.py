@@ -15,7 +15,7 @@ from pydantic import BaseModel
 from optisense.design import Cage, SensorDesign, Share, get_value, parse_path, set_value
 from optisense.design.cage import as_array
 from optisense.design.colour import NAMED_COLOURS
-from optisense.errors import SearchError
+from optisense.errors import DesignError, SearchError
 from optisense.search.space._control_points import (
     as_dicts,
     as_points,
@@ -85,10 +85,27 @@ def expand(
                 "the options of control points do not apply to this path",
                 hint="Vary cages.NAME.points",
             )
-        single = _of_value(path, get_value(design, path), spec)
+        single = _of_value(path, _present(design, path), spec)
         return design, [replace(each, asked=path) for each in single]
     except SearchError as error:
         raise SearchError(error.message, where=error.where or path, hint=error.hint) from None
+
+
+def _present(design: SensorDesign, path: str) -> Any:
+    """Return the value at a path.
+
+    Raises:
+        DesignError: there is none; the hint also names the moves that a search can vary.
+    """
+    try:
+        return get_value(design, path)
+    except DesignError as error:
+        section, _, rest = path.partition(".")
+        moves = {"lights": "shift, turn and aim move lights", "parts": "shift and turn move a part"}
+        if section not in moves or "." not in rest:
+            raise
+        hint = f"{error.hint or ''}; {moves[section]}".removeprefix("; ")
+        raise DesignError(error.message, where=error.where, hint=hint) from None
 
 
 def starred(design: SensorDesign, path: str) -> list[str]:

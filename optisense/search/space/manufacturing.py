@@ -12,6 +12,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign, set_value
 from optisense.errors import DesignError, SearchError
+from optisense.near import suggestion
 from optisense.search.space._expansion import expand
 from optisense.search.space.parameters import Around, CagePoints, Continuous, Integer, Parameter
 from optisense.search.space.search_space import BoundSpace, SearchSpace
@@ -231,6 +232,12 @@ def _paths(design: SensorDesign, source: str) -> list[str]:
     """Return the paths that a source names: itself, or one path per light."""
     match = re.fullmatch(r"lights(?:\.([^.\[\]]+))?\.(position|angle)", source)
     if match is None:
+        section, _, name = source.partition(".")
+        if section == "lights" and "." not in name and name not in design.lights:
+            raise DesignError(
+                f"the path '{source}' does not exist",
+                hint=suggestion(name, [*ALL_LIGHTS, *design.lights]),
+            )
         return [source]
     group, what = match.groups()
     if group is not None and group not in design.lights:
