@@ -95,6 +95,10 @@ class FolderInUseError(OutputError):
     """Another process is writing to a folder."""
 
 
+class OwnCodeError(OptiSenseError):
+    """Python code of a user, such as the class of a kind of indenter, has failed."""
+
+
 class TaskError(OptiSenseError):
     """A perception task or a dataset can't be made or read."""
 

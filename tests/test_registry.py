@@ -6,8 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from optisense.engine.failures import as_data
 from optisense.errors import SearchError
 from optisense.registry import Registry
 
@@ -27,6 +29,14 @@ class Pea(IndenterKind):
 
     def mesh(self, reach, facet_error=4e-4):
         return Sphere(self.size / 2).mesh(reach, facet_error)
+
+
+@dataclasses.dataclass(frozen=True)
+class Dent(Pea):
+    kind = "dent"
+
+    def mesh(self, reach, facet_error=4e-4):
+        raise ValueError("my mesh bug")
 
 
 def wide_mini():
@@ -57,6 +67,7 @@ NAMES = ShapeFormat(".txt", write, holds_all=True)
 ENTRY_POINTS = """
 [optisense.indenters]
 pea = my_parts:Pea
+dent = my_parts:Dent
 [optisense.sensors]
 wide-mini = my_parts:wide_mini
 broken-mini = my_parts:no_such_thing
@@ -70,7 +81,8 @@ names = my_parts:NAMES
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of installed packages with one that brings something to each registry."""
-    folder = tmp_path_factory.mktemp("site")
+    folder = tmp_path_factory.mktemp("environment") / "site-packages"
+    folder.mkdir()
     (folder / "my_parts.py").write_text(MODULE)
     info = folder / "my_parts-1.0.dist-info"
     info.mkdir()
@@ -117,6 +129,43 @@ def test_a_package_that_does_not_fit_is_named(site: Path, tmp_path: Path) -> Non
     assert done.returncode == 2
     assert "my-parts" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_failure_in_a_package_is_not_called_a_defect_of_this_one(
+    site: Path, tmp_path: Path
+) -> None:
+    done = run(
+        site, tmp_path, "render", "gelsight-mini-ideal", "--contact", "dent:2@0,0:0.5", "--out", "t"
+    )
+    assert done.returncode == 1
+    line = MODULE[: MODULE.index("my mesh bug")].count("\n") + 1
+    assert "error: ValueError: my mesh bug" in done.stderr
+    assert f"where: {site / 'my_parts.py'}:{line}\n" in done.stderr
+    assert "Repair this file or the package that contains it" in done.stderr
+    assert "defect" not in done.stderr
+
+
+def test_a_failure_in_a_file_of_a_user_names_its_line_in_the_engine() -> None:
+    with pytest.raises(ZeroDivisionError) as own:
+        _ = 1 / 0
+    told = as_data(own.value)
+    assert (told["kind"], told["message"]) == (
+        "OwnCodeError",
+        "ZeroDivisionError: division by zero",
+    )
+    assert told["where"].startswith(f"{__file__}:")
+
+
+def test_a_failure_in_this_package_or_one_that_it_needs_is_a_defect_of_it() -> None:
+    with pytest.raises(AttributeError) as ours:
+        things().register(None, things)  # type: ignore[arg-type]
+    with pytest.raises(np.linalg.LinAlgError) as installed:
+        np.linalg.inv(np.zeros((2, 2)))
+    for found in (ours, installed):
+        error = found.value.with_traceback(found.tb.tb_next)  # without the frame of this test
+        told = as_data(error)
+        assert told["kind"] == "InternalError"
+        assert "defect of OptiSense" in told["hint"]
 
 
 def things() -> Registry[object]:

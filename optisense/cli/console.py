@@ -21,6 +21,7 @@ from rich.segment import Segment
 from optisense import starting
 from optisense.cli.from_options import with_options
 from optisense.errors import OptiSenseError, OutputError, SetupError
+from optisense.own_code import error_of_own_code
 from optisense.text import visible
 
 if TYPE_CHECKING:
@@ -140,13 +141,14 @@ def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
             if isinstance(error.__cause__, KeyboardInterrupt):
                 messages.print("interrupted")
                 raise typer.Exit(EXIT_INTERRUPTED) from None
-            # Typer prints usage errors itself; every other error is a defect.
+            # Typer prints usage errors itself; every other error is a defect, here or in own code.
             if type(error).__module__.split(".")[0] in ("click", "typer"):
                 raise
-            print_error(
+            told = error_of_own_code(error) or OptiSenseError(
                 f"unexpected {type(error).__name__}: {error}",
                 hint="This is a defect of OptiSense; `optisense --debug ...` shows where it is",
             )
+            print_error(told.message, where=told.where, hint=told.hint)
             _show_traceback()
             raise typer.Exit(EXIT_FAILURE) from None
 

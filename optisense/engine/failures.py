@@ -8,6 +8,7 @@ from typing import Any
 
 from optisense.design import Diagnostic, SensorDesign
 from optisense.errors import OptiSenseError, OutputError, SetupError
+from optisense.own_code import error_of_own_code
 
 
 class ProtocolError(OptiSenseError):
@@ -80,7 +81,9 @@ def as_data(error: BaseException, design: SensorDesign | None = None) -> dict[st
         told, kind = OutputError.of(error), "OutputError"
     elif not isinstance(error, OptiSenseError):
         hint = "This is a defect of OptiSense; the log of the engine shows where it is"
-        told, kind = OptiSenseError(f"unexpected {kind}: {error}", hint=hint), "InternalError"
+        defect = OptiSenseError(f"unexpected {kind}: {error}", hint=hint)
+        told = error_of_own_code(error) or defect
+        kind = "InternalError" if told is defect else type(told).__name__
     assert isinstance(told, OptiSenseError)
     problems = error.problems if isinstance(error, InvalidDesignError) else ()
     return {

@@ -5,12 +5,12 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-import traceback
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from optisense.errors import ObjectiveError
+from optisense.own_code import place_of
 from optisense.untrusted_files import MOST_PROGRAM, read_bytes
 
 
@@ -46,10 +46,3 @@ def run_file(path: Path) -> dict[str, Any]:
             where=place_of(error, str(whole)) or str(path),
         ) from error
     return vars(module)
-
-
-def place_of(error: BaseException, file: str | None = None) -> str | None:
-    """Return the ``file:line`` of an error's origin: the last one in `file`, or the last of all."""
-    frames = traceback.extract_tb(error.__traceback__)
-    inside = [frame for frame in frames if file is None or frame.filename == file]
-    return f"{inside[-1].filename}:{inside[-1].lineno}" if inside else file

@@ -16,11 +16,11 @@ from optisense.errors import OptiSenseError, SearchError, SetupError, UnknownPar
 from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.combined import goal_of
 from optisense.objectives.evaluation import ProgressCallback
-from optisense.objectives.files import place_of
 from optisense.objectives.named import named_in
 from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
+from optisense.own_code import place_of
 from optisense.search.evaluation.models import ModelCache
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of

@@ -1,0 +1,66 @@
+"""Places in the Python code of users, for messages about errors in it."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from importlib.metadata import distributions
+from pathlib import Path
+from types import FrameType
+
+from optisense.errors import OwnCodeError
+
+HOME = Path(__file__).parent
+"""Folder of this package."""
+
+GROUPS = "optisense."
+"""Start of the names of the groups of entry points by which packages add to this one."""
+
+INSTALLED = frozenset({"site-packages", "dist-packages"})
+"""Names of the folders of installed packages."""
+
+
+def place_of(error: BaseException, file: str | None = None) -> str | None:
+    """Return the ``file:line`` of an error's origin: the last one in `file`, or the last of all."""
+    frames = traceback.extract_tb(error.__traceback__)
+    inside = [frame for frame in frames if file is None or frame.filename == file]
+    return f"{inside[-1].filename}:{inside[-1].lineno}" if inside else file
+
+
+def error_of_own_code(error: BaseException) -> OwnCodeError | None:
+    """Return an error with the place in a user's code through which another one was raised.
+
+    A user's code is all code outside of this package, of the standard library and of installed
+    packages, and installed packages that add something to this one by an entry point.
+
+    Returns:
+        The error; None if no user's code took part.
+    """
+    adding = {
+        point.module.partition(".")[0]
+        for package in distributions()
+        for point in package.entry_points
+        if point.group.startswith(GROUPS)
+    }
+    own = [
+        f"{frame.f_code.co_filename}:{line}"
+        for frame, line in traceback.walk_tb(error.__traceback__)
+        if _is_own(frame, adding)
+    ]
+    if not own:
+        return None
+    return OwnCodeError(
+        f"{type(error).__name__}: {error}",
+        where=own[-1],
+        hint="Repair this file or the package that contains it",
+    )
+
+
+def _is_own(frame: FrameType, adding: set[str]) -> bool:
+    file = Path(frame.f_code.co_filename)
+    package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+    if str(file).startswith("<") or package in sys.stdlib_module_names:
+        return False
+    if file.is_relative_to(HOME) or file.is_relative_to(HOME.parent / "paper"):
+        return False
+    return package in adding or not INSTALLED.intersection(file.parts)
