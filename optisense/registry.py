@@ -112,6 +112,21 @@ class Registry(Generic[T]):
         offered = {point.name for point in entry_points(group=self.group)}
         return [*self.built_in, *sorted((offered | set(self._registered)) - set(self.built_in))]
 
+    def loadable(
+        self, failures: dict[str, OptiSenseError] | None = None
+    ) -> Iterator[tuple[str, T]]:
+        """Yield name and object of all that can be loaded, in the order of `names`.
+
+        Args:
+            failures: dictionary that receives the error of each other object, by its name.
+        """
+        for name in self.names():
+            try:
+                yield name, self.find(name)
+            except OptiSenseError as error:
+                if failures is not None:
+                    failures[name] = error
+
     def registered(self) -> dict[str, T]:
         """Return the objects that were registered so far, by name."""
         return dict(self._registered)

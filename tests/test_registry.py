@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 
 from optisense.engine.failures import as_data
+from optisense.engine.listing import listed
 from optisense.errors import SearchError
 from optisense.registry import Registry
+from optisense.search.methods import METHODS
 
 MODULE = """
 import dataclasses
@@ -91,11 +94,14 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(site: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+def command(site: Path, *arguments: str) -> list[str]:
     """An `optisense` command in a process that has the package."""
     start = f"import sys; sys.path.insert(0, {str(site)!r}); from optisense.cli import main; main()"
-    command = [sys.executable, "-c", start, *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    return [sys.executable, "-c", start, *arguments]
+
+
+def run(site: Path, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command(site, *arguments), cwd=folder, capture_output=True, text=True)
 
 
 def test_a_package_brings_a_sensor_an_indenter_and_a_picture_of_both(
@@ -129,6 +135,59 @@ def test_a_package_that_does_not_fit_is_named(site: Path, tmp_path: Path) -> Non
     assert done.returncode == 2
     assert "my-parts" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_package_that_cannot_be_loaded_leaves_the_others_in_all_lists(tmp_path: Path) -> None:
+    groups = ("emitters", "materials", "sensors", "objectives", "methods")
+    info = tmp_path / "old-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: old\nVersion: 1.0\n")
+    (info / "entry_points.txt").write_text(
+        "".join(f"[optisense.{group}]\nold-{group} = no_such_module:Old\n" for group in groups)
+    )
+    lists = ("kinds", "sensors", "objectives", "methods")
+    with subprocess.Popen(
+        command(tmp_path, "engine"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as engine:
+        assert engine.stdin is not None and engine.stdout is not None
+        answers = {}
+        hello = {"protocol": 1, "client": "a test", "folder": str(tmp_path)}
+        for do, fields in [("hello", hello), *((each, {}) for each in lists)]:
+            engine.stdin.write(json.dumps({"id": do, "do": do, **fields}) + "\n")
+            engine.stdin.flush()
+            answers[do] = json.loads(engine.stdout.readline())
+            assert answers[do]["ok"], answers[do]
+        engine.stdin.close()
+    unavailable = [row for each in lists for row in answers[each]["result"]["unavailable"]]
+    assert sorted(row["name"] for row in unavailable) == sorted(f"old-{each}" for each in groups)
+    assert all("no_such_module" in row["message"] for row in unavailable)
+    assert "dielectric" in answers["kinds"]["result"]["materials_of_role"]["support"]
+
+    methods = run(tmp_path, tmp_path, "search", "--methods")
+    assert methods.returncode == 0
+    assert [line.split()[0] for line in methods.stdout.splitlines()] == list(METHODS.built_in)
+    assert "old-methods    unavailable: " in methods.stderr and "of old" in methods.stderr
+
+    schema = "from optisense.design import SensorDesign; print(SensorDesign.model_json_schema())"
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {schema}"
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+def test_what_cannot_be_described_is_unavailable_unless_it_is_built_in() -> None:
+    registry = things()
+    registry.register("line", run)
+
+    def row(name: str, thing: object) -> dict[str, object]:
+        return {"name": name, "size": 1 / (name != bad)}
+
+    bad = "line"
+    rows, unavailable = listed(registry, row)
+    assert rows == [{"name": "home", "size": 1.0}]
+    assert unavailable[0]["name"] == "line"
+    assert unavailable[0]["message"].startswith("ZeroDivisionError: division by zero")
+    bad = "home"
+    with pytest.raises(ZeroDivisionError):
+        listed(registry, row)
 
 
 def test_a_failure_in_a_package_is_not_called_a_defect_of_this_one(
@@ -201,7 +260,6 @@ def built_in_registries() -> list[Registry]:
     from optisense.geometry.indenter_kinds import INDENTERS
     from optisense.objectives.registry import OBJECTIVES
     from optisense.robots.formats import ROBOT_FORMATS
-    from optisense.search.methods._registry import METHODS
     from optisense.sensors.registry import SENSORS
     from optisense.workshop._formats import FORMATS
 

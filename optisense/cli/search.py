@@ -18,6 +18,7 @@ from optisense.cli.options import VariantOption, WorkersOption, json_option, out
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
 from optisense.commands.searching import SearchOptions
+from optisense.errors import OptiSenseError
 
 if TYPE_CHECKING:
     from optisense.search import Study
@@ -128,7 +129,6 @@ def _verify(study: Path, variant: str) -> None:
     """
     from optisense.cli.verify import compare, print_comparison
     from optisense.commands.sampling import VerifyOptions
-    from optisense.errors import OptiSenseError
 
     folder = study / VERIFY_FOLDER
     output.print(f"Quick verification of the best design (in full: optisense verify {study}):")
@@ -194,7 +194,10 @@ def _ask_trust(strange: list[str]) -> bool:
 
 
 def _print_methods() -> None:
-    from optisense.search.methods import find, names
+    from optisense.search.methods import METHODS
 
-    for name in names():
-        output.print(f"{name:<14} {find(name).summary}")
+    failures: dict[str, OptiSenseError] = {}
+    for name, method in METHODS.loadable(failures):
+        output.print(f"{name:<14} {method.summary}")
+    for name, error in failures.items():
+        messages.print(f"{name:<14} unavailable: {error}", style="yellow")

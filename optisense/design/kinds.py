@@ -60,11 +60,13 @@ class KindModel(Model):
     def __get_pydantic_json_schema__(
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler, /
     ) -> dict[str, Any]:
-        """Return the JSON schema of an interface: one of the schemas of its kinds."""
+        """Return the JSON schema of an interface: one of the schemas of its kinds, without those
+        that can't be loaded."""
         if "kinds" not in cls.__dict__:
             return handler(schema)
-        kinds = [cls.kinds.find(name) for name in cls.kinds.names()]
-        return {"oneOf": [handler(kind.__pydantic_core_schema__) for kind in kinds]}
+        return {
+            "oneOf": [handler(kind.__pydantic_core_schema__) for _, kind in cls.kinds.loadable()]
+        }
 
     @classmethod
     def _of_a_kind(cls, value: Any) -> Any:

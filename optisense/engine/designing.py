@@ -23,6 +23,7 @@ from optisense.engine.designs import AnyMesh
 from optisense.engine.failures import ProtocolError, problem_row
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
+from optisense.engine.listing import listed
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, blender_pixels, design_of
 from optisense.engine.requests import Lane, handles
@@ -97,11 +98,13 @@ class ExportRobot(DesignFields):
 @handles("sensors", Fields, Lane.QUICK)
 def sensors(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """Return the names and descriptions of the built-in sensors."""
-    rows = []
-    for name in SENSORS.names():
+
+    def row(name: str, builder: object) -> dict[str, Any]:
         job.check()
-        rows.append({"name": name, "description": session.designs.read(name).description})
-    return {"sensors": rows}
+        return {"name": name, "description": session.designs.read(name).description}
+
+    rows, failed = listed(SENSORS, row)
+    return {"sensors": rows, "unavailable": failed}
 
 
 @handles("open", DesignFields, Lane.QUICK)

@@ -1,4 +1,4 @@
-"""Request that lists the kinds of emitters, materials and coatings, and their fields."""
+"""Requests about the kinds of emitters, materials, coatings, camera responses and others."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from optisense.design.problems import design_error
 from optisense.design.responses import CameraResponse, ToneCurve
 from optisense.engine.failures import ProtocolError
 from optisense.engine.jobs import Job
+from optisense.engine.listing import Rows, listed
 from optisense.engine.protocol import Fields
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
@@ -50,11 +51,14 @@ BOUNDS = {
 @handles("kinds", Fields, Lane.QUICK)
 def kinds(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """Return all kinds with their fields, and the kinds of materials that suit each role."""
+    found: dict[str, Rows] = {}
+    unavailable: Rows = []
+    for word, noun in NOUNS.items():
+        found[word], failed = listed(noun.kinds, lambda name, kind: _kind(kind))
+        unavailable += failed
     return {
-        "kinds": {
-            word: [_kind(noun.kinds.find(name)) for name in noun.kinds.names()]
-            for word, noun in NOUNS.items()
-        },
+        "kinds": found,
+        "unavailable": unavailable,
         "materials_of_role": {role.value: kinds_for(role) for role in Role},
     }
 

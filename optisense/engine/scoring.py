@@ -13,13 +13,14 @@ from pydantic import Field
 
 from optisense.engine.files import Files
 from optisense.engine.jobs import Job
+from optisense.engine.listing import listed
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
 
 if TYPE_CHECKING:
-    from optisense.objectives import Score
+    from optisense.objectives import Objective, Score
 
 _registering = threading.Lock()
 
@@ -37,25 +38,24 @@ class Evaluate(DesignFields):
 @handles("objectives", Fields, Lane.QUICK)
 def objectives(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """Return the objectives that can be scored."""
-    from optisense.objectives.registry import find, names
+    from optisense.objectives.registry import OBJECTIVES
 
-    rows = []
-    for name in names():
-        each = find(name)
-        rows.append(
-            {
-                "name": each.name,
-                "title": each.title,
-                "summary": each.summary,
-                "settings": each.settings,
-                "unit": each.unit,
-                "lower_is_better": each.lower_is_better,
-                "rays_only": each.rays_only,
-                "usual": each.usual,
-                "range": _finite(each.bounds()),
-            }
-        )
-    return {"objectives": rows}
+    rows, failed = listed(OBJECTIVES, lambda name, each: _row(each))
+    return {"objectives": rows, "unavailable": failed}
+
+
+def _row(objective: Objective) -> dict[str, Any]:
+    return {
+        "name": objective.name,
+        "title": objective.title,
+        "summary": objective.summary,
+        "settings": objective.settings,
+        "unit": objective.unit,
+        "lower_is_better": objective.lower_is_better,
+        "rays_only": objective.rays_only,
+        "usual": objective.usual,
+        "range": _finite(objective.bounds()),
+    }
 
 
 def _finite(bounds: tuple[float, float]) -> tuple[float, float] | None:

@@ -13,6 +13,7 @@ from optisense.engine.designing import bent_shapes
 from optisense.engine.failures import ProtocolError
 from optisense.engine.following import Following, curve_row, trial_row
 from optisense.engine.jobs import Job
+from optisense.engine.listing import listed
 from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
@@ -78,9 +79,10 @@ class Apply(TrialFields):
 @handles("methods", Fields, Lane.QUICK)
 def methods(session: Session, fields: Fields, job: Job) -> dict[str, Any]:
     """Return the search methods with their summaries."""
-    from optisense.search.methods import find, names
+    from optisense.search.methods import METHODS
 
-    return {"methods": [{"name": name, "summary": find(name).summary} for name in names()]}
+    rows, failed = listed(METHODS, lambda name, each: {"name": name, "summary": each.summary})
+    return {"methods": rows, "unavailable": failed}
 
 
 @handles("space", Space, Lane.QUICK)

@@ -163,7 +163,6 @@ def kinds_for(role: Role) -> tuple[str, ...]:
     """Return the kinds of material that a part of this role can be made of; none for the coated
     one.
 
-    All kinds are loaded for this; `role in material.roles` tests a single one.
+    All kinds that can be loaded are loaded for this; `role in material.roles` tests a single one.
     """
-    kinds = Material.kinds
-    return tuple(name for name in kinds.names() if role in kinds.find(name).roles)
+    return tuple(name for name, kind in Material.kinds.loadable() if role in kind.roles)
