@@ -45,12 +45,12 @@ def check_design(
     They are: meshes that are empty, not closed or not finite, wrong units, missing meshes, unknown
     lights, lights or a camera inside something opaque, a camera inside a solid or too near to a
     part, a field of view that no lens has, a distortion that shows a point twice, a refractive
-    index that no transparent material has, transparent parts that absorb all light, a sensing
-    surface that faces the wrong way, lies off the elastomer, is mostly out of the camera's view or
-    out of its focus, parts that cages have folded or pushed together, cages that would tear a
-    sensing surface off its elastomer, solids that overlap with one priority, and provenance of
-    values that don't exist. (Fields, ranges and references between parts are checked when a design
-    is created.)
+    index that no transparent material has, kinds that fail or return what can't be simulated,
+    transparent parts that absorb all light, a sensing surface that faces the wrong way, lies off
+    the elastomer, is mostly out of the camera's view or out of its focus, parts that cages have
+    folded or pushed together, cages that would tear a sensing surface off its elastomer, solids
+    that overlap with one priority, and provenance of values that don't exist. (Fields, ranges and
+    references between parts are checked when a design is created.)
 
     Args:
         design: design to check.
@@ -66,10 +66,11 @@ def check_design(
     problems += unit_slips(design)
     problems += lens_problems(design.camera, design.where("camera", "fov"))
     problems += fold_problems(design.camera, design.where("camera", "distortion"))
-    problems += index_problems(design)
+    of_kinds = _check_kinds(design)
+    problems += [] if of_kinds else index_problems(design)  # which calls methods of kinds
     problems += _check_finishes(design, meshes)
     problems += _check_lights(design, light_names)
-    problems += _check_kinds(design)
+    problems += of_kinds
     if not any(problem.severity == "error" for problem in problems):
         try:
             meshes = {n: m for n, m in design.deformed_meshes().items() if n in meshes}
@@ -156,11 +157,11 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
 
 
 def _check_kinds(design: SensorDesign) -> list[Diagnostic]:
-    """Return the problems that emitters, materials and others find in themselves."""
+    """Return the problems of emitters, materials and others, and those that their classes have."""
     problems: list[Diagnostic] = []
     for path, value in design.values_of_kinds().items():
         try:
-            value.check()
+            value.verify()
         except OptiSenseError as error:
             place = error.where or design.where(*path)
             problems.append(Diagnostic(error.message, place, error.hint))

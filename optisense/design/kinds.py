@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
+import numpy as np
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PrivateAttr
 from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 
 from optisense.design.fields import IN_FOLDER, Model
-from optisense.errors import DesignError, LibraryError
+from optisense.errors import DesignError, LibraryError, OptiSenseError
+from optisense.own_code import error_of_own_code
 from optisense.registry import Registry
 from optisense.text import brief
 from optisense.untrusted_files import MOST_DATA, inside, read_bytes
@@ -105,6 +108,31 @@ class KindModel(Model):
             OptiSenseError: there is a problem.
         """
 
+    def _check_results(self) -> None:
+        """Check type and range of what the methods of a kind return; interfaces override it.
+
+        Raises:
+            OptiSenseError: a result can't be used.
+        """
+
+    def verify(self) -> None:
+        """Check whether it can be used: by `check`, and by what its methods return.
+
+        Raises:
+            OptiSenseError: there is a problem, or the class of the kind fails.
+        """
+        try:
+            self.check()
+            self._check_results()
+        except OptiSenseError:
+            raise
+        except Exception as error:
+            own = error_of_own_code(error)
+            raise LibraryError(
+                f"the {self.kinds.noun} '{self.kind}' fails: {type(error).__name__}: {error}",
+                hint=f"Repair {'the class of this kind' if own is None else own.where}",
+            ) from error
+
     def files(self) -> dict[str, str]:
         """Return the files that it names, relative to its folder, by field."""
         return {
@@ -160,3 +188,28 @@ class KindModel(Model):
         for field, file in self.files().items():
             setattr(self, field, name(file))
         return self.located(folder)
+
+
+def are_numbers(
+    value: object,
+    shape: tuple[int, ...] = (),
+    low: float = -math.inf,
+    high: float = math.inf,
+    *,
+    above: float = -math.inf,
+) -> bool:
+    """Return whether a value is an array of finite numbers, or can become one, within limits.
+
+    Args:
+        shape: shape of the array; () for a single number.
+        low, high: smallest and largest allowed number.
+        above: number that all must exceed.
+    """
+    try:
+        array = np.asarray(value)
+    except ValueError:  # rows of different lengths
+        return False
+    if array.shape != shape or array.dtype.kind not in "iuf":
+        return False
+    within = (array >= low) & (array <= high) & (array > above)
+    return bool((np.isfinite(array) & within).all())

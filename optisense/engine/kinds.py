@@ -83,6 +83,7 @@ def lamp(session: Session, fields: Lamp, job: Job) -> dict[str, Any]:
     else:
         emitter = _emitter(fields.value)
         emitter.located(None if fields.folder is None else Path(fields.folder))
+    emitter.verify()
     window = emitter.window()
     return {
         "window": None if window is None else {"shape": window.shape, "size": window.size},

@@ -42,7 +42,7 @@ def read_entry(kind: Kind, file: Path) -> AnyEntry:
     entry = make_entry(kind, file.stem, data, lines, str(file))
     value: Model = entry.value
     if isinstance(value, KindModel):
-        value.located(file.parent).check()
+        value.located(file.parent).verify()
     return entry
 
 

@@ -5,7 +5,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -15,8 +15,10 @@ from pydantic import Field
 from optisense import sensors
 from optisense.array_types import FloatArray
 from optisense.design import LightGroup, LightModel, check_design, load_design, save_design
-from optisense.design.emitters import SpotEmitter
+from optisense.design.emitters import SpotEmitter, Window
 from optisense.design.fields import Positive
+from optisense.design.materials import CoatingModel, Material, Medium, Reflection
+from optisense.design.parts import Role
 from optisense.errors import DesignError
 
 COSINE_POWER = '''"""A lamp of another package."""
@@ -171,3 +173,129 @@ def test_an_intensity_below_zero_is_a_problem_of_the_design() -> None:
     design.lights[name] = group
     found = [problem for problem in check_design(design) if "test-ring" in problem.message]
     assert [problem.severity for problem in found] == ["error"]
+
+
+class Flawed(LightModel):
+    """A lamp whose methods return what a test wants."""
+
+    kind: Literal["test-flawed"] = "test-flawed"
+    face: Any = None
+    power: Any = None
+    behind: float = 0.0
+
+    def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
+        light = np.where(np.asarray(polar) <= 90.0, 1.0, self.behind)
+        return np.asarray(light + 0.0 * np.asarray(azimuth))
+
+    def window(self) -> Any:
+        return self.face
+
+    def cosine_power(self) -> Any:
+        return self.power
+
+
+class Wrong(CoatingModel):
+    """A coating whose reflection is what a test wants."""
+
+    kind: Literal["test-wrong"] = "test-wrong"
+    result: Any = None
+
+    def reflection(self) -> Any:
+        return self.result if self.result is not None else int("no reflection")
+
+
+class Fog(Material):
+    """A material of no part, whose medium is what a test wants."""
+
+    roles: ClassVar[tuple[Role, ...]] = ()
+
+    kind: Literal["test-fog"] = "test-fog"
+    result: Any = None
+
+    def medium(self) -> Any:
+        return self.result
+
+    def check(self) -> None:
+        if self.result is None:
+            raise KeyError("my table")
+
+
+def problems(**changes: Any) -> list[tuple[str, str, str | None]]:
+    """Message, place and hint of the problems of a design with a lamp, coating or material."""
+    design = sensors.load("builtin:gelsight-mini-ideal")
+    if "emitter" in changes:
+        group = next(iter(design.lights.values()))
+        group.emitter = changes["emitter"]
+    if "coating" in changes:
+        design.coating = changes["coating"]
+    if "material" in changes:
+        design.materials["fog"] = changes["material"]
+    found = [problem for problem in check_design(design) if problem.severity == "error"]
+    return [(problem.message, problem.where, problem.hint) for problem in found]
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"face": ("disc", (1.0, 1.0))}, "the window of an emitter"),
+        ({"face": Window("oval", (1.0, 1.0))}, "oval"),  # type: ignore[arg-type]
+        ({"face": Window("disc", (1.0, 0.0))}, "the window of an emitter"),
+        ({"power": "2"}, "the cosine power of an emitter"),
+        ({"behind": -0.1}, "not negative from 0 to 180 degrees"),
+        ({"behind": np.nan}, "must be finite"),
+    ],
+)
+def test_a_lamp_that_returns_what_cannot_be_simulated_is_refused(
+    fields: dict[str, Any], words: str
+) -> None:
+    ((message, where, _),) = problems(emitter=Flawed(**fields))
+    assert words in message and "test-flawed" in message
+    assert where.startswith("lights.") and where.endswith(".emitter")
+
+
+def test_a_lamp_that_returns_what_can_be_simulated_is_not_refused() -> None:
+    assert not problems(emitter=Flawed(face=Window("rectangle", (1.0, 2.0)), behind=0.1, power=1))
+
+
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (0.5, "returned 0.5, which is no Reflection"),
+        (Reflection((1.0, 1.0, 1.2)), "reflectance"),
+        (Reflection(0.5), "reflectance"),  # type: ignore[arg-type]
+        (Reflection(specularity=-0.1), "specularity"),
+        (Reflection(roughness=1.5), "roughness"),
+        (Reflection(eta=(1.0, 0.0, 1.0)), "eta"),
+        (Reflection(k=(0.0, np.inf, 0.0)), " k "),
+    ],
+)
+def test_a_coating_that_returns_what_cannot_be_simulated_is_refused(
+    result: object, words: str
+) -> None:
+    ((message, where, _),) = problems(coating=Wrong(result=result))
+    assert words in message and "the kind of coating 'test-wrong'" in message
+    assert where == "coating"
+
+
+@pytest.mark.parametrize(
+    ("result", "words"),
+    [
+        (1.5, "no Medium"),
+        (Medium(0.0), "ior"),
+        (Medium(1.5, 2.0), "roughness"),
+        (Medium(1.5, absorption=(0.1, 0.1)), "absorption"),  # type: ignore[arg-type]
+        (Medium(1.5, indices=(1.5, 1.5, np.nan)), "indices"),
+    ],
+)
+def test_a_medium_that_cannot_be_simulated_is_refused(result: object, words: str) -> None:
+    ((message, where, _),) = problems(material=Fog(result=result))
+    assert words in message and where == "materials.fog"
+
+
+def test_an_exception_in_a_kind_is_a_problem_at_its_value_with_the_line_of_the_class() -> None:
+    ((message, where, hint),) = problems(coating=Wrong())
+    assert message.startswith("the kind of coating 'test-wrong' fails: ValueError: invalid literal")
+    assert where == "coating"
+    assert hint is not None and hint.startswith(f"Repair {__file__}:")
+    ((message, where, hint),) = problems(material=Fog())
+    assert "KeyError: 'my table'" in message and where == "materials.fog"

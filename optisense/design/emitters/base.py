@@ -13,9 +13,10 @@ from pydantic import Field
 from optisense.array_types import FloatArray
 from optisense.design.emitters._intensity import Intensity
 from optisense.design.fields import DEGREES, Number
-from optisense.design.kinds import KindModel
+from optisense.design.kinds import KindModel, are_numbers
 from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
+from optisense.text import brief
 
 HalfAngle = Annotated[Number, Field(gt=0.0, le=90.0, json_schema_extra=DEGREES)]
 """Angle from the axis of a lamp that shines forward, degrees."""
@@ -46,6 +47,12 @@ class Window:
 
     shape: Literal["disc", "rectangle"]
     size: tuple[float, float]
+
+    @property
+    def is_valid(self) -> bool:
+        """True if the shape is known and the size is positive."""
+        known = self.shape in ("disc", "rectangle")
+        return known and isinstance(self.size, tuple) and are_numbers(self.size, (2,), above=0.0)
 
 
 class LightModel(KindModel):
@@ -134,17 +141,32 @@ class LightModel(KindModel):
         """Return the kind of lamp and its most informative number, in a few words."""
         return f"{self.kind}, half at {self.half_angle():.3g} degrees"
 
-    def check(self) -> None:
+    def _check_results(self) -> None:
         """Check whether the lamp can be simulated.
 
         Raises:
-            OptiSenseError: its intensity is not finite, is negative, or is 0 everywhere, or a
-                file of it can't be read.
+            OptiSenseError: its intensity is not finite, is negative, or is 0 everywhere; its window
+                or the exponent of its cosine can't be used; or a file of it can't be read.
         """
-        values = self.intensity().values
-        if not np.isfinite(values).all() or values.min() < 0.0 or values.max() <= 0.0:
+        window, power = self.window(), self.cosine_power()
+        if window is not None and not (isinstance(window, Window) and window.is_valid):
+            raise LibraryError(
+                f"the window of an emitter of kind '{self.kind}' is {brief(repr(window))}",
+                hint="Return None, or a Window of shape 'disc' or 'rectangle', with a width and a "
+                "height above 0 mm",
+            )
+        if power is not None and not are_numbers(power, low=0.0):
+            raise LibraryError(
+                f"the cosine power of an emitter of kind '{self.kind}' is {brief(repr(power))}",
+                hint="Return None, or a number that is not negative",
+            )
+        azimuth = np.linspace(0.0, 360.0, AZIMUTHS)
+        polar = np.arange(0.0, 180.0 + COARSE_POLAR, COARSE_POLAR)
+        around = self.relative_intensity(polar[:, None], azimuth[None, :])
+        values = np.concatenate([np.ravel(around), np.ravel(self.intensity().values)])
+        if not are_numbers(values, values.shape, low=0.0) or values.max() <= 0.0:
             raise LibraryError(
                 f"the intensity of an emitter of kind '{self.kind}' must be finite and not "
-                "negative, and above 0 somewhere",
+                "negative from 0 to 180 degrees, and above 0 somewhere",
                 hint="Change its numbers",
             )

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.fields import Name
-from optisense.design.kinds import KindModel
+from optisense.design.kinds import KindModel, are_numbers
 from optisense.design.parts import Role
 from optisense.design.reflectance import fresnel_metal
-from optisense.errors import DesignError
+from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
+from optisense.text import brief
 
 RGB = tuple[float, float, float]
 
@@ -89,6 +91,61 @@ class Reflection:
         return np.asarray((1.0 - self.specularity) * diffuse + self.specularity * metal)
 
 
+class Limits(NamedTuple):
+    """Limits of a value; see `are_numbers`.
+
+    Attributes:
+        words: the limits as text.
+    """
+
+    words: str
+    shape: tuple[int, ...] = ()
+    low: float = -math.inf
+    high: float = math.inf
+    above: float = -math.inf
+
+
+SHARE = Limits("a number within 0..1", low=0.0, high=1.0)
+THREE_ABOVE_0 = Limits("3 numbers above 0", (3,), above=0.0)
+THREE_FROM_0 = Limits("3 numbers that are not negative", (3,), low=0.0)
+
+LIMITS: dict[type, dict[str, Limits]] = {
+    Medium: {
+        "ior": Limits("a number above 0", above=0.0),
+        "roughness": SHARE,
+        "absorption": THREE_FROM_0,
+        "indices": THREE_ABOVE_0,
+    },
+    Reflection: {
+        "reflectance": Limits("3 numbers within 0..1", (3,), 0.0, 1.0),
+        "specularity": SHARE,
+        "roughness": SHARE,
+        "eta": THREE_ABOVE_0,
+        "k": THREE_FROM_0,
+    },
+}
+"""Limits of the attributes of what kinds return, beyond which nothing can be simulated."""
+
+
+def _check_result(owner: KindModel, method: str, result: object, expected: type) -> None:
+    """Raise LibraryError if a method has returned another type, or a number beyond `LIMITS`."""
+    returned = f"{method}() of the {owner.kinds.noun} '{owner.kind}' returned"
+    if not isinstance(result, expected):
+        raise LibraryError(
+            f"{returned} {brief(repr(result))}, which is no {expected.__name__}",
+            hint="Repair the class of this kind",
+        )
+    for name, limits in LIMITS[expected].items():
+        value = getattr(result, name)
+        optional = name == "indices" and value is None
+        if not (optional or are_numbers(value, *limits[1:4], above=limits.above)):
+            raise LibraryError(
+                f"{returned} a {expected.__name__} whose {name} is {brief(repr(value))}",
+                hint=f"Its {name} must be {limits.words}: change the numbers of the kind, or "
+                "repair its class",
+            )
+
+
 class Material(KindModel):
     """Material of a part; each kind of material is a subclass.
 
@@ -119,6 +176,18 @@ class Material(KindModel):
         """Return its reflection if it is opaque; black by default."""
         return Reflection()
 
+    def _check_results(self) -> None:
+        """Check its medium, or its reflection if it is opaque.
+
+        Raises:
+            LibraryError: a number in it is beyond its limits, or it is of another type.
+        """
+        medium = self.medium()
+        if medium is None:
+            _check_result(self, "reflection", self.reflection(), Reflection)
+        else:
+            _check_result(self, "medium", medium, Medium)
+
     def in_words(self) -> str:
         """Return the most informative number of the material, in a few words."""
         return f"reflects {100 * float(self.reflection().normal_reflectance().mean()):.3g} %"
@@ -148,6 +217,14 @@ class CoatingModel(KindModel):
     @abstractmethod
     def reflection(self) -> Reflection:
         """Return its reflection, with the metal's index as in air."""
+
+    def _check_results(self) -> None:
+        """Check its reflection.
+
+        Raises:
+            LibraryError: a number in it is beyond its limits, or it is of another type.
+        """
+        _check_result(self, "reflection", self.reflection(), Reflection)
 
     def in_words(self) -> str:
         """Return the most informative number of the material, in a few words."""
