@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.design import SensorDesign
-from optisense.errors import DesignError
+from optisense.errors import DesignError, OutputError
 from optisense.workshop._assembly_files import assembly_files
 from optisense.workshop._bill_of_materials import bill_of_materials
 from optisense.workshop._drawings import cut_file, drawing
@@ -49,19 +49,20 @@ def export(
     Raises:
         DesignError: a part has no mesh, or lies outside of its cage; or a gel has no mould.
         SetupError: a format needs a package that is not installed.
-        OutputError: there is no such format, or the folder can't be written.
+        OutputError: there is no such format, two formats have files of one name, a format writes
+            none, or the folder can't be written.
     """
     for name in formats:
         FORMATS.find(name).require()
     made = shapes(design)
     writers: dict[str, Writer] = {}
     for name in dict.fromkeys(formats):
-        writers.update(_shape_writers(name, design.name, made))
+        _add(writers, name, _shape_writers(name, design.name, made))
     if with_moulds:
         cast = moulds(made)
         halves = [half for each in cast for half in each.shapes()]
         for name in dict.fromkeys(formats) if halves else ():
-            writers.update(_shape_writers(name, f"{design.name}-moulds", halves))
+            _add(writers, name, _shape_writers(name, f"{design.name}-moulds", halves))
         if notes is not None:
             notes += [each.note() for each in cast]
     for plate in plates(made):
@@ -84,7 +85,7 @@ def _shape_writers(name: str, title: str, made: Sequence[Shape]) -> dict[str, Wr
     """Return the files of a format, and the function that writes each."""
     kind = FORMATS.find(name)
     if kind.holds_all:
-        return {f"{file_name(title)}{kind.suffix}": lambda path: kind.write(path, title, made)}
+        return {f"{file_name(title)}{kind.suffix}": _ShapeWriter(name, kind, title, made)}
     files: dict[str, Writer] = {}
     for shape in made:
         file = f"{shape.name}{kind.suffix}"
@@ -94,12 +95,44 @@ def _shape_writers(name: str, title: str, made: Sequence[Shape]) -> dict[str, Wr
                 where=f"parts.{shape.name}",
                 hint="Rename one: their files would overwrite each other on some systems",
             )
-        files[file] = partial(_write_shape, kind, shape, title)
+        files[file] = _ShapeWriter(name, kind, title, [shape])
     return files
 
 
-def _write_shape(kind: ShapeFormat, shape: Shape, title: str, path: Path) -> None:
-    kind.write(path, title, [shape])
+@dataclass(frozen=True)
+class _ShapeWriter:
+    """Function that writes shapes into a file of a format; see `ShapeFormat.write`."""
+
+    name: str
+    kind: ShapeFormat
+    title: str
+    shapes: Sequence[Shape]
+
+    def __call__(self, path: Path) -> object:
+        notes = self.kind.write(path, self.title, self.shapes)
+        if not path.exists():
+            raise OutputError(
+                f"the format '{self.name}' wrote no file",
+                hint="Repair the package that contains the format",
+            )
+        return notes
+
+
+def _add(writers: dict[str, Writer], name: str, files: Mapping[str, Writer]) -> None:
+    """Add the files of a format.
+
+    Raises:
+        OutputError: another format has a file of the same name, also in another case.
+    """
+    before = {file.casefold(): writer for file, writer in writers.items()}
+    for file in files:
+        other = before.get(file.casefold())
+        if isinstance(other, _ShapeWriter) and other.name != name:
+            raise OutputError(
+                f"formats '{other.name}' and '{name}' would both write {file}",
+                hint="Export them into two folders",
+            )
+    writers.update(files)
 
 
 def file_name(title: str) -> str:
