@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.options import DesignArgument, out_option
 from optisense.cli.output_folder import take_folder
+from optisense.errors import OptiSenseError, OutputError
+from optisense.registry import Registry
 from optisense.robots.formats import ROBOT_FORMATS
 from optisense.workshop import FORMATS
 
@@ -72,12 +74,7 @@ def export(
             "it needs --for, as it describes models for robot simulators",
             param_hint="--mass" if mass is not None else "--density",
         )
-    wanted = [name.lower() for name in formats or ["stl"]]
-    for name in wanted:
-        if name not in FORMATS:
-            raise typer.BadParameter(
-                f"'{name}' is none of {', '.join(FORMATS.names())}", param_hint="--format"
-            )
+    wanted = _known(formats or ["stl"], FORMATS, "--format", ROBOT_FORMATS, "--for")
 
     from optisense.sensors import load
 
@@ -111,12 +108,7 @@ def export(
 def _export_robot(
     design: str, out: Path, wanted: list[str], mass: float | None, density: list[str]
 ) -> None:
-    names = [name.lower() for name in wanted]
-    for name in names:
-        if name not in ROBOT_FORMATS:
-            raise typer.BadParameter(
-                f"'{name}' is none of {', '.join(ROBOT_FORMATS.names())}", param_hint="--for"
-            )
+    names = _known(wanted, ROBOT_FORMATS, "--for", FORMATS, "--format")
     densities = dict(_density(text) for text in density)
 
     from optisense.robots import export_robot
@@ -130,6 +122,29 @@ def _export_robot(
     for note in notes:
         output.print(note, style="dim")
     output.print("Lengths are in m, masses in kg.", style="dim")
+
+
+def _known(
+    names: list[str], formats: Registry[Any], option: str, others: Registry[Any], their_option: str
+) -> list[str]:
+    """Return names of formats in lower case.
+
+    Args:
+        others: formats of the other option, which a user may mean.
+
+    Raises:
+        OptiSenseError: there is no such format, or it can't be loaded.
+    """
+    wanted = [name.lower() for name in names]
+    for name in wanted:
+        try:
+            formats.find(name)
+        except OutputError as error:
+            meant = name not in formats and name in others
+            hint = f"It is a {others.noun}: write {their_option} {name}" if meant else error.hint
+            # Bad input has another exit code than output that can't be written.
+            raise OptiSenseError(error.message, where=error.where or option, hint=hint) from None
+    return wanted
 
 
 def _density(text: str) -> tuple[str, float]:

@@ -60,9 +60,12 @@ def test_the_command_offers_what_can_be_written() -> None:
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (("gelsight-mini-ideal", "--format", "dxf"), "none of stl, obj, 3mf, step"),
+        (("gelsight-mini-ideal", "--format", "dxf"), "Known: 3mf, obj, step, stl"),
+        (("gelsight-mini-ideal", "--format", "stlb"), "Did you mean 'stl'?"),
+        (("gelsight-mini-ideal", "--format", "urdf"), "It is a robot format: write --for urdf"),
+        (("gelsight-mini-ideal", "--for", "STL"), "It is a file format: write --format stl"),
         (("gelsight-minni",), "Did you mean 'gelsight-mini'?"),
-        (("gelsight-mini-ideal", "--for", "gazebo"), "none of mujoco, urdf"),
+        (("gelsight-mini-ideal", "--for", "gazebo"), "Known: mujoco, urdf"),
         (("gelsight-mini-ideal", "--for", "urdf", "--moulds"), "combined with --format"),
         (("gelsight-mini-ideal", "--mass", "20"), "needs --for"),
         (("gelsight-mini-ideal", "--for", "urdf", "--density", "gel"), "housing=1.24"),
