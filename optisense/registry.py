@@ -28,6 +28,8 @@ class Registry(Generic[T]):
         noun: word for one of them, for messages.
         group: entry-point group under which installed packages add one: name = "module:attribute".
         built_in: names of the objects that this package has.
+        check: function that is called with name and object before it is registered, and raises an
+            error if the object does not fit.
     """
 
     def __init__(
@@ -46,14 +48,14 @@ class Registry(Generic[T]):
             group: group of the entry points.
             error: class of errors about these objects.
             built_in: place of definition of each object of this package ("module:attribute").
-            check: function that is called with name and object, and raises `error` if the object
-                does not fit.
+            check: the attribute `check`; it raises `error`.
             adapt: function that is called with name and object of an entry point, and returns the
                 object to register.
         """
         self.noun, self.group = noun, group
         self.built_in = tuple(built_in)
-        self._error, self._homes, self._check = error, built_in, check
+        self.check = check
+        self._error, self._homes = error, built_in
         self._adapt = adapt
         self._registered: dict[str, T] = {}
 
@@ -68,7 +70,7 @@ class Registry(Generic[T]):
                 f"'{name}' can't be the name of {with_article(self.noun)}",
                 hint="Use lower case, without spaces at the ends and without : , @ /",
             )
-        self._check(name, thing)
+        self.check(name, thing)
         home, old = _home(thing), self._registered.get(name)
         if self._homes.get(name, home) != home or (old is not None and _home(old) != home):
             raise self._error(
@@ -192,5 +194,25 @@ def must_be(kind: type, error: type[OptiSenseError], noun: str) -> Callable[[str
     def check(name: str, given: object) -> None:
         if not isinstance(given, kind):
             raise error(f"the {noun} '{name}' is no {kind.__name__}")
+
+    return check
+
+
+def must_derive(
+    base: type, error: type[OptiSenseError], noun: str
+) -> Callable[[str, object], None]:
+    """Return a check for a `Registry` that refuses all but subclasses of a class.
+
+    Args:
+        noun: what the registry holds, as messages call it.
+    """
+
+    def check(name: str, given: object) -> None:
+        if not (isinstance(given, type) and issubclass(given, base)):
+            raise error(
+                f"the {noun} '{name}' is not a subclass of {base.__name__}",
+                where=place_of_definition(given),
+                hint=f"Derive its class from {base.__module__}.{base.__name__}",
+            )
 
     return check

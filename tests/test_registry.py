@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+import optisense.design.lenses  # noqa: F401  defines further kinds
+from optisense import sensors
+from optisense.design.kinds import KindModel
 from optisense.engine.failures import as_data
 from optisense.engine.listing import listed
-from optisense.errors import SearchError
+from optisense.errors import ContactError, DesignError, SearchError
+from optisense.geometry import IndenterKind, Sphere, TriangleMesh, quantity, register_indenter
+from optisense.geometry.indenter_kinds import INDENTERS, indenter_from_plain
 from optisense.registry import Registry
 from optisense.search.methods import METHODS
+from optisense.sensors.registry import SENSORS
 
 MODULE = """
 import dataclasses
@@ -253,14 +262,88 @@ def test_a_misspelt_name_gets_the_near_match() -> None:
         things().find("hoem")
 
 
+def no_design() -> None:
+    """A function of a sensor that has no result."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Unnamed(IndenterKind):
+    """An indenter that works, but has no name."""
+
+    def mesh(self, reach: float, facet_error: float = 4e-4) -> TriangleMesh:
+        return Sphere(1.0).mesh(reach, facet_error)
+
+
+class Undecorated(Unnamed):
+    kind = "undecorated"
+    size: float = quantity("mm", "The diameter.")
+
+
+@dataclasses.dataclass(frozen=True)
+class Plain(Unnamed):
+    kind = "plain"
+    size: float = quantity("mm", "The diameter.")
+    colour: str = "red"
+
+
+@dataclasses.dataclass(frozen=True)
+class Reading(Plain):
+    kind = "reading"
+
+    @classmethod
+    def from_text(cls, text: str) -> Reading:
+        return cls(1.0, text)
+
+    @classmethod
+    def from_plain(cls, values: Mapping[str, Any]) -> Reading:
+        return cls(1.0, values["colour"])
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        (no_design, "not a subclass of IndenterKind"),
+        (Unnamed, "no attribute 'kind'"),
+        (Undecorated, "no dataclass"),
+        (Plain, "fields without a quantity: colour"),
+    ],
+)
+def test_an_indenter_that_could_not_be_read_is_refused(kind: Any, words: str) -> None:
+    with INDENTERS.forgetting(), pytest.raises(ContactError, match=words):
+        register_indenter(kind)
+    with INDENTERS.forgetting(), pytest.raises(ContactError, match=words):
+        INDENTERS.register("name", kind)
+
+
+def test_an_indenter_may_read_itself() -> None:
+    with INDENTERS.forgetting():
+        register_indenter(Reading)
+        assert indenter_from_plain({"kind": "reading", "colour": "blue"}) == Reading(1.0, "blue")
+
+
+def test_a_sensor_that_is_no_design_is_refused() -> None:
+    with SENSORS.forgetting():
+        with pytest.raises(DesignError, match="'odd' is no function"):
+            SENSORS.register("odd", "a text")  # type: ignore[arg-type]
+        SENSORS.register("odd", no_design)  # type: ignore[arg-type]
+        with pytest.raises(DesignError, match="returned None, which is no SensorDesign") as found:
+            sensors.load("odd")
+        assert found.value.where == f"{__file__}: no_design"
+
+
+def test_every_interface_refuses_what_is_no_kind_of_it() -> None:
+    interfaces = [each for each in KindModel.__subclasses__() if "kinds" in vars(each)]
+    assert len(interfaces) == 8
+    for interface in interfaces:
+        for given in (no_design, KindModel, Registry):
+            with pytest.raises(DesignError, match=f"not a subclass of {interface.__name__}"):
+                interface.kinds.register("odd", given)
+
+
 def built_in_registries() -> list[Registry]:
     """All registries of this package."""
-    import optisense.design.lenses  # noqa: F401  defines further kinds
-    from optisense.design.kinds import KindModel
-    from optisense.geometry.indenter_kinds import INDENTERS
     from optisense.objectives.registry import OBJECTIVES
     from optisense.robots.formats import ROBOT_FORMATS
-    from optisense.sensors.registry import SENSORS
     from optisense.workshop._formats import FORMATS
 
     kinds = [kind.kinds for kind in KindModel.__subclasses__()]

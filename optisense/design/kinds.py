@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema, PydanticKnownError, core_schema
 from optisense.design.fields import IN_FOLDER, Model
 from optisense.errors import DesignError, LibraryError, OptiSenseError
 from optisense.own_code import error_of_own_code
-from optisense.registry import Registry
+from optisense.registry import Registry, must_derive
 from optisense.text import brief
 from optisense.untrusted_files import MOST_DATA, inside, read_bytes
 
@@ -42,9 +42,11 @@ class KindModel(Model):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
-        """Register a kind when its class is created."""
+        """Register a kind when its class is created; only such classes are an interface's kinds."""
         super().__pydantic_init_subclass__(**kwargs)
-        if "kinds" not in cls.__dict__ and not cls.model_fields["kind"].is_required():
+        if "kinds" in cls.__dict__:
+            cls.kinds.check = must_derive(cls, DesignError, cls.kinds.noun)
+        elif not cls.model_fields["kind"].is_required():
             cls.kinds.register(cls.model_fields["kind"].default, cls)
 
     @classmethod

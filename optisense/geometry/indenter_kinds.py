@@ -22,7 +22,7 @@ from optisense.errors import ContactError
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rotations import turn_about_axes
 from optisense.near import suggestion
-from optisense.registry import Registry
+from optisense.registry import Registry, must_derive, place_of_definition
 
 FACET_ERROR = 4e-4
 """Largest distance (mm) of facets from the exact shape: a hundredth of the width that a pixel of
@@ -231,11 +231,33 @@ def tilted(indenter: Indenter, tilt_x: float, tilt_y: float) -> Indenter:
 
 
 def _check(name: str, kind: Any) -> None:
-    if not (isinstance(kind, type) and issubclass(kind, IndenterKind)):
-        raise ContactError(
-            f"the indenter '{name}' is not a subclass of IndenterKind",
-            hint="Derive its class from optisense.geometry.IndenterKind",
-        )
+    must_derive(IndenterKind, ContactError, "kind of indenter")(name, kind)
+    if not isinstance(getattr(kind, "kind", None), str):
+        problem, hint = "has no attribute 'kind'", "Give it one: its name in text, in lower case"
+    elif "__dataclass_fields__" not in vars(kind):
+        problem, hint = "is no dataclass", "Decorate it with @dataclasses.dataclass(frozen=True)"
+    elif not _reads_itself(kind) and (plain := _plain_fields(kind)):
+        problem = f"has fields without a quantity: {', '.join(plain)}"
+        hint = "Make them with optisense.geometry.quantity, or override from_text and from_plain"
+    else:
+        return
+    raise ContactError(
+        f"the class of the kind of indenter '{name}' {problem}",
+        where=place_of_definition(kind),
+        hint=hint,
+    )
+
+
+def _reads_itself(kind: type[IndenterKind]) -> bool:
+    """Return whether a kind has its own reading of text and of requests."""
+    return all(
+        getattr(kind, name).__func__ is not getattr(IndenterKind, name).__func__
+        for name in ("from_text", "from_plain")
+    )
+
+
+def _plain_fields(kind: type[IndenterKind]) -> list[str]:
+    return [each.name for each in dataclasses.fields(kind) if "quantity" not in each.metadata]
 
 
 INDENTERS: Registry[type[IndenterKind]] = Registry(
@@ -259,8 +281,9 @@ def register_indenter(kind: type[IndenterKind]) -> type[IndenterKind]:
     """Add a kind of indenter by its `kind`; usable as a class decorator.
 
     Raises:
-        ContactError: the name is taken or malformed.
+        ContactError: the name is taken or malformed, or the class does not fit.
     """
+    _check(getattr(kind, "__name__", repr(kind)), kind)
     return INDENTERS.register(kind.kind, kind)
 
 

@@ -11,7 +11,18 @@ from optisense.design import Diagnostic, SensorDesign, check_design, load_design
 from optisense.design.problems import raise_problems
 from optisense.errors import DesignError
 from optisense.near import suggestion
-from optisense.registry import Registry
+from optisense.registry import Registry, place_of_definition
+from optisense.text import brief
+
+
+def _check(name: str, builder: object) -> None:
+    if not callable(builder):
+        raise DesignError(
+            f"the sensor '{name}' is no function",
+            where=place_of_definition(builder),
+            hint="Name a function that returns a SensorDesign",
+        )
+
 
 SENSORS: Registry[Callable[[], SensorDesign]] = Registry(
     "built-in sensor",
@@ -33,6 +44,7 @@ SENSORS: Registry[Callable[[], SensorDesign]] = Registry(
         "gelsight-mini-spherical": "optisense.sensors._gelsight_mini:gelsight_mini_spherical",
         "gelsight-svelte": "optisense.sensors._gelsight_svelte:gelsight_svelte",
     },
+    _check,
 )
 """Functions that build a sensor with its default dimensions; other packages add theirs under the
 entry-point group `optisense.sensors`."""
@@ -44,12 +56,21 @@ def build(name: str) -> SensorDesign:
     """Build a sensor with its default dimensions.
 
     Raises:
-        DesignError: there is no such sensor; the message suggests a similar name.
+        DesignError: there is no such sensor, and the message suggests a similar name; or its
+            function returns no design.
     """
     builder = SENSORS.find(name)
-    if builder.__module__.startswith("optisense.sensors."):
+    if getattr(builder, "__module__", "").startswith("optisense.sensors."):
         return _built(builder).copy()
-    return builder()
+    design: object = builder()
+    if not isinstance(design, SensorDesign):
+        raise DesignError(
+            f"the function of the sensor '{name}' returned {brief(repr(design))}, which is no "
+            "SensorDesign",
+            where=place_of_definition(builder),
+            hint="Return the design",
+        )
+    return design
 
 
 @cache
