@@ -144,9 +144,8 @@ def _problems(
         if kind in ("enum", "literal_error") and isinstance(given, str):
             words = str(context.get("expected", "")).replace(" or ", ", ").replace("'", "")
             hint = suggestion(given, words.split(", "))
-        found.append(
-            Diagnostic(f"'{dotted(path)}'{shown}: {text}", _place(path, where, lines), hint)
-        )
+        named = f"'{dotted(path)}'{shown}: " if path else ""  # no path: the whole value
+        found.append(Diagnostic(f"{named}{text}", _place(path, where, lines), hint))
     return found
 
 

@@ -75,3 +75,5 @@ def test_a_lamp_is_told_as_it_is_drawn(engine: Any) -> None:
     lens = engine.ask("lamp", entry="round-5mm-30")
     assert lens["window"] is None and np.isclose(lens["half_angle"], 15.0, atol=1.0)
     assert "'kind'" in engine.refused("lamp", value={"size": [1.0, 1.0]})["message"]
+    refused = engine.refused("lamp", value={"kind": "spot", "cutoff": 20.0, "beam": 30.0})
+    assert (refused["message"], refused["where"]) == ("beam can't be wider than cutoff", "value")
