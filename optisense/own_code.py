@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import traceback
 from importlib.metadata import distributions
@@ -37,7 +38,7 @@ def error_of_own_code(error: BaseException) -> OwnCodeError | None:
         The error; None if no user's code took part.
     """
     adding = {
-        point.module.partition(".")[0]
+        re.split("[.:]", point.value)[0].strip()  # `point.module` fails for a malformed value
         for package in distributions()
         for point in package.entry_points
         if point.group.startswith(GROUPS)

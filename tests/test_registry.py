@@ -83,6 +83,7 @@ dent = my_parts:Dent
 [optisense.sensors]
 wide-mini = my_parts:wide_mini
 broken-mini = my_parts:no_such_thing
+malformed-mini = no module
 [optisense.methods]
 middle = my_parts:Middle
 [optisense.formats]
