@@ -8,7 +8,7 @@ from typing import Any
 from optisense.errors import OptiSenseError, SearchError
 from optisense.keyword_types import as_type, types_of
 from optisense.near import suggestion
-from optisense.objectives.files import place_of
+from optisense.own_code import place_of
 from optisense.registry import Registry, place_of_definition
 from optisense.search.methods.base import Method, Problem
 
