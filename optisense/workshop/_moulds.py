@@ -1,8 +1,9 @@
 """Moulds in which gels are cast: the gel's negative in two halves, with a sprue and a vent.
 
 The front half shapes the skin and is pulled off in the direction of the skin's outward normal; the
-back half closes it. They part where the gel is widest, which on most gels is their flat back, so
-that the parting line is not on the skin.
+back half closes it, and fills hollows that are open towards the back. They part in the plane with
+the least undercut, and of several where the outline of the gel is largest, which on most gels is
+their flat back, so that the parting line is not on the skin.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.design import Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import as_manifold, of_manifold
-from optisense.geometry.patches import mean_normal
+from optisense.geometry.patches import mean_normal, patches
+from optisense.workshop._thickened import body_between
 from optisense.workshop.shapes import Shape
 
 WALL = 8.0
@@ -38,10 +41,22 @@ FROM_EDGE = 0.5
 """Distance of sprue or vent from the edge of the gel's back, mm, so that the edge stays whole."""
 
 LEVELS = 64
-"""Number of sections in the search for the widest one; between two of them a gel hardly changes."""
+"""Number of planes in the search for the parting plane, besides both ends of the gel; between two
+of them a gel hardly changes.
+"""
 
-AT_THE_BACK = 0.05
-"""Height, as a share of the gel's, up to which the widest section is taken to be its back."""
+DECIMALS = 9
+"""Number of decimals of coordinates, mm, in the frame of pulling. A flat back is then exactly
+level, and no film of 1e-15 mm remains between it and the parting plane.
+"""
+
+SAME = 1e-3
+"""Difference of undercuts, as a share of the gel's surface, and of outlines, as a share of the
+largest, that counts as none, so that the rounding of a mesh does not choose the plane.
+"""
+
+UPRIGHT = 1e-6
+"""Sine of the slope below which a face is upright and covers nothing: rounding of coordinates."""
 
 LEAST_DRAFT = 1.0
 """Smallest draft angle, degrees: steeper faces stick to a rigid mould; silicone needs 1 to 2."""
@@ -126,7 +141,7 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
             hint="Close its mesh, or leave --moulds out",
         )
     axes = _axes(pull, gel.mesh.vertices)
-    local = TriangleMesh(gel.mesh.vertices @ axes.T, gel.mesh.faces)
+    local = TriangleMesh(np.round(gel.mesh.vertices @ axes.T, DECIMALS), gel.mesh.faces)
     solid = as_manifold(local)
     if solid.is_empty():
         raise DesignError(
@@ -135,7 +150,8 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
             hint="Repair its mesh: no edge with more than two faces, no face through another",
         )
     (left, near, bottom), (right, far, top) = local.bounds.tolist()
-    parting = _widest(solid, bottom, top)
+    held = _Held(local)
+    parting = _parting(solid, held, bottom, top)
     low, high = np.array([left, near]) - WALL, np.array([right, far]) + WALL
     front = _box(low, high, parting, top + WALL) - solid
     back = _box(low, high, bottom - WALL, parting) - solid
@@ -144,11 +160,14 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
         back += _rod(at, parting - 1.0, parting + PIN_HEIGHT, PIN)
         hole = PIN + 2.0 * CLEARANCE
         front -= _rod(at, parting - 1.0, parting + PIN_HEIGHT + CLEARANCE, hole)
+    for core in _cores(solid, local, parting):
+        back += core
+        front -= core + _widened(core)
     inside = bottom + 0.02 * (top - bottom)
     sprue, vent = _ends(solid.slice(inside), (SPRUE, VENT))
     back -= _rod(sprue, bottom - WALL - 1.0, inside, FUNNEL, SPRUE)
     back -= _rod(vent, bottom - WALL - 1.0, inside, VENT)
-    upright, undercut = _draft(local, parting)
+    upright, undercut = held.upright(parting), held.undercut(parting)
     front, back = (of_manifold(half).transformed(axes.T) for half in (front, back))
     return Mould(gel.name, front, back, axes[2], upright, undercut)
 
@@ -175,13 +194,103 @@ def _axes(pull: FloatArray, vertices: FloatArray) -> FloatArray:
     return np.array([along, np.cross(pull, along), pull])
 
 
-def _widest(solid: Any, bottom: float, top: float) -> float:
-    """Return the height of the section with the largest area, or of the back."""
-    heights = np.linspace(bottom, top, LEVELS + 2)[1:-1]
-    areas = np.array([solid.slice(float(height)).area() for height in heights])
-    first = int(np.argmax(areas >= 0.999 * areas.max()))
-    height = float(heights[first])
-    return bottom if height - bottom <= AT_THE_BACK * (top - bottom) else height
+class _Held:
+    """The faces of a gel, and which of them hold a half of the mould that parts at some height.
+
+    Args:
+        local: the gel, with z in the direction of pulling.
+    """
+
+    def __init__(self, local: TriangleMesh) -> None:
+        self._areas = local.face_areas
+        self._levels = np.sort(local.triangles[:, :, 2], axis=1)
+        self._to_back = _open_below(local, local)
+        self._slope = np.degrees(np.arcsin(np.clip(local.face_normals[:, 2], -1.0, 1.0)))
+
+    def undercut(self, parting: float) -> float:
+        """Return the area, mm^2, from which a rigid half can't be pulled off."""
+        front, back = self._shares(parting)
+        return float(front[self._slope < -UNDERCUT].sum() + back[self._slope > UNDERCUT].sum())
+
+    def upright(self, parting: float) -> float:
+        """Return the area, mm^2, that is not undercut and has less draft than `LEAST_DRAFT`."""
+        front, back = self._shares(parting)
+        ahead = (self._slope >= -UNDERCUT) & (self._slope < LEAST_DRAFT)
+        behind = (self._slope <= UNDERCUT) & (self._slope > -LEAST_DRAFT)
+        return float(front[ahead].sum() + back[behind].sum())
+
+    def _shares(self, parting: float) -> tuple[FloatArray, FloatArray]:
+        """Return the area, mm^2, of each face that the front half shapes, and the back half."""
+        low, middle, high = self._levels.T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            under = (parting - low) ** 2 / ((middle - low) * (high - low))
+            over = (high - parting) ** 2 / ((high - middle) * (high - low))
+        behind = np.where(parting <= middle, under, 1.0 - over)
+        behind = np.where(parting <= low, 0.0, np.where(parting >= high, 1.0, behind))
+        behind[self._to_back | (high - parting < 1e-6)] = 1.0
+        return self._areas * (1.0 - behind), self._areas * behind
+
+
+def _parting(solid: Any, held: _Held, bottom: float, top: float) -> float:
+    """Return the height of the plane with the least undercut, and of those the largest outline.
+
+    The outline is the convex hull of the section. The lowest plane of several is taken.
+    """
+    heights = np.linspace(bottom, top, LEVELS + 2)
+    undercuts = np.array([held.undercut(float(height)) for height in heights])
+    best = heights[undercuts <= undercuts.min() + SAME * solid.surface_area()]
+    within = 1e-3 * (top - bottom)  # a section in a flat end of the gel itself is empty
+    sections = np.clip(best, bottom + within, top - within)
+    outlines = np.array([solid.slice(float(height)).hull().area() for height in sections])
+    return float(best[np.argmax(outlines >= (1.0 - SAME) * outlines.max())])
+
+
+def _open_below(faces: TriangleMesh, gel: TriangleMesh) -> NDArray[np.bool_]:
+    """Return which faces (n,) look down and have no part of the gel below their middles."""
+    import shapely
+
+    down = np.flatnonzero(faces.face_normals[:, 2] < -UPRIGHT)
+    middles = faces.triangles[down].mean(axis=1)
+    covers = gel.triangles[gel.face_normals[:, 2] > UPRIGHT]
+    tree = shapely.STRtree(shapely.polygons(covers[:, :, :2]))
+    ray, cover = tree.query(shapely.points(middles[:, :2]), predicate="intersects")
+    normal = np.cross(covers[:, 1] - covers[:, 0], covers[:, 2] - covers[:, 0])[cover]
+    off = covers[cover, 0] - middles[ray]
+    height = np.einsum("ij,ij->i", normal, off) / normal[:, 2]  # of the cover above the middle
+    open_below = np.zeros(len(faces.faces), dtype=bool)
+    open_below[down] = True
+    open_below[down[ray[height < 0.0]]] = False
+    return open_below
+
+
+def _cores(solid: Any, local: TriangleMesh, parting: float) -> list[Any]:
+    """Return the bodies that fill the hollows of a gel above the parting plane, open towards it.
+
+    Each reaches 1 mm below the plane, into the back half.
+    """
+    upper = of_manifold(solid.trim_by_plane((0.0, 0.0, 1.0), parting)).welded()
+    above = upper.triangles[:, :, 2].max(axis=1) > parting + 1e-6
+    hollow = np.flatnonzero(_open_below(upper, local) & above)
+    steep = upper.face_normals[:, 2] < -np.sin(np.radians(UNDERCUT))
+    found = []
+    for patch in patches(upper, hollow):
+        if not steep[patch].any():
+            continue
+        roof = upper.with_faces(upper.faces[patch, ::-1]).compacted()
+        floor = roof.vertices.copy()
+        floor[:, 2] = parting - 1.0
+        found.append(as_manifold(body_between(roof, floor)))
+    return [core for core in found if core.volume() > 0.0]
+
+
+def _widened(core: Any) -> Any:
+    """Return a core with `CLEARANCE` at its ends, where the front slides along it."""
+    low, high = np.array(core.bounding_box()).reshape(2, 3)
+    factor = 1.0 + 2.0 * CLEARANCE / (high - low)
+    middle = 0.5 * (low + high)
+    move = np.array([middle[0], middle[1], 0.0])
+    scale = (float(factor[0]), float(factor[1]), 1.0)
+    return core.translate(tuple(-move)).scale(scale).translate(tuple(move))
 
 
 def _box(low: FloatArray, high: FloatArray, bottom: float, top: float) -> Any:
@@ -218,14 +327,3 @@ def _ends(cut: Any, diameters: tuple[float, float]) -> tuple[FloatArray, FloatAr
         last = corners[end > end.max() - 1e-6]
         found.append(last.mean(axis=0))
     return found[0], found[1]
-
-
-def _draft(local: TriangleMesh, parting: float) -> tuple[float, float]:
-    """Return the areas of sides with too little draft, and of undercuts, in either half, mm^2."""
-    corners, areas, up = local.triangles, local.face_areas, local.face_normals[:, 2]
-    in_front = corners[:, :, 2].mean(axis=1) > parting
-    opens = np.degrees(np.arcsin(np.clip(np.where(in_front, up, -up), -1.0, 1.0)))
-    at_parting = np.ptp(corners[:, :, 2], axis=1) + np.abs(corners[:, 0, 2] - parting) < 1e-6
-    undercut = (opens < -UNDERCUT) & ~at_parting
-    upright = (opens < LEAST_DRAFT) & ~undercut & ~at_parting
-    return float(areas[upright].sum()), float(areas[undercut].sum())

@@ -70,8 +70,17 @@ def _edges(mesh: TriangleMesh) -> tuple[NDArray[np.int32], NDArray[np.int64], ND
 
 def _plate(mesh: TriangleMesh, thickness: float) -> TriangleMesh:
     """Return the closed plate of one piece."""
+    return body_between(mesh, mesh.vertices + _offsets(mesh, thickness))
+
+
+def body_between(mesh: TriangleMesh, far: FloatArray) -> TriangleMesh:
+    """Return the closed body between a sheet and a copy of it behind its faces.
+
+    Args:
+        mesh: a welded sheet, mm.
+        far: vertices (n, 3) of the copy, mm.
+    """
     count = len(mesh.vertices)
-    far = mesh.vertices + _offsets(mesh, thickness)
     ends, inverse, counts = _edges(mesh)
     a, b = ends[counts[inverse] == 1].T
     walls = np.concatenate([np.stack([b, a, a + count], 1), np.stack([b, a + count, b + count], 1)])

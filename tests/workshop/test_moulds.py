@@ -19,6 +19,7 @@ from optisense.geometry.common_space import as_manifold
 from optisense.workshop._moulds import (
     CLEARANCE,
     FUNNEL,
+    LEVELS,
     PIN,
     PIN_HEIGHT,
     SIDES,
@@ -44,6 +45,17 @@ def cone(low: float, high: float, height: float = 5.0) -> Shape:
     """A round gel of radii at its bottom and its top."""
     profile = [[0.0, 0.0], [low, 0.0], [high, height], [0.0, height]]
     return gel(trimesh.creation.revolve(profile, sections=64))
+
+
+def shell(inner: float = 8.0, outer: float = 11.0, length: float = 36.0) -> Shape:
+    """Half a tube along x, whose feet stand on z = 0."""
+    import shapely
+
+    ring = shapely.Point(0.0, 0.0).buffer(outer) - shapely.Point(0.0, 0.0).buffer(inner)
+    half = ring & shapely.box(-outer, 0.0, outer, outer)
+    body = trimesh.creation.extrude_polygon(half, length)  # along z, upper half along y
+    turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    return gel(trimesh.Trimesh((body.vertices - [0.0, 0.0, 0.5 * length]) @ turn.T, body.faces))
 
 
 def common(one: TriangleMesh, other: TriangleMesh) -> float:
@@ -120,6 +132,47 @@ def test_upright_sides_and_undercuts_are_told() -> None:
     height = math.hypot(2.5, 2.0 * math.cos(math.pi / 64))
     assert made.undercut == pytest.approx(slope * height, rel=1e-6)
     assert "undercut" in made.note()
+
+
+@pytest.mark.parametrize("distance", [0.0, 0.3, 4.0, 12.0])
+def test_both_halves_come_off_a_gel_that_wraps_around_a_core(distance: float) -> None:
+    """They part at the feet, and the back half fills the space between these."""
+    body = shell()
+    made = mould_of(body, UP)
+    assert made.undercut == 0.0
+    assert made.front.bounds[0, 2] == pytest.approx(0.0, abs=1e-9)
+    for half, way in ((made.front, UP), (made.back, -UP)):
+        assert len(as_manifold(half).decompose()) == 1
+        moved = half.with_vertices(half.vertices + distance * way)
+        assert common(moved, body.mesh) < 1e-6 * body.mesh.volume
+    lifted = made.front.with_vertices(made.front.vertices + distance * UP)
+    assert common(lifted, made.back) < 1e-6 * body.mesh.volume
+    core = as_manifold(made.back).trim_by_plane((0.0, 0.0, 1.0), 1e-3).volume()
+    pins = 4.0 * ROUND * (0.5 * PIN) ** 2 * PIN_HEIGHT
+    assert core == pytest.approx(0.5 * math.pi * 8.0**2 * 36.0 + pins, rel=3e-3)
+
+
+def test_a_pocket_in_the_back_belongs_to_the_back_half() -> None:
+    """No block of the front half remains in it, which the gel would hold."""
+    block = trimesh.creation.box((20.0, 12.0, 4.0))
+    pocket = trimesh.creation.box(bounds=[[-4.0, -3.0, -3.0], [4.0, 3.0, 0.0]])
+    made = mould_of(gel(trimesh.boolean.difference([block, pocket])), UP)
+    assert made.undercut == 0.0
+    assert [len(as_manifold(half).decompose()) for half in (made.front, made.back)] == [1, 1]
+    assert made.back.bounds[1, 2] == pytest.approx(-2.0 + PIN_HEIGHT)
+    core = as_manifold(made.back).trim_by_plane((0.0, 0.0, 1.0), -2.0 + 1e-3).volume()
+    pins = 4.0 * ROUND * (0.5 * PIN) ** 2 * PIN_HEIGHT
+    assert core == pytest.approx(8.0 * 6.0 * 2.0 + pins, rel=1e-3)
+
+
+def test_a_ball_parts_at_its_equator() -> None:
+    made = mould_of(gel(trimesh.creation.icosphere(subdivisions=3, radius=10.0)), UP)
+    assert made.front.bounds[0, 2] == pytest.approx(0.0, abs=20.0 / LEVELS)
+    assert made.undercut < 20.0 * math.pi * 20.0 / LEVELS  # the zone between two levels
+
+
+def test_a_flat_back_leaves_no_film_across_the_cavity(of_digit: Mould) -> None:
+    assert len(as_manifold(of_digit.front).decompose()) == 1
 
 
 def test_a_turned_sensor_has_the_same_mould(of_digit: Mould, digit: SensorDesign) -> None:
