@@ -34,8 +34,11 @@ CLEARANCE = 0.15
 
 SPRUE, FUNNEL, VENT = 4.0, 8.0, 2.0
 """Diameters of the sprue at the gel, of its outer end, and of the vent, mm. Silicone flows through
-4 mm by its own weight.
+4 mm by its own weight. Where the gel's back is narrower, the holes are smaller.
 """
+
+NARROWER = 0.9
+"""Factor by which a hole and its distance from the edge are reduced until there is room."""
 
 FROM_EDGE = 0.5
 """Distance of sprue or vent from the edge of the gel's back, mm, so that the edge stays whole."""
@@ -84,6 +87,7 @@ class Mould:
         pull: unit vector (3,) in the direction in which the front is pulled off.
         upright: area of the gel's sides with less draft than `LEAST_DRAFT`, mm^2.
         undercut: area from which a rigid half can't be pulled off, mm^2.
+        has_vent: whether the back has a vent; a small back has no room for it beside the sprue.
     """
 
     name: str
@@ -92,6 +96,7 @@ class Mould:
     pull: FloatArray
     upright: float
     undercut: float
+    has_vent: bool = True
 
     def shapes(self) -> list[Shape]:
         """Return both halves, in the form of parts."""
@@ -100,8 +105,18 @@ class Mould:
             for end, mesh in (("front", self.front), ("back", self.back))
         ]
 
-    def note(self) -> str:
-        """Return a sentence on the draft."""
+    def notes(self) -> list[str]:
+        """Return a sentence on the draft, and one on the vent if there is none."""
+        if self.has_vent:
+            return [self._draft()]
+        return [
+            self._draft(),
+            f"{self.name}-mould: the gel's back has no room for a vent beside the sprue: drill one "
+            f"of {VENT:g} mm through {self.name}-mould-back, beside the sprue where the gel is "
+            "highest while you pour",
+        ]
+
+    def _draft(self) -> str:
         if self.undercut > 0.0:
             return (
                 f"{self.name}-mould: {self.undercut:.3g} mm^2 of the gel are undercut, and only a "
@@ -164,12 +179,13 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
         back += core
         front -= core + _widened(core)
     inside = bottom + 0.02 * (top - bottom)
-    sprue, vent = _ends(solid.slice(inside), (SPRUE, VENT))
-    back -= _rod(sprue, bottom - WALL - 1.0, inside, FUNNEL, SPRUE)
-    back -= _rod(vent, bottom - WALL - 1.0, inside, VENT)
+    sprue, vent = _holes(solid.slice(inside))
+    back -= _rod(sprue.at, bottom - WALL - 1.0, inside, FUNNEL, sprue.diameter)
+    if vent is not None:
+        back -= _rod(vent.at, bottom - WALL - 1.0, inside, vent.diameter)
     upright, undercut = held.upright(parting), held.undercut(parting)
     front, back = (of_manifold(half).transformed(axes.T) for half in (front, back))
-    return Mould(gel.name, front, back, axes[2], upright, undercut)
+    return Mould(gel.name, front, back, axes[2], upright, undercut, vent is not None)
 
 
 def _outward(skins: list[TriangleMesh]) -> FloatArray:
@@ -310,20 +326,47 @@ def _rod(
     return rod.translate((float(at[0]), float(at[1]), bottom))
 
 
-def _ends(cut: Any, diameters: tuple[float, float]) -> tuple[FloatArray, FloatArray]:
-    """Return the places of two holes at the ends of a gel's back, out of the camera's view."""
+@dataclass(frozen=True)
+class _Hole:
+    """Hole through the back: its place (2,) and its diameter, mm."""
+
+    at: FloatArray
+    diameter: float
+
+
+def _holes(cut: Any) -> tuple[_Hole, _Hole | None]:
+    """Return the sprue and the vent, at the ends of a gel's back, out of the camera's view.
+
+    A back of several feet has the vent on the foot that is farthest from the sprue.
+
+    Args:
+        cut: section of the gel near its back.
+
+    Returns:
+        The two holes; None for a vent that would run into the sprue.
+    """
     from shapely import Polygon, unary_union
 
     back = unary_union([Polygon(each) for each in cut.to_polygons() if len(each) > 2])
-    found = []
-    for diameter, sign in zip(diameters, (-1.0, 1.0), strict=True):
-        room = back.buffer(-(0.5 * diameter + FROM_EDGE))
-        if room.is_empty:  # it is too slim, so the hole is in the middle
-            found.append(np.array(back.representative_point().coords[0]))
-            continue
-        parts = getattr(room, "geoms", [room])
-        corners = np.concatenate([np.array(part.exterior.coords) for part in parts])
-        end = corners[:, 0] * sign
-        last = corners[end > end.max() - 1e-6]
-        found.append(last.mean(axis=0))
-    return found[0], found[1]
+    feet = list(getattr(back, "geoms", [back]))
+    sprue = min((_hole(foot, SPRUE, -1.0) for foot in feet), key=lambda hole: float(hole.at[0]))
+
+    def gap(hole: _Hole) -> float:
+        between = float(np.linalg.norm(hole.at - sprue.at))
+        return between - 0.5 * (hole.diameter + sprue.diameter)
+
+    vent = max((_hole(foot, VENT, 1.0) for foot in feet), key=gap)
+    return sprue, vent if gap(vent) >= FROM_EDGE else None
+
+
+def _hole(foot: Any, diameter: float, sign: float) -> _Hole:
+    """Return a hole at the end of a foot along x (`sign` 1) or against it (-1)."""
+    margin = 0.5 * diameter + FROM_EDGE
+    share = 1.0
+    while (room := foot.buffer(-share * margin)).is_empty:
+        share *= NARROWER
+    parts = getattr(room, "geoms", [room])
+    corners = np.concatenate([np.array(part.exterior.coords) for part in parts])
+    end = corners[:, 0] * sign
+    at = corners[end > end.max() - 1e-6].mean(axis=0)
+    return _Hole(at, share * diameter)

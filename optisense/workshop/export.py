@@ -64,7 +64,7 @@ def export(
         for name in dict.fromkeys(formats) if halves else ():
             _add(writers, name, _shape_writers(name, f"{design.name}-moulds", halves))
         if notes is not None:
-            notes += [each.note() for each in cast]
+            notes += [note for each in cast for note in each.notes()]
     for plate in plates(made):
         writers[f"{plate.name}-cut.dxf"] = _bytes_writer(cut_file(plate).encode("ascii"))
         sheet = drawing(plate, design.name)

@@ -115,14 +115,14 @@ def test_a_half_with_draft_comes_off(lift: float) -> None:
     assert made.upright == made.undercut == 0.0
     lifted = made.front.with_vertices(made.front.vertices + lift * UP)
     assert common(lifted, body.mesh) < 1e-6 * body.mesh.volume
-    assert "draft of 1 degree or more" in made.note()
+    assert "draft of 1 degree or more" in made.notes()[0]
 
 
 def test_upright_sides_and_undercuts_are_told() -> None:
     upright = mould_of(cone(8.0, 8.0), UP)
     side = 2.0 * 64 * 8.0 * math.sin(math.pi / 64) * 5.0
     assert upright.upright == pytest.approx(side, rel=1e-6)
-    assert upright.undercut == 0.0 and "release agent" in upright.note()
+    assert upright.undercut == 0.0 and "release agent" in upright.notes()[0]
     narrow = mould_of(cone(8.0, 7.0), -UP)  # pulled the other way, it parts at its front
     assert narrow.undercut == 0.0
     waist = [[0.0, 0.0], [8.0, 0.0], [6.0, 2.5], [8.0, 5.0], [0.0, 5.0]]
@@ -131,7 +131,7 @@ def test_upright_sides_and_undercuts_are_told() -> None:
     slope = 64 * math.sin(math.pi / 64) * half_way  # sum of the sides of both rings, halved
     height = math.hypot(2.5, 2.0 * math.cos(math.pi / 64))
     assert made.undercut == pytest.approx(slope * height, rel=1e-6)
-    assert "undercut" in made.note()
+    assert "undercut" in made.notes()[0]
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.3, 4.0, 12.0])
@@ -173,6 +173,29 @@ def test_a_ball_parts_at_its_equator() -> None:
 
 def test_a_flat_back_leaves_no_film_across_the_cavity(of_digit: Mould) -> None:
     assert len(as_manifold(of_digit.front).decompose()) == 1
+
+
+def holes(back: TriangleMesh, height: float) -> list[np.ndarray]:
+    """Outlines (n, 2) of the holes of a half at a height, mm, the largest first."""
+    found = [np.asarray(each) for each in as_manifold(back).slice(height).to_polygons()]
+    return sorted(found, key=lambda each: float(np.ptp(each[:, 0])), reverse=True)[1:]
+
+
+def test_a_gel_with_two_feet_has_its_sprue_and_its_vent_on_different_ones() -> None:
+    made = mould_of(shell(), UP)
+    sprue, vent = holes(made.back, -1e-3)
+    for hole, largest in ((sprue, SPRUE), (vent, VENT)):
+        assert 0.5 * largest < np.ptp(hole[:, 0]) <= largest
+        assert np.abs(hole[:, 1]).min() > 8.0 and np.abs(hole[:, 1]).max() < 11.0
+    sides = np.array([hole.mean(axis=0) for hole in (sprue, vent)])
+    assert (sides[0] * sides[1] < 0.0).all()  # on different feet, and at different ends
+    assert len(made.notes()) == 1
+
+
+def test_a_back_without_room_for_a_vent_tells_where_to_drill_one() -> None:
+    made = mould_of(gel(trimesh.creation.icosphere(subdivisions=3, radius=10.0)), UP)
+    assert len(holes(made.back, made.back.bounds[0, 2] + 1.0)) == 1
+    assert "drill one of 2 mm through gel-mould-back" in made.notes()[1]
 
 
 def test_a_turned_sensor_has_the_same_mould(of_digit: Mould, digit: SensorDesign) -> None:
