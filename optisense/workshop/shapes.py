@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from optisense.design import Cage, Role, SensorDesign
+from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.workshop._thickened import thickened
@@ -58,7 +59,8 @@ def is_air(design: SensorDesign, name: str) -> bool:
 def shapes(design: SensorDesign) -> list[Shape]:
     """Return all parts of a design except its indenters and those of air, in their current shape.
 
-    Sheets have the thickness that the design gives for manufacturing.
+    Sheets have the thickness that the design gives for manufacturing, and gels have only the space
+    that solids of higher priority leave them.
 
     Raises:
         DesignError: a part has no mesh, or lies outside of the cage that deforms it.
@@ -78,6 +80,10 @@ def shapes(design: SensorDesign) -> list[Shape]:
         if mesh.is_closed and mesh.volume < 0.0:
             mesh = mesh.flipped()
         cage = next((each for each in design.cages.values() if name in each.parts), None)
+        if part.role is Role.ELASTOMER:
+            left = carved(design, meshes, name)
+            if left is not meshes[name]:
+                mesh, cage = left.welded(), None
         rest = None if cage is None else design.meshes[name].welded()
         shape = Shape(name, part.role, part.material, mesh, rest, cage)
         found.append(_as_made(shape, part.thickness))

@@ -12,6 +12,7 @@ from optisense.design import Light, LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
+from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
@@ -48,7 +49,8 @@ class Assembly:
     Attributes:
         pieces: all fixed surfaces; flat faces are merged into few triangles.
         sensing: the deformed sensing surface, with all its triangles.
-        gels: the elastomers.
+        gels: the elastomers, without what parts of higher priority cut out of them; drafts of parts
+            that bend leave it in.
         emitters: all lights; ``group`` counts in the order of ``groups``.
         fine: by number of a piece of the sensing surface, that piece with all its triangles.
         ior_before: refractive index on the inner side of the (first) sensing surface.
@@ -194,7 +196,10 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     return Assembly(
         pieces=pieces,
         sensing=sensing[0] if len(sensing) == 1 else TriangleMesh.joined(sensing),
-        gels=[meshes[name] for name in design.parts_of(Role.ELASTOMER)],
+        gels=[
+            meshes[name] if bend else carved(design, meshes, name)
+            for name in design.parts_of(Role.ELASTOMER)
+        ],
         emitters=emitters,
         groups=list(design.lights),
         fine=fine,
