@@ -14,6 +14,7 @@ from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_weights
 from optisense.geometry.coarseness import chord_error
+from optisense.geometry.common_space import without
 from optisense.geometry.containment import inside
 from optisense.geometry.folds import find_fold
 from optisense.geometry.overlaps import (
@@ -240,7 +241,8 @@ def _meetings(
             f"part '{name}', bent by cage '{cage_name}', {meeting.kind} part '{other}' "
             f"near {_text(meeting.place)}",
             _where(design, cage_name),
-            f"Move {mover} back towards its place at rest, or put '{other}' into the cage too",
+            f"Move {mover} back towards its place at rest, or put '{other}' into the cage too"
+            + _outer_face_hint(design, name, other),
             severity="error" if overlap == "no" else "warning",
         )
     ]
@@ -264,16 +266,35 @@ def _partings(
     pushed = bent[other].is_closed and bool(inside(place[None], bent[other])[0])
     if pushed and overlap == "yes":
         return []
+    if _shares_space(mesh, rest) and _shares_space(bent[name], bent[other]):
+        return []  # it reaches into the other part, and only the ends of their overlap moved
     what = "is pushed into" if pushed else "has come off"
     return [
         Diagnostic(
             f"part '{name}', bent by cage '{cage_name}', {what} part '{other}', on which it lies "
             f"at rest, near {_text(place)}",
             _where(design, cage_name),
-            f"Put '{other}' into the cage too, or move {mover} back",
+            f"Put '{other}' into the cage too, or move {mover} back"
+            + _outer_face_hint(design, name, other),
             severity="error" if pushed and overlap == "no" else "warning",
         )
     ]
+
+
+def _shares_space(one: TriangleMesh, other: TriangleMesh) -> bool:
+    """Return whether two solids share more space than parts that touch."""
+    return one.is_closed and other.is_closed and without(one, other, CONTACT) is not one
+
+
+def _outer_face_hint(design: SensorDesign, name: str, other: str) -> str:
+    """Return how to bend only the outer face of a gel that lies on a rigid part; else nothing."""
+    roles = design.parts[name].role, design.parts[other].role
+    if roles != (Role.ELASTOMER, Role.SUPPORT):
+        return ""
+    return (
+        f"; to bend only the outer face of '{name}', let its mesh reach into '{other}', and give "
+        f"'{other}' the higher priority"
+    )
 
 
 def _mover(design: SensorDesign, cage_name: str, name: str, vertex: int) -> str:

@@ -22,6 +22,7 @@ from optisense.design import (
 )
 from optisense.design.cage_edit import select_points
 from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
 
 
 @pytest.fixture(scope="module")
@@ -106,6 +107,7 @@ class TestChecks:
         assert [p.severity for p in lifted] == ["warning"]
         # The middle of the gel's bottom, at -4.25 mm, follows by 1/2 * 1/2 of the 2 mm.
         assert "has come off part 'tray'" in lifted[0].message and "-3.75" in lifted[0].message
+        assert "let its mesh reach into 'tray'" in str(lifted[0].hint)
 
     def test_a_gel_pushed_into_its_tray(self, mini: SensorDesign) -> None:
         """The gel has the larger priority, so the tray gives way: odd, but it can be simulated."""
@@ -114,6 +116,22 @@ class TestChecks:
         assert "is pushed into part 'tray'" in cage_problems(pushed)[0].message
         equal = set_value(pushed, "parts.gel.priority", 0)
         assert [p.severity for p in cage_problems(equal)] == ["error"]
+
+    @pytest.mark.parametrize("up", [2.0, -2.0])
+    def test_a_gel_that_reaches_into_its_core_bends_alone(
+        self, mini: SensorDesign, up: float
+    ) -> None:
+        """Gel and core share space but no face of one crosses the other; the ends of both are in
+        one plane, in which vertices of the gel move off those of the core."""
+        bare = set_value(remove_cage(mini, "skin"), "parts.tray.priority", 2)
+        del bare.meshes["skin"], bare.meshes["guide"]
+        bare.meshes["gel"] = TriangleMesh.box((-10.0, -8.0, -4.25), (10.0, 8.0, 0.0), (10, 8, 8))
+        bare.meshes["tray"] = TriangleMesh.box((-10.0, -4.0, -4.25), (10.0, 4.0, -2.0))
+        caged = add_cage(bare, "bend", ["gel"])
+        assert cage_problems(move_points(caged, "bend", {"*,*,2": (0.0, 0.0, up)})) == []
+        bare.meshes["tray"] = TriangleMesh.box((-10.0, -4.0, -5.25), (10.0, 4.0, -4.25))
+        off = move_points(add_cage(bare, "bend", ["gel"]), "bend", {"1,*,0": (0.0, 0.0, up)})
+        assert len(cage_problems(off)) == 1
 
     def test_parts_in_one_cage_go_together(self, mini: SensorDesign) -> None:
         bare = remove_cage(mini, "skin")
