@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from optisense.array_types import FloatArray
 from optisense.design._spectrum import LightSpectra
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, Direction, Model, Name, NonNegative, Vector, is_left_out
@@ -61,3 +63,22 @@ class LightGroup(Model):
         colour = np.array(self.colour)
         dies = self.flux * colour / colour.sum()
         return np.asarray(dies if self.spectrum is None else dies @ self.spectrum.spread())
+
+
+@lru_cache(maxsize=4096)
+def frame_of(
+    direction: tuple[float, float, float], up: tuple[float, float, float] | None
+) -> FloatArray:
+    """Return the unit vectors (3, 3) of width axis, height axis and direction of a light, as rows.
+
+    The array is shared between calls and must not be changed.
+    """
+    n = np.asarray(direction, float)
+    n = n / np.linalg.norm(n)
+    s = np.cross(np.asarray(up if up is not None else (0.0, 0.0, 1.0), float), n)
+    if np.linalg.norm(s) < 1e-6:
+        s = np.cross((1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0), n)
+    s = s / np.linalg.norm(s)
+    frame = np.stack([s, np.cross(n, s), n])
+    frame.flags.writeable = False
+    return frame

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from optisense.design import SensorDesign, check_design, load_design, set_value
+from optisense.design import SensorDesign, load_design, set_value
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, design_error
 from optisense.design.sensor_design import dotted
@@ -19,9 +19,9 @@ from optisense.design.storage import DESIGN_FILE, file_inside
 from optisense.engine.failures import InvalidDesignError, ProtocolError, place_in
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
-from optisense.library import names
 from optisense.near import near_match
 from optisense.sensors import load
+from optisense.sensors.registry import find_problems
 from optisense.untrusted_arrays import read_array
 from optisense.untrusted_files import is_folder
 
@@ -118,7 +118,7 @@ class Designs:
         """Return all problems that `check` finds; the answer for the last design is cached."""
         if self._sound is not None and _same(self._sound[0], design):
             return self._sound[1]
-        found = check_design(design, light_names=names("light"))
+        found = find_problems(design)
         self._sound = design, found
         return found
 

@@ -16,6 +16,11 @@ NEAR_EDGE = 1e-9
 """Distance of a ray from an edge, as a share of the face's size, below which its result is not
 used: far above the rounding of double precision (1e-16)."""
 
+BLOCK = 9
+"""Number of points, one after another, for which the faces near all of them are selected first: the
+points at which the window of a light is tested lie close together.
+"""
+
 
 def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
     """Return a mask (n,) of the points (n, 3), mm, inside a closed mesh of either winding.
@@ -30,19 +35,37 @@ def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
     if len(near) == 0:
         return result
     frame = _frame()
-    turned = mesh.vertices @ frame.T
-    a, b, c = (turned[mesh.faces[:, corner]] for corner in range(3))
+    turned = frame @ mesh.vertices.T
+    a, b, c = (turned[:, mesh.faces[:, corner]] for corner in range(3))
     lowest = np.minimum(np.minimum(a, b), c)
     highest = np.maximum(np.maximum(a, b), c)
-    for index, place in zip(near, places[near] @ frame.T, strict=True):
-        beside = (lowest[:, 0] <= place[0]) & (highest[:, 0] >= place[0])
-        beside &= (lowest[:, 1] <= place[1]) & (highest[:, 1] >= place[1])
-        beside &= highest[:, 2] >= place[2]
-        corners = np.stack([a[beside], b[beside], c[beside]], axis=1)
-        crossings = _crossings(corners - place)
-        turns = _turns(mesh, places[index]) if crossings is None else crossings
-        result[index] = turns != 0
+    seen = places[near] @ frame.T
+    for first in range(0, len(near), BLOCK):
+        block = seen[first : first + BLOCK]
+        beside = np.flatnonzero(_beside(lowest, highest, block.min(axis=0), block.max(axis=0)))
+        low, high = lowest[:, beside], highest[:, beside]
+        for index, place in zip(near[first : first + BLOCK], block, strict=True):
+            met = beside[_beside(low, high, place, place)]
+            corners = np.stack([a[:, met].T, b[:, met].T, c[:, met].T], axis=1)
+            crossings = _crossings(corners - place)
+            turns = _turns(mesh, places[index]) if crossings is None else crossings
+            result[index] = turns != 0
     return result
+
+
+def _beside(
+    lowest: FloatArray, highest: FloatArray, low: FloatArray, high: FloatArray
+) -> NDArray[np.bool_]:
+    """Return a mask (m,) of the faces that rays along +z from a box may meet.
+
+    Args:
+        lowest, highest: bounds (3, m) of the faces.
+        low, high: bounds (3,) of the box.
+    """
+    beside: NDArray[np.bool_] = (lowest[0] <= high[0]) & (highest[0] >= low[0])
+    beside &= (lowest[1] <= high[1]) & (highest[1] >= low[1])
+    beside &= highest[2] >= low[2]
+    return beside
 
 
 def _frame() -> FloatArray:

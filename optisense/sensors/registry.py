@@ -12,6 +12,7 @@ from optisense.design.problems import raise_problems
 from optisense.errors import DesignError
 from optisense.near import suggestion
 from optisense.registry import Registry, place_of_definition
+from optisense.sensors.light_checks import light_problems
 from optisense.text import brief
 
 
@@ -127,6 +128,16 @@ def check(design: SensorDesign) -> list[Diagnostic]:
     Raises:
         DesignError: the design can't be simulated, or its simulation would be wrong.
     """
-    problems = check_design(design, light_names=library.names("light"))
-    raise_problems(problems, f"design '{design.name}'")
-    return problems
+    found = find_problems(design)
+    raise_problems(found, f"design '{design.name}'")
+    return found
+
+
+def find_problems(design: SensorDesign) -> list[Diagnostic]:
+    """Return all problems of a design that can be found without rendering it: those of
+    `optisense.design.check_design`, then those of its lights.
+    """
+    found = check_design(design, light_names=library.names("light"))
+    if not any(each.severity == "error" for each in found):
+        found += light_problems(design)
+    return found

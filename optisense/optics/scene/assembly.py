@@ -10,6 +10,7 @@ import numpy as np
 from optisense import library
 from optisense.design import Light, LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
+from optisense.design.lights import frame_of
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.priorities import carved
@@ -22,7 +23,6 @@ from optisense.optics.scene.emitters import (
     DISC_CORNERS,
     Emitter,
     EmitterShape,
-    frame_of,
 )
 from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from functools import lru_cache
 
 import drjit as dr
 import mitsuba as mi
@@ -19,6 +18,7 @@ import numpy as np
 
 from optisense.array_types import FloatingArray
 from optisense.design.emitters import Intensity
+from optisense.design.lights import frame_of
 from optisense.optics.backend.arrays import floats
 from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, RGB
 
@@ -92,25 +92,6 @@ class Emitter:
     def frame(self) -> FloatingArray:
         """Return the unit vectors (3, 3) of width axis, height axis and direction, as rows."""
         return frame_of(self.direction, self.up)
-
-
-@lru_cache(maxsize=4096)
-def frame_of(
-    direction: tuple[float, float, float], up: tuple[float, float, float] | None
-) -> FloatingArray:
-    """Return the unit vectors (3, 3) of width axis, height axis and direction of a light, as rows.
-
-    The array is shared between calls and must not be changed.
-    """
-    n = np.asarray(direction, float)
-    n = n / np.linalg.norm(n)
-    s = np.cross(np.asarray(up if up is not None else (0.0, 0.0, 1.0), float), n)
-    if np.linalg.norm(s) < 1e-6:
-        s = np.cross((1.0, 0.0, 0.0) if abs(n[0]) < 0.9 else (0.0, 1.0, 0.0), n)
-    s = s / np.linalg.norm(s)
-    frame = np.stack([s, np.cross(n, s), n])
-    frame.flags.writeable = False
-    return frame
 
 
 @dataclass

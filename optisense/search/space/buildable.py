@@ -16,10 +16,10 @@ from optisense.design.cage_checks import contact_problems
 from optisense.design.material_checks import is_gas
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import find_coincident
-from optisense.geometry.containment import inside
 from optisense.geometry.overlaps import CONTACT, near_surface
 from optisense.geometry.surface import closest_points
 from optisense.search.space.constraints import same_shape
+from optisense.sensors.light_checks import FLUSH, windows_in
 
 LEAST_KEPT_CONTACT = 0.99
 """Share of the contact area of two parts that a trial must keep. The remaining hundredth covers
@@ -39,9 +39,8 @@ R2_STEPS = (0.7548776662466927, 0.5698402909980532)
 evenly over a square (Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018)."""
 
 SEAT_DISTANCE = 0.1
-"""Largest distance of a light from the opaque part that it sits on, mm, and largest depth in a part
-of a light that lies against its face. Lights of the built-in sensors are 0.01 mm off their boards,
-and 0.2 mm or more off the transparent parts into which they shine.
+"""Largest distance of a light from the opaque part that it sits on, mm. Lights of the built-in
+sensors are 0.01 mm off their boards.
 """
 
 
@@ -194,7 +193,7 @@ class LightsOnSupports:
 
 
 class LightsOutsideParts:
-    """Constraint: no light may be inside of a part in which it is not at the start.
+    """Constraint: no window of a light may reach into a part in which it is not at the start.
 
     A light in the acrylic of a tray is brighter than one in front of it, but there is no room for
     an LED. Lights that are cast into a part from the beginning, as those of GelSight360, are
@@ -203,35 +202,34 @@ class LightsOutsideParts:
 
     def __init__(self, design: SensorDesign) -> None:
         """Find the lights inside of parts in the design that the search starts from."""
-        self._always = self._within(design)
+        parts = _solids(design)
+        self._always = {
+            (each.group, each.number, each.part)
+            for each in windows_in(design, parts, set())
+            if each.middle or each.depth(parts[each.part]) > FLUSH
+        }
 
     def __call__(self, design: SensorDesign) -> str | None:
         """Return a message with the light that is inside of a part, or None."""
-        for group, index, part in sorted(self._within(design) - self._always):
-            place = np.array(design.lights[group].lights[index].position)
-            mesh = design.deformed_meshes()[part]
-            deep = float(np.linalg.norm(closest_points(mesh, place) - place, axis=1).min())
-            if deep > SEAT_DISTANCE:
+        parts = _solids(design)
+        for each in windows_in(design, parts, self._always):
+            deep = each.depth(parts[each.part])
+            if deep > FLUSH:
                 return (
-                    f"light {index} of group '{group}' is {deep:.2g} mm inside part '{part}', "
-                    "where no light can be, and is outside of it in the design that the search "
-                    "starts from"
+                    f"the window of light {each.number} of group '{each.group}' reaches "
+                    f"{deep:.2g} mm inside part '{each.part}', where no light can be, and is "
+                    "outside of it in the design that the search starts from"
                 )
         return None
 
-    def _within(self, design: SensorDesign) -> set[tuple[str, int, str]]:
-        """Return group, index and part of the lights that are inside of a closed part."""
-        found = set()
-        meshes = design.deformed_meshes()
-        for part, mesh in meshes.items():
-            if design.parts[part].role is Role.INDENTER or not mesh.is_closed:
-                continue
-            for group, lights in design.lights.items():
-                places = np.array([light.position for light in lights.lights])
-                if len(places):
-                    within = np.flatnonzero(inside(places, mesh))
-                    found |= {(group, int(index), part) for index in within}
-        return found
+
+def _solids(design: SensorDesign) -> dict[str, TriangleMesh]:
+    """Return the closed meshes, mm, of all parts except indenters, by part."""
+    return {
+        name: mesh
+        for name, mesh in design.deformed_meshes().items()
+        if mesh.is_closed and design.parts[name].role is not Role.INDENTER
+    }
 
 
 class DeformedPartsInContact:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from pydantic import ValidationError
-from scipy.spatial import cKDTree
 
-from optisense import library
 from optisense.design import Camera, LightGroup, Provenance, Role, Status
 from optisense.design.colour import NAMED_COLOURS
 from optisense.design.problems import design_error
@@ -78,7 +76,6 @@ def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGro
         )
     except ValidationError as error:
         raise design_error(error, {}, where=where, model=LightGroup) from None
-    _note_crowded(state, name, group)
     if choice.row is not None:
         _note_beyond(state, name, group, choice.row)
     return group
@@ -95,20 +92,6 @@ def _note_beyond(state: RecipeState, name: str, group: LightGroup, row: LightRow
         state.notes.append(
             f"lights {name}: {beyond} of {len(places)} are beyond the ends of {part}, which is "
             f"{high[along] - low[along]:.4g} mm long along {'xyz'[along]}"
-        )
-
-
-def _note_crowded(state: RecipeState, name: str, group: LightGroup) -> None:
-    """Note if lights are closer than their bodies are wide."""
-    package = getattr(library.entry("light", group.model), "package", None)
-    if package is None or len(group.lights) < 2:
-        return
-    places = np.array([light.position for light in group.lights])
-    nearest = float(cKDTree(places).query(places, k=2)[0][:, 1].min())
-    if nearest < min(package[:2]) - 1e-6:
-        state.notes.append(
-            f"lights {name}: they are {nearest:.2f} mm apart, but a {group.model} is "
-            f"{package[0]:g} x {package[1]:g} mm"
         )
 
 
