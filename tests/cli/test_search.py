@@ -116,6 +116,22 @@ def test_apply_writes_the_better_design(study: Path, tmp_path: Path) -> None:
         assert said in wrong.output
 
 
+def test_apply_marks_what_was_moved(mine: Path, tmp_path: Path) -> None:
+    """A row of lights, one light, a part and the camera; the other rows stay as they were."""
+    moved = ("lights.blue.shift.x", "lights.green.lights[1].turn.z", "parts.guide.shift.x",
+             "camera.turn.z")  # fmt: skip
+    varied = [word for path in moved for word in ("--vary", f"{path}=0.01:0.02")]
+    folder, out = tmp_path / "study", tmp_path / "moved"
+    assert run("gelsight-mini-ideal", *varied, "-b", f"{mine}:near", "--budget", 1,
+               "--out", folder).exit_code == 0  # fmt: skip
+    words = ["apply", str(folder), "--trial", "1", "--out", str(out)]
+    assert CliRunner().invoke(app, words).exit_code == 0
+    marked = {path for path, each in ots.load(out).provenance.items() if "trial 1" in each.source}
+    groups = {"lights.blue", "lights.green"}  # have a source in the sensor, which holds no longer
+    moves = {"lights.blue.lights", "lights.green.lights[1]", "parts.guide", "camera.up"}
+    assert marked == groups | moves
+
+
 def test_json(study: Path) -> None:
     result = run("--resume", "--out", study, "--json")
     found = json.loads(result.stdout)

@@ -38,6 +38,11 @@ class DesignVariable(ABC):
         """Paths of all that it changes."""
         return [self.path]
 
+    @property
+    def values(self) -> list[str]:
+        """Paths of the values or sections of a design that it changes."""
+        return self.paths
+
     @abstractmethod
     def start(self, design: SensorDesign) -> float | str | None:
         """Return the value in a design: 0 for moves, else a name."""

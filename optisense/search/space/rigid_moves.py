@@ -28,7 +28,16 @@ class _Move(DesignVariable):
         return 0.0
 
 
-class GroupShift(_Move):
+class _GroupMove(_Move):
+    """Move of all lights of a group."""
+
+    @property
+    def values(self) -> list[str]:
+        """Paths of the values or sections of a design that it changes."""
+        return [f"lights.{self.name}.lights"]
+
+
+class GroupShift(_GroupMove):
     """Shift of all lights of a group along an axis of the design."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
@@ -36,7 +45,7 @@ class GroupShift(_Move):
         return _with_poses(design, self.name, np.eye(3), _along(self.axis, value))
 
 
-class GroupTurn(_Move):
+class GroupTurn(_GroupMove):
     """Turn of all lights of a group about an axis of the design through their middle."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
@@ -47,7 +56,7 @@ class GroupTurn(_Move):
         return _with_poses(design, self.name, turn, middle - turn @ middle)
 
 
-class GroupAim(_Move):
+class GroupAim(_GroupMove):
     """Turn of each light of a group about an axis of the design through its own position."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
@@ -63,6 +72,11 @@ class LightShift(_Move):
 
     index: int
 
+    @property
+    def values(self) -> list[str]:
+        """Paths of the values or sections of a design that it changes."""
+        return [f"lights.{self.name}.lights[{self.index}]"]
+
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the light shifted by `value` mm."""
         shift = _along(self.axis, value)
@@ -75,6 +89,11 @@ class LightTurn(_Move):
 
     index: int
 
+    @property
+    def values(self) -> list[str]:
+        """Paths of the values or sections of a design that it changes."""
+        return [f"lights.{self.name}.lights[{self.index}]"]
+
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the light turned by `value` degrees."""
         place = np.array(design.lights[self.name].lights[self.index].position)
@@ -84,6 +103,11 @@ class LightTurn(_Move):
 
 class CameraTurn(_Move):
     """Turn of the camera about one of its own axes: right, up, viewing direction."""
+
+    @property
+    def values(self) -> list[str]:
+        """Paths of the values or sections of a design that it changes."""
+        return ["camera.direction", "camera.up"]
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the camera turned by `value` degrees."""
@@ -114,6 +138,11 @@ class GroupMoves(DesignVariable):
         """Return 0, the value of every move in the starting design."""
         return 0.0
 
+    @property
+    def values(self) -> list[str]:
+        """Paths of the values or sections of a design that it changes."""
+        return [path for each in self.members for path in each.values]
+
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with all groups moved by `value`, mm or degrees."""
         for each in self.members:
@@ -121,20 +150,27 @@ class GroupMoves(DesignVariable):
         return design
 
 
-class PartShift(_Move):
-    """Shift of a part along an axis of the design."""
+class _PartMove(_Move):
+    """Move of a part."""
 
     shapes: ClassVar[bool] = True
+
+    @property
+    def values(self) -> list[str]:
+        """Paths of the values or sections of a design that it changes."""
+        return [f"parts.{self.name}"]
+
+
+class PartShift(_PartMove):
+    """Shift of a part along an axis of the design."""
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the part shifted by `value` mm."""
         return _with_mesh(design, self.name, np.eye(3), _along(self.axis, value))
 
 
-class PartTurn(_Move):
+class PartTurn(_PartMove):
     """Turn of a part about an axis of the design through the middle of its bounding box."""
-
-    shapes: ClassVar[bool] = True
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the part turned by `value` degrees."""

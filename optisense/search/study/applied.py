@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from optisense.design import Provenance, SensorDesign, Status, get_value
+from optisense.design import Part, Provenance, SensorDesign, Status, get_value
 from optisense.errors import DesignError
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
@@ -27,12 +27,14 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
         f"which scores {trial.unbiased_score:.4g}",
     )
     before = study.space.design
-    # A cage is marked as a whole; other numbers are marked one by one.
+    # A cage is marked as a whole, and so are moved lights; other numbers are marked one by one.
     varied = {
         p.asked if p.name.startswith("cages.") else target.path
         for p in study.space.parameters
         for target in p.targets
     }
+    varied |= {path for p in study.space.parameters if p.variable for path in p.variable.values}
+    varied |= {f"lights.{group}.model" for group in design.lights}  # lights.model varies them all
     known = {path: each for path, each in design.provenance.items() if _value(design, path)}
     for path in {**known, **dict.fromkeys(sorted(varied))}:
         now, then = _value(design, path), _value(before, path)
@@ -42,8 +44,13 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
 
 
 def _value(design: SensorDesign, path: str) -> tuple[Any, ...]:
-    """Return the value at a path as a tuple of one, or an empty tuple if the path names nothing."""
+    """Return the value at a path, and the vertices of a part, or an empty tuple if the path names
+    nothing.
+    """
     try:
-        return (get_value(design, path),)
+        value = get_value(design, path)
     except DesignError:
         return ()
+    if isinstance(value, Part):
+        return value, design.meshes[path.removeprefix("parts.")].vertices.tobytes()
+    return (value,)
