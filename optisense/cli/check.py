@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from optisense.cli.console import handles_errors, output
-from optisense.cli.options import ContactOption, DesignArgument, parse_contacts
+from optisense.cli.options import (
+    ContactOption,
+    DesignArgument,
+    parse_contacts,
+    print_small_indenters,
+)
 from optisense.errors import SetupError
 
 if TYPE_CHECKING:
@@ -40,6 +45,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         pressed = model.pressed(contacts, [model.place(each) for each in contacts])
         for warning in pressed.warnings:
             output.print(f"warning: {warning}", style="yellow")
+        print_small_indenters(contacts)
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
     output.print("The design is in order.", style="green")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -75,3 +76,12 @@ def parse_contacts(texts: list[str] | None) -> list[Contact]:
     from optisense.geometry import parse_contact
 
     return [parse_contact(text) for text in texts or []]
+
+
+def print_small_indenters(contacts: Sequence[Contact]) -> None:
+    """Print a warning for each indenter that is too small to be in millimetres."""
+    from optisense.cli.console import output
+    from optisense.geometry.indenter_sizes import size_warning
+
+    for warning in filter(None, map(size_warning, contacts)):
+        output.print(f"warning: {warning}", style="yellow")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -14,6 +15,7 @@ from optisense.cli.options import (
     VariantOption,
     out_option,
     parse_contacts,
+    print_small_indenters,
 )
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
@@ -23,6 +25,7 @@ from optisense.commands.rendering import RenderOptions
 from optisense.quality import PICTURE_PHOTONS
 
 if TYPE_CHECKING:
+    from optisense.geometry import Contact
     from optisense.optics import OpticalModel, RenderProgress, TactileImage
     from optisense.report.real_sensor import RealComparison
 
@@ -108,7 +111,7 @@ def render(
             real=real,
             light=light,
         )
-    _print_summary(image, out)
+    _print_summary(image, contacts, out)
     if image.interrupted:
         messages.print("interrupted: the files contain what was finished")
     if interrupt.requested:
@@ -148,7 +151,7 @@ def _show_render(line: ProgressLine, progress: RenderProgress) -> None:
     line.say(what, None, None, *notes)
 
 
-def _print_summary(image: TactileImage, folder: Path) -> None:
+def _print_summary(image: TactileImage, contacts: Sequence[Contact], folder: Path) -> None:
     """Print size, photons, noise and time of an image, its warnings, and the files."""
     from optisense.optics.imaging.tactile_image import REPORT_FILE
 
@@ -163,5 +166,9 @@ def _print_summary(image: TactileImage, folder: Path) -> None:
     output.print(", ".join(facts), style="dim")
     for warning in image.pressed.warnings if image.pressed is not None else ():
         output.print(f"warning: {warning}", style="yellow")
+    print_small_indenters(contacts)
+    if contacts and not image.interrupted and not image.contact_mask.any():
+        sentence = "warning: no pixel sees a contact: it is out of view, or too small"
+        output.print(sentence, style="yellow")
     output.print(f"picture: {folder / PICTURE}")
     output.print(f"report:  {folder / REPORT_FILE}")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 from typer.testing import CliRunner
 from warm_python import programs
@@ -47,6 +48,23 @@ def child(script: str, folder: Path) -> subprocess.CompletedProcess[str]:
 
 def written(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_an_indenter_in_metres_is_told(tmp_path: Path) -> None:
+    """A cube of 4 mm whose file is in metres, pressed 0.5 mm deep."""
+    file = tmp_path / "cube.stl"
+    trimesh.creation.box((0.004, 0.004, 0.004)).export(file)
+    hint = f"mesh:{file},1000"
+    words = ("--contact", f"mesh:{file}@0,0:0.5")
+    _, said = render(*words, *SMALL, "--out", str(tmp_path / "out"))
+    flat = "".join(said.split())
+    assert "anindenter0.004mmlargeispressed0.5mmdeep" in flat
+    assert hint in flat
+    assert "warning:nopixelseesacontact" in flat
+    for text, warned in ((f"mesh:{file}@0,0:0.5", True), (f"{hint}@0,0:0.5", False)):
+        result = CliRunner().invoke(app, ["check", "gelsight-mini-ideal", "--contact", text])
+        assert result.exit_code == 0
+        assert ("mm large" in result.output) == warned
 
 
 @pytest.fixture(scope="module")
