@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 JSON_FILE = "scores.json"
 REPORT_FILE = "scores.html"
 
+MARK = (JSON_FILE, '"shared_seconds"')
+"""File of all scores, and a text in it, by which the folder of earlier ones is recognised."""
+
 
 @handles_errors
 def _print_objectives(wanted: bool) -> None:
@@ -87,7 +90,7 @@ def evaluate(
         Settings(**shared)
         sensor = load(design)
         if out is not None:
-            take_folder(out)
+            take_folder(out, (JSON_FILE, *([REPORT_FILE] if report else [])), MARK)
 
         from optisense.objectives.scored import Scored
         from optisense.optics import OpticalModel

@@ -3,21 +3,31 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 
 from optisense.cli.console import on_exit
 from optisense.errors import OutputError
-from optisense.folders import hold
+from optisense.folders import hold, refuse_to_replace
 
 
-def take_folder(folder: Path) -> None:
+def take_folder(
+    folder: Path, files: Iterable[str] = (), mark: tuple[str, str] | None = None
+) -> None:
     """Create the folder if needed, and hold its lock against other processes until the command
     ends.
 
+    Args:
+        files, mark: files that the command writes, and the mark of its earlier results; see
+            `refuse_to_replace`. Without a mark, nothing is refused.
+
     Raises:
         FolderInUseError: another process is writing to the folder.
-        OutputError: the folder can't be written; raised before the work begins.
+        OutputError: the folder can't be written, or files of the user are in it; raised before the
+            work begins.
     """
+    if mark is not None:
+        refuse_to_replace(folder, files, mark)
     on_exit(hold(folder))
 
 

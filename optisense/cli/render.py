@@ -31,6 +31,13 @@ if TYPE_CHECKING:
 
 PICTURE = "image.png"
 
+FILES = (PICTURE, "radiance.exr", "normals.npy", "contact_mask.npy", "pressure.npy", "markers.csv",
+         "run.json", "report.html")  # fmt: skip
+"""Files that a render may write, besides its layers."""
+
+MARK = ("run.json", '"photons_asked"')
+"""File of each render, and a text in it, by which the folder of an earlier one is recognised."""
+
 
 @handles_errors
 def render(
@@ -59,7 +66,8 @@ def render(
         from optisense.sensors import load
 
         sensor = load(design)
-        take_folder(out)
+        layers = [f"layers/{group}.exr" for group in sensor.lights]
+        take_folder(out, [*FILES, *layers], MARK)
 
         from optisense.optics import OpticalModel
         from optisense.optics.backend.stages import Stage

@@ -28,6 +28,10 @@ REPORT_FILE = "verify.html"
 KEPT_FOLDER = "presses"
 """Subfolder of --out in which what was read from each press is kept while the command runs."""
 
+MARK = (JSON_FILE, '"reading_nothing"')
+"""File of each verification, and a text in it, by which the folder of an earlier one is
+recognised."""
+
 
 @handles_errors
 def verify(
@@ -105,7 +109,7 @@ def compare(
         settings = options.settings()
         names, designs = _designs(first, second, trial)
         if out is not None:
-            take_folder(out)
+            take_folder(out, (JSON_FILE, REPORT_FILE), MARK)
         line.begin(BUILDING)
         models = [
             _model(name, design, variant) for name, design in zip(names, designs, strict=True)

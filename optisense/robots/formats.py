@@ -8,6 +8,7 @@ from pathlib import Path
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError, OutputError
+from optisense.folders import refuse_to_replace
 from optisense.registry import Registry, must_be
 from optisense.robots._body import SensorBody, sensor_body
 from optisense.robots._mjcf import mjcf
@@ -73,7 +74,8 @@ def export_robot(
 
     Raises:
         DesignError: see `sensor_body`; or two parts differ in upper and lower case only.
-        OutputError: there is no such format, or the folder can't be written.
+        OutputError: there is no such format, the folder can't be written, or it holds a design or
+            files of the user with such names.
     """
     kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(formats)]
     body = sensor_body(design, mass=mass, densities=densities)
@@ -91,6 +93,9 @@ def export_robot(
         f"{MESHES}/{each.name}.stl": stl_bytes_of(f"{each.name}, metres", each.mesh)
         for each in meshes
     }
+    refuse_to_replace(
+        folder, files, (f"{MESHES}/{meshes[0].name}.stl", f"{meshes[0].name}, metres")
+    )
     finals = [inside(Path(folder), name) for name in files]
     with written_together("the files for a robot simulator") as stage:
         for final, data in zip(finals, files.values(), strict=True):

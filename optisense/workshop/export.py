@@ -9,6 +9,7 @@ from pathlib import Path
 
 from optisense.design import SensorDesign
 from optisense.errors import DesignError, OutputError
+from optisense.folders import refuse_to_replace
 from optisense.workshop._assembly_files import assembly_files
 from optisense.workshop._bill_of_materials import bill_of_materials
 from optisense.workshop._drawings import cut_file, drawing
@@ -21,6 +22,9 @@ from optisense.writing import written_together
 
 PLACEMENT_FILE = "pick-and-place.csv"
 BILL_FILES = ("bill-of-materials.csv", "bill-of-materials.md")
+
+MARK = (BILL_FILES[1], "# Bill of materials: ")
+"""File of each export, and a text in it, by which the folder of an earlier one is recognised."""
 
 Writer = Callable[[Path], object]
 
@@ -50,7 +54,8 @@ def export(
         DesignError: a part has no mesh, or lies outside of its cage; or a gel has no mould.
         SetupError: a format needs a package that is not installed.
         OutputError: there is no such format, two formats have files of one name, a format writes
-            none, or the folder can't be written.
+            none, the folder can't be written, or it holds a design or files of the user with such
+            names.
     """
     for name in formats:
         FORMATS.find(name).require()
@@ -151,6 +156,7 @@ def _write_all(folder: Path, writers: dict[str, Writer], notes: list[str]) -> li
     """Write each file under a temporary name, and rename them when all are complete; a list that a
     writer returns is added to the notes.
     """
+    refuse_to_replace(folder, writers, MARK)
     finals = [folder / file for file in writers]
     with written_together("the workshop's files") as stage:
         for final, write in zip(finals, writers.values(), strict=True):
