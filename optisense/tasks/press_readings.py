@@ -159,10 +159,15 @@ def check_seen(name: str, pair: Sequence[PressReading]) -> None:
         TaskError: neither camera sees the contact.
     """
     if not any(len(each.areas) for each in pair):
-        raise TaskError(
-            f"no camera sees the {name} where it presses",
-            hint="Use a higher --resolution, or another --seed",
-        )
+        raise not_seen(name)
+
+
+def not_seen(name: str) -> TaskError:
+    """Return the error of an object whose contact neither camera sees."""
+    return TaskError(
+        f"no camera sees the {name} where it presses",
+        hint="Use a higher --resolution, or another --seed",
+    )
 
 
 def whole_errors(

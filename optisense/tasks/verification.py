@@ -18,6 +18,7 @@ from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
+from optisense.mechanics.skins import CONFORMING
 from optisense.near import suggestion
 from optisense.objectives.score import json_ready
 from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
@@ -36,6 +37,7 @@ from optisense.tasks.press_readings import (
     PressReading,
     check_seen,
     flat_errors,
+    not_seen,
     read_press,
     whole_errors,
 )
@@ -263,6 +265,7 @@ def verify(
                 hint="Check the camera's position, direction and field of view",
             )
     chosen = choose_presses(models, settings.objects, settings.places, settings.reading.seed)
+    _check_views(models, chosen.presses, settings.reading)
     readings: list[list[PressReading]] = []
     views = []
     reach = 0.0
@@ -315,6 +318,34 @@ def _progress_of_sensor(
     progress: Callable[[int, int, int], None] | None, sensor: int, count: int
 ) -> Callable[[int], None]:
     return lambda done: None if progress is None else progress(sensor, done, count)
+
+
+def _check_views(
+    models: tuple[OpticalModel, OpticalModel],
+    presses: Sequence[UnseenPress],
+    reading: ReconstructionSettings,
+) -> None:
+    """Check by rays, before anything is rendered, that a camera sees the contact of each press.
+
+    The shape of an elastic skin takes a second to solve for, so it is only used where the overlap
+    of object and skin is in neither picture.
+
+    Raises:
+        TaskError: neither camera sees a contact.
+    """
+    from optisense.optics.transport.chief_rays import pixel_areas
+
+    views = []
+    for model in models:
+        size = reading.resolution or model.design.camera.size_at(reading.width)
+        views.append((model, size, pixel_areas(model.chief_rays(size)) > 0.0))
+    for press in presses:
+        if not any(
+            (model.chief_rays(size, [contact], skin).contact_mask & seen).any()
+            for skin in dict.fromkeys((CONFORMING, reading.skin))
+            for (model, size, seen), contact in zip(views, press.contacts, strict=True)
+        ):
+            raise not_seen(press.name)
 
 
 def _areas(model: OpticalModel, sensor: CalibratedSensor) -> FloatArray:

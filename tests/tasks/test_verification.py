@@ -186,6 +186,21 @@ def test_what_only_the_other_camera_sees_counts_as_read_flat() -> None:
         check_seen("nut", (none, none))
 
 
+def test_a_press_that_no_camera_sees_is_told_before_anything_is_rendered(
+    lambertian: Any,
+) -> None:
+    """With five by four pixels in a picture, the dots of the braille lie between pixels."""
+    few = replace(READING, resolution=(5, 4), seed=0)
+    taken: list[tuple[int, int, int]] = []
+    with pytest.raises(TaskError, match="no camera sees the braille where it presses"):
+        verify(
+            (lambertian, lambertian),
+            VerificationSettings(("braille",), places=4, readers=1, reading=few),
+            progress=lambda *each: taken.append(each),
+        )
+    assert taken == []
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
