@@ -28,8 +28,6 @@ MAX_POINTS = 480
 """Largest number of grid points along a side; an iteration then takes about 40 ms."""
 NO_OVERLAP = -1e3
 """Value of the overlap (mm) without skin or indenter: a gap that no displacement closes."""
-DOES_NOT_REACH = "an indenter does not reach the sensing surface"
-"""Message of the error for a contact without overlap."""
 PITCHES_PER_OCTAVE = 8
 """Number of grid pitches per factor of two. With few pitches and sizes of grids, presses of similar
 depths share kernels, and a press takes half the time."""
@@ -38,6 +36,10 @@ POINTS_STEP = 4
 an overlap finer than the grid still has a point on each side."""
 SEARCH_POINTS = 96
 """Number of grid points along a side of the first grid, which finds the extent of the overlap."""
+
+
+class NoFootprintError(ContactError):
+    """An indenter overlaps the skin nowhere, or at no point of the grid of its contact."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +93,7 @@ def footprint(
             bounds on their distance (`FINEST_PITCH`, `COARSEST_PITCH`).
 
     Raises:
-        ContactError: indenter and skin do not overlap.
+        NoFootprintError: indenter and skin do not overlap, or between the points of the grid only.
     """
     axes = _tangent_axes(spot.inward)
     pose = np.eye(4)
@@ -103,8 +105,8 @@ def footprint(
     rough = _overlap(body, plane, x, y)
     inside = rough > 0.0
     if not inside.any():
-        raise ContactError(
-            DOES_NOT_REACH,
+        raise NoFootprintError(
+            "an indenter does not reach the sensing surface",
             where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*spot.point),
             hint="Press deeper, or check the indenter's shape: it may have a hole there",
         )
@@ -123,7 +125,17 @@ def footprint(
             for span, size in zip(spans, sizes, strict=True)
         )
     )
-    return Footprint(spot.point, axes, x, y, _overlap(body, plane, x, y), thickness)
+    overlap = _overlap(body, plane, x, y)
+    if not (overlap > 0.0).any():
+        (left, right), (front, back) = spans
+        raise NoFootprintError(
+            f"an indenter meets the skin on {right - left:.2g} x {back - front:.2g} mm only, less "
+            f"than the model of the gel resolves, whose points are {pitch:.2g} mm apart there",
+            where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*spot.point),
+            hint="Check the unit: lengths of indenters and depths are in mm, so a ball with a "
+            "radius of 1.5 mm is sphere:1.5",
+        )
+    return Footprint(spot.point, axes, x, y, overlap, thickness)
 
 
 def _step_below(pitch: float) -> float:

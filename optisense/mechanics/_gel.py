@@ -19,7 +19,7 @@ from optisense.geometry.surface import SurfacePoint
 from optisense.mechanics._contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics._deformed_mesh import SkinMesh, skin_mesh
 from optisense.mechanics._elasticity import Elasticity
-from optisense.mechanics._footprint import DOES_NOT_REACH, POINTS_ACROSS, Footprint, footprint
+from optisense.mechanics._footprint import POINTS_ACROSS, Footprint, NoFootprintError, footprint
 from optisense.mechanics._gel_patches import GelPatches
 from optisense.mechanics._pressed_skin import PressedSkin, press
 from optisense.mechanics._rims import Rims
@@ -163,9 +163,9 @@ class Gel:
             placed: their placed meshes, if they are known.
 
         Raises:
-            ContactError: an indenter does not reach the surface or has a hole where it touches, two
-                indenters overlap on the skin, no depth gives a force, a pressure does not converge,
-                or nothing holds the gel.
+            ContactError: an indenter does not reach the surface, is too small for the model of the
+                gel, or has a hole where it touches, two indenters overlap on the skin, no depth
+                gives a force, a pressure does not converge, or nothing holds the gel.
         """
         # Matrices are small: threads would only wait for each other.
         with _linear_algebra().limit(limits=1):
@@ -231,7 +231,8 @@ class Gel:
         Contacts without a force are returned unchanged.
 
         Raises:
-            ContactError: the gel is too thin for the force.
+            ContactError: the gel is too thin for the force, or the indenter too small for its
+                model.
         """
         if contact.force is None:
             return contact
@@ -248,12 +249,10 @@ class Gel:
         def force(depth: float) -> float:
             try:
                 return self.pressed([at(depth)]).contacts[0].force
-            except ContactError as error:
-                if error.message == DOES_NOT_REACH:
-                    return 0.0
-                raise
+            except NoFootprintError:
+                return 0.0
 
-        if (greatest := force(limit)) < wanted:
+        if (greatest := self.pressed([at(limit)]).contacts[0].force) < wanted:
             raise ContactError(
                 f"a force of {wanted:g} N would press an indenter deeper than "
                 f"{100 * DEEPEST_SHARE:.0f} % of the gel, which is {limit:.2f} mm and takes "

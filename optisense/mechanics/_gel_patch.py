@@ -110,6 +110,8 @@ class GelPatch:
         Returns:
             The displacement (rows, columns) into the gel, mm.
         """
+        if not force.any():
+            return np.zeros(self.shape)
         loads = self._on_sources(force[None])[0] / -self._inward[self._sources, 2]
         rest = self._elements.moved(self._right_sides[INTO].total(loads))
         upright = -self._inward[:, 2]

@@ -311,3 +311,8 @@ def test_skin_that_turns_away_at_once_is_pressed_as_a_flat_layer():
     gel = Gel(surface, skin, [body], GEL, lambda contact: place(contact, surface, body))
     contact = Contact(Sphere(0.5), point=(9.2, -5.79, -3.17), depth=0.3)
     assert gel.pressed([contact]).contacts[0].force > 0.0
+
+
+def test_a_patch_without_loads_does_not_move():
+    patch = patch_at(*dome(14.0, 3.0), 3.0)
+    assert not patch.correction(np.zeros(patch.shape)).any()

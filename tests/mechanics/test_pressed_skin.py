@@ -187,6 +187,21 @@ def test_an_indenter_that_does_not_reach_the_skin_is_told():
         gel(lambda _: lifted).pressed([contact])
 
 
+@pytest.mark.parametrize(
+    ("indenter", "load", "size"),
+    [
+        (Sphere(0.0015), {"depth": 0.8}, r"0\.0029? x 0\.0029? mm"),
+        (Sphere(0.003), {"force": 2.0}, r"0\.005\d x 0\.005\d mm"),
+        (Cylinder(0.002), {"depth": 0.5}, r"21 x 0\.004 mm"),
+    ],
+)
+def test_indenters_too_small_for_the_grid_are_told_with_their_size(indenter, load, size):
+    contact = Contact(indenter, at=(0.0, 0.0), **load)
+    with pytest.raises(ContactError, match=f"{size} only.*lengths of indenters .* are in mm"):
+        pad = gel()
+        pad.pressed([pad.at_depth(contact)])
+
+
 def test_contacts_that_overlap_are_told_and_neighbours_are_not():
     near, far = (
         [Contact(Sphere(1.5), at=(u, 0.0), depth=0.5) for u in (-apart, apart)]
