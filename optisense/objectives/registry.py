@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design import SensorDesign
 from optisense.errors import ObjectiveError
 from optisense.near import suggestion
 from optisense.objectives.score import Drawing
@@ -60,8 +61,9 @@ class Objective:
 
     Attributes:
         name: name on the command line and in files, in lower case.
-        function: function of an `Evaluation` and its own settings (keyword arguments) that returns
-            a number, or a number and its parts, or a `Score`.
+        function: function of an `Evaluation`, or of the design (see `takes_design`), and its own
+            settings (keyword arguments) that returns a number, or a number and its parts, or a
+            `Score`.
         title: display name.
         draw: function that draws the figure of a score, or None.
         beside: names of the parts that are shown beside the value.
@@ -74,7 +76,7 @@ class Objective:
         unit: unit of the value, such as "mm"; empty for a plain number.
         lower_is_better: whether a lower value is better, as for an error. A search maximises the
             negative value of such an objective.
-        rays_only: whether it traces chief rays only and needs no light.
+        rays_only: whether it traces chief rays only, or none, and needs no light.
         usual: the values of the poorest and of the best built-in sensor, for comparison; None if
             they are not known.
         numbers: names of all its parts that are numbers, which an expression can use, such as
@@ -96,7 +98,8 @@ class Objective:
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of its result."""
-        return self.function(evaluation, **settings)
+        given = evaluation.design if takes_design(self.function) else evaluation
+        return self.function(given, **settings)
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -135,6 +138,25 @@ class Objective:
         return " ".join(text.split("\n\n")[0].split()).rstrip(".")
 
 
+def takes_design(function: Callable[..., Any]) -> bool:
+    """Return whether an objective is a function of the design, which needs neither light nor rays.
+
+    Its first parameter is annotated as a `SensorDesign`, or has no annotation and the name
+    ``design``.
+    """
+    try:
+        first = next(iter(inspect.signature(function).parameters.values()), None)
+    except (TypeError, ValueError):
+        return False
+    if first is None:
+        return False
+    if first.annotation is first.empty:
+        return first.name == "design"
+    if isinstance(first.annotation, str):  # as of `from __future__ import annotations`
+        return first.annotation.rpartition(".")[2] == SensorDesign.__name__
+    return first.annotation is SensorDesign
+
+
 def _check(name: str, given: Objective) -> None:
     if name in (CONDITIONS, WATCHED) or any(sign in name for sign in "'\""):
         raise ObjectiveError(
@@ -159,7 +181,14 @@ def _check(name: str, given: Objective) -> None:
 def _from_package(name: str, loaded: Any) -> Objective:
     if not callable(loaded):
         raise ObjectiveError(f"the objective '{name}' is not a function")
-    return Objective(name, loaded, name)
+    return _of_function(name, loaded, name)
+
+
+def _of_function(name: str, function: Callable[..., Any], title: str) -> Objective:
+    """Return the objective of a function that is given without further metadata."""
+    no_light = takes_design(function)
+    reads = no_pixels if no_light else None
+    return Objective(name, function, title, reads=reads, rays_only=no_light)
 
 
 OBJECTIVES: Registry[Objective] = Registry(
@@ -196,7 +225,7 @@ def objective(
     usual: tuple[float, float] | None = None,
     numbers: tuple[str, ...] | None = None,
 ) -> Callable[[_F], _F]:
-    """Register a function as an objective.
+    """Register a function of an `Evaluation`, or of the design, as an objective.
 
     Args:
         name: unused name in lower case.
@@ -208,7 +237,8 @@ def objective(
         range: the lowest and the highest value, as in `Objective`; any number by default.
         unit: unit of the value.
         lower_is_better: whether a lower value is better.
-        rays_only: whether it traces chief rays only and needs no light.
+        rays_only: whether it traces chief rays only and needs no light, as every function of the
+            design.
         usual: a poor and a good value, for comparison.
         numbers: names of all its parts that are numbers, if they are the same for all sensors; an
             expression with any other name is then refused before a sensor is scored.
@@ -218,17 +248,18 @@ def objective(
     """
 
     def register(function: _F) -> _F:
+        no_light = rays_only or takes_design(function)
         given = Objective(
             name,
             function,
             title or name,
             draw,
             beside,
-            no_pixels if rays_only and reads is None else reads,
+            no_pixels if no_light and reads is None else reads,
             range,
             unit,
             lower_is_better,
-            rays_only,
+            no_light,
             usual,
             numbers,
         )
@@ -318,4 +349,4 @@ def from_file(path: Path, function: str | None = None) -> Objective:
             hint=suggestion(function, known),
         )
     key = function.lower()
-    return OBJECTIVES.register(key, Objective(key, chosen, function))
+    return OBJECTIVES.register(key, _of_function(key, chosen, function))

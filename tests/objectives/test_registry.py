@@ -73,6 +73,24 @@ def test_a_function_of_a_file_can_be_named(own_file: Path) -> None:
     assert find(f"{own_file}:plain").name == "plain"
 
 
+@pytest.mark.parametrize(
+    "head",
+    [
+        "def flux(design):",
+        "import optisense\ndef flux(sensor: optisense.SensorDesign):",
+        "from __future__ import annotations\ndef flux(sensor: optisense.SensorDesign):",
+    ],
+)
+def test_a_function_of_the_design_in_a_file_is_given_the_design(head: str, tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    given = "design" if "design" in head else "sensor"
+    path.write_text(f"{head}\n    return {given}.lights['red'].flux\n")
+    found = find(f"{path}:flux")
+    assert found.rays_only
+    design = optisense.load("gelsight-mini-ideal")
+    assert optisense.evaluate(design, found).value == design.lights["red"].flux
+
+
 def test_an_edited_file_is_read_again_even_at_the_same_time_and_size(
     own_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
