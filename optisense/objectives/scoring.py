@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ from optisense.own_code import place_of
 
 RETURNS = "a number, a number and a dict of its parts, or a Score"
 
+RETURNED = "the objective returned"
+"""First words of the failure of an objective whose function returns no valid score."""
+
 
 def run_objective(
     objective: Objective, evaluation: Evaluation, settings: Mapping[str, Any] | None = None
@@ -26,6 +30,24 @@ def run_objective(
     Raises:
         SetupError: the renderer can't run on this machine.
         UnknownPartError: the objective is an expression with a part that does not exist.
+    """
+
+    def call() -> Any:
+        if isinstance(evaluation, Evaluation):  # others share its camera
+            evaluation.check_possible()
+        return objective(evaluation, **(settings or {}))
+
+    return score_of(objective, call, settings)
+
+
+def score_of(
+    objective: Objective, call: Callable[[], Any], settings: Mapping[str, Any] | None = None
+) -> Score:
+    """Return the score of an objective from the result of `call`; see `run_objective`.
+
+    Args:
+        call: function that calls the objective's function.
+        settings: settings on which the objective's range depends.
     """
     began = time.perf_counter()
 
@@ -42,10 +64,7 @@ def run_objective(
         )
 
     try:
-        if isinstance(evaluation, Evaluation):  # others share its camera
-            evaluation.check_possible()
-        result = objective(evaluation, **(settings or {}))
-        value, parts, arrays, draw = _read(result)
+        value, parts, arrays, draw = _read(call())
         low, high = objective.bounds(settings)
         parts = json_ready(parts)
     except (SetupError, UnknownPartError):
@@ -53,13 +72,11 @@ def run_objective(
     except OptiSenseError as error:
         return failed(str(error))
     except Exception as error:
-        return failed(f"{type(error).__name__}: {error} ({place_of(error)})")
+        return failed(f"{type(error).__name__}: {error} ({_place(error, objective)})")
     if not math.isfinite(value):
-        return failed(f"the objective returned {value}, which is not a finite number")
+        return failed(f"{RETURNED} {value}, which is not a finite number")
     if not low <= value <= high:
-        return failed(
-            f"the objective returned {value:g}, which is outside its range from {low:g} to {high:g}"
-        )
+        return failed(f"{RETURNED} {value:g}, which is outside its range from {low:g} to {high:g}")
     return Score(
         objective=objective.name,
         value=value,
@@ -72,6 +89,14 @@ def run_objective(
         unit=objective.unit,
         lower_is_better=objective.lower_is_better,
     )
+
+
+def _place(error: Exception, objective: Objective) -> str | None:
+    """Return the ``file:line`` of an error: the deepest one in the file of the objective's
+    function.
+    """
+    code = getattr(inspect.unwrap(objective.function), "__code__", None)
+    return place_of(error, getattr(code, "co_filename", None))
 
 
 def _read(result: Any) -> tuple[float, Mapping[str, Any], Mapping[str, Any], Any]:
@@ -90,6 +115,4 @@ def _read(result: Any) -> tuple[float, Mapping[str, Any], Mapping[str, Any], Any
 def _number(value: Any) -> float:
     if isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool):
         return float(value)
-    raise ObjectiveError(
-        f"the objective returned a {type(value).__name__}", hint=f"Return {RETURNS}"
-    )
+    raise ObjectiveError(f"{RETURNED} a {type(value).__name__}", hint=f"Return {RETURNS}")

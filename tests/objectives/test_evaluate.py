@@ -195,6 +195,10 @@ def test_a_design_can_be_scored_without_a_model() -> None:
     assert score.value == score.parts["mean_cosine"]
 
 
+def raises_in_numpy(evaluation: Evaluation) -> float:
+    return float(np.asarray(evaluation.presses[0].colours).std())
+
+
 def raises(evaluation: Evaluation) -> float:
     raise KeyError("gel")
 
@@ -203,6 +207,7 @@ def raises(evaluation: Evaluation) -> float:
     ("function", "reason"),
     [
         (raises, r"KeyError: 'gel' .*test_evaluate.py:\d+"),
+        (raises_in_numpy, r"TypeError: .*test_evaluate.py:\d+"),
         (lambda evaluation: float("nan"), "returned nan"),
         (lambda evaluation: math.inf, "returned inf"),
         (lambda evaluation: "good", "returned a str"),

@@ -12,6 +12,7 @@ import pytest
 
 from optisense.design import SensorDesign, save_design, set_value
 from optisense.errors import SearchError
+from optisense.objectives.registry import forgetting
 from optisense.quality import TRIAL_PHOTONS
 from optisense.search import Plan, SearchProgress, SearchSpace, Study, search
 from optisense.search._run_search import run_study
@@ -103,6 +104,46 @@ def test_stops_early_when_every_trial_fails(
     assert 1 <= len(study.trials) <= 6
     with pytest.raises(SearchError, match="'best'"):
         study.trial("best")
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        ("'high'", "the objective returned a str"),
+        ("float('nan')", "the objective returned nan"),
+        ("[1, 2][7]", r"IndexError: .*mine\.py:2\)"),
+    ],
+)
+def test_an_objective_that_always_fails_is_to_be_repaired(
+    answer: str, reason: str, mini: SensorDesign, tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.py"
+    file.write_text(f"def mine(design):\n    return {answer}\n")
+    with forgetting(), pytest.raises(SearchError, match=reason) as told:
+        search(mini, SPACE, f"{file}:mine", budget=10)
+    assert told.value.hint is not None
+    assert told.value.hint.startswith("Repair the objective mine,")
+
+
+def test_a_rule_that_always_fails_is_to_be_repaired(mini: SensorDesign, goals: ModuleType) -> None:
+    def torn(design: SensorDesign) -> bool:
+        return bool(design.lights["none"])
+
+    space = SearchSpace(SPACE, constraints=[torn])
+    with pytest.raises(SearchError, match=r"a constraint failed: KeyError: .*\.py:\d+") as told:
+        search(mini, space, goals.brightness, budget=10)
+    assert str(told.value.hint).startswith("Repair the rule,")
+
+
+def test_bounds_are_to_be_changed_where_only_the_start_has_a_score(mini: SensorDesign) -> None:
+    start = mini.coating.specularity
+
+    def picky(design: SensorDesign) -> float:
+        return 1.0 if design.coating.specularity == start else math.nan
+
+    with pytest.raises(SearchError, match="returned nan") as told:
+        search(mini, {"coating.specularity": (0.0, 1.0)}, picky, method="random", budget=30)
+    assert str(told.value.hint).startswith("Change the bounds")
 
 
 def test_a_rule_forbids_designs(mini: SensorDesign, goals: ModuleType) -> None:

@@ -7,7 +7,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, Protocol
 
 from optisense.array_types import FloatArray
@@ -21,6 +21,7 @@ from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
 from optisense.own_code import place_of
+from optisense.objectives.scoring import score_of
 from optisense.search.evaluation.models import ModelCache
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
@@ -238,20 +239,18 @@ class DesignEvaluator(PickledWithoutCaches):
     ) -> tuple[dict[str, float], dict[str, Mapping[str, Any]], list[str]]:
         scores = dict.fromkeys(self.names, math.nan)
         parts: dict[str, Mapping[str, Any]] = {}
-        failures = []
+        asked: list[Score] = []
         for name, function in self._functions.items():
-            value = float(function(design))
-            if not math.isfinite(value):
-                failures.append(f"{name} returned {value}, which is not a finite score")
-                value = math.nan
-            scores[name] = value
+            score = score_of(Objective(name, function, name), partial(function, design))
+            scores[name] = score.value
+            asked.append(score)
         if self.renders:
             found = self.objective_scores(design, seed)
             needed = {each.name for each in self._goal_objectives}
             for name, score in found.items():
                 if name in scores:
                     scores[name], parts[name] = score.value, score.to_dict()["parts"]
-            failures += _failures([found[name] for name in found if name in needed])
+            asked += [found[name] for name in found if name in needed]
             watched = {each: found[each].value for each in self._watched}
             watched = {each: value for each, value in watched.items() if math.isfinite(value)}
             if watched:
@@ -261,7 +260,7 @@ class DesignEvaluator(PickledWithoutCaches):
                     str(each): json_ready(found[each.objective().name].value)
                     for each in self.requirements
                 }
-        return scores, parts, failures
+        return scores, parts, _failures(asked)
 
     def _add_preserving(self, apart: bool) -> None:
         """Add the constraints that keep properties of the start which the space may change."""

@@ -15,13 +15,18 @@ from numpy.typing import NDArray
 from optisense.design import Role, SensorDesign
 from optisense.design.cage_checks import fold_problems
 from optisense.design.parts import TRANSPARENT_SOLIDS
-from optisense.errors import SearchError
+from optisense.errors import OptiSenseError, SearchError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.crossings import crossings
+from optisense.objectives.files import place_of
 from optisense.search.space.pickling import PickledWithoutCaches
 
 Constraint = Callable[[SensorDesign], bool | str | None]
 """Function that forbids designs: it returns False, or a text with the reason, for such a one."""
+
+
+RULE = "a constraint"
+"""First words of the errors of a rule whose function fails or returns no valid answer."""
 
 
 class CrossingParts(NamedTuple):
@@ -141,10 +146,17 @@ def why_forbidden(design: SensorDesign, constraints: Sequence[Constraint]) -> st
     """Return the reason why a design is forbidden, or None.
 
     Raises:
-        SearchError: a rule returns something other than a bool, a text or None.
+        SearchError: a rule fails, or returns something other than a bool, a text or None.
     """
     for rule in constraints:
-        said = rule(design)
+        try:
+            said = rule(design)
+        except OptiSenseError:
+            raise
+        except Exception as error:
+            raise SearchError(
+                f"{RULE} failed: {type(error).__name__}: {error}", where=place_of(error)
+            ) from error
         if isinstance(said, str):
             return said or "a constraint does not hold"
         if said is None or isinstance(said, bool | np.bool_):
@@ -153,7 +165,7 @@ def why_forbidden(design: SensorDesign, constraints: Sequence[Constraint]) -> st
             name = getattr(rule, "__name__", None) or str(rule)
             return f"the constraint {name} does not hold"
         raise SearchError(
-            f"a constraint returned a {type(said).__name__}",
+            f"{RULE} returned a {type(said).__name__}",
             hint="Return True where a design is fine, else False or a text that says why",
         )
     return None

@@ -7,7 +7,7 @@ import math
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.study.conditions import unmet, worsened
-from optisense.search.study.failures import cause_of
+from optisense.search.study.failures import cause_of, is_defect, is_of_rule
 from optisense.search.study.store import START, Row
 
 ALL_FAIL = 20
@@ -82,9 +82,21 @@ class Tally:
         return SearchError(
             f"all {self.done} trials so far have failed, {len(reasons)} of them because: "
             f"{reasons[0]}",
-            hint="Change the bounds, or see with `optisense evaluate` whether the design can be "
-            "scored at all",
+            hint=self._way_out(),
         )
+
+    def _way_out(self) -> str:
+        """Return what to do if no trial has a score."""
+        start = self._start_outcome
+        causes = [each[0] for each in self._reasons.values()]
+        if start is None or start.failure is None or not all(map(is_defect, causes)):
+            return (
+                "Change the bounds, or see with `optisense evaluate` whether the design can be "
+                "scored at all"
+            )
+        missing = [name for name, score in start.scores.items() if math.isnan(score)]
+        faulty = "the rule" if is_of_rule(causes[0]) else f"the objective {', '.join(missing)}"
+        return f"Repair {faulty}, which failed for every design that was tried, the start included"
 
     def nearest_note(self) -> str:
         """Return the conditions that the trial nearest to feasibility breaks; "" if feasible."""

@@ -6,11 +6,22 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from optisense.objectives.scoring import RETURNED
+from optisense.search.space.constraints import RULE
+
 _PLACE = re.compile(r" at \([-+\d., e]+\)(?: mm)?")
 """Pattern of coordinates in a message, such as `` at (3.76, 11.51, 86.87) mm``."""
 
-_NUMBER = re.compile(r"(?<![\w.'])[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?(?![\w'])")
-"""Pattern of a number alone; digits in a name (``M1``) or in quotes (``'2'``) are no numbers."""
+_NUMBER = re.compile(r"(?<![\w.'])(?<!\.py:)[-+]?\d+(?:[.,]\d+)*(?:e[-+]?\d+)?(?![\w'])")
+"""Pattern of a number alone; digits in a name (``M1``) or in quotes (``'2'``) and the line of an
+error in a file are no numbers."""
+
+_DEFECT = re.compile(rf"{re.escape(RETURNED)} |\.py:\d+\)")
+"""Pattern of the reason if the function of an objective, or of a rule, returned no valid value or
+raised an error other than an `OptiSenseError`."""
+
+_OF_RULE = re.compile(rf"{re.escape(RULE)} (returned|failed)")
+"""Pattern of the reason if that was the function of a rule."""
 
 
 @dataclass
@@ -26,6 +37,16 @@ class FailureCause:
     text: str
     example: str
     numbers: list[int] = field(default_factory=list)
+
+
+def is_defect(reason: str) -> bool:
+    """Return whether a reason tells of an error in the function of an objective or of a rule."""
+    return _DEFECT.search(reason) is not None or is_of_rule(reason)
+
+
+def is_of_rule(reason: str) -> bool:
+    """Return whether a reason tells of an error in the function of a rule."""
+    return _OF_RULE.match(reason) is not None
 
 
 def cause_of(reason: str) -> str:
