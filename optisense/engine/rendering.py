@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from optisense.commands.options import MOST_PIXELS
 from optisense.commands.rendering import LedgerOptions, RenderOptions
 from optisense.design import LightGroup, SensorDesign, set_value
+from optisense.design.camera import MOST_PIXELS
 from optisense.engine.contacts import (
     AnyContact,
     contacts_of,

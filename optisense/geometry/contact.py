@@ -43,8 +43,8 @@ class Contact:
             at 0 the indenter's x axis is parallel to u.
         along: (3,) direction in the design's frame whose projection on the surface replaces u as
             the direction of the x axis.
-        force: force (N) along the inward normal, instead of a depth: the depth then follows from
-            the elasticity of the gel.
+        force: force (N) along the inward normal, instead of `depth`, which then follows from the
+            elasticity of the gel.
         shift: (2,) displacement (mm) along u and v by which the indenter has moved to this place
             after it was pressed in; the elastic skin follows as far as friction allows.
         twist: rotation (degrees) about the outward normal, counter-clockwise seen from outside,
@@ -72,6 +72,8 @@ class Contact:
                     f"a contact place needs {count} finite numbers, not {values}",
                     hint="Give `at` as (u, v) or `point` as (x, y, z), in mm",
                 )
+        if self.force is not None and self.depth != Contact.depth:
+            raise ContactError("a contact has both `depth` and `force`", hint="Give one of them")
         if not (math.isfinite(self.depth) and self.depth > 0.0):
             raise ContactError(
                 f"the depth of a contact is {self.depth:g}", hint="Give a depth above 0, in mm"
@@ -98,6 +100,16 @@ class Contact:
                 f"the direction `along` of a contact is {self.along}",
                 hint="Give it as x, y, z, not all of them 0",
             )
+
+
+def refuse_no_contacts(contacts: object) -> None:
+    """Raise ContactError if an argument is not a sequence of contacts."""
+    if isinstance(contacts, Sequence) and all(isinstance(each, Contact) for each in contacts):
+        return
+    raise ContactError(
+        "the argument `contacts` is no list of contacts",
+        hint="Write [contact], also for a single one",
+    )
 
 
 def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:

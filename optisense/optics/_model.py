@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
+from optisense.design.camera import MOST_PIXELS
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
+from optisense.geometry.contact import refuse_no_contacts
 from optisense.mechanics import ELASTIC, SKINS, PressedSkin, SkinMesh
 from optisense.optics._ray_model import RayModel
-from optisense.optics._skin_view import VIEW_RESOLUTION, SkinView
+from optisense.optics._skin_view import VIEW_RESOLUTION, SkinView, is_size
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import bound_memory
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
@@ -202,10 +204,13 @@ class OpticalModel(RayModel):
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
 
         Raises:
-            ContactError: a contact is off the surface or deeper than the gel.
+            ContactError: a contact is off the surface or deeper than the gel, or `contacts` is no
+                list of contacts.
             RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
         """
+        refuse_no_contacts(contacts)
         _check_choices(estimator, skin, noise, seconds)
+        _check_pixels(resolution)
         number = None if photons is None else _photons_of(photons)
         began = time.perf_counter()
         bound_memory()
@@ -382,6 +387,16 @@ def _check_choices(estimator: str, skin: str, noise: float | None, seconds: floa
             raise RenderError(
                 f"the limit '{name}' is {value}", hint="Give a number above 0, or none"
             )
+
+
+def _check_pixels(resolution: object) -> None:
+    """Raise RenderError if a picture has too many pixels."""
+    if is_size(resolution) and resolution[0] * resolution[1] > MOST_PIXELS:
+        width, height = resolution
+        raise RenderError(
+            f"a picture of {width} x {height} pixels is too large",
+            hint=f"Ask for at most {MOST_PIXELS:,} pixels",
+        )
 
 
 def _stage_callback(

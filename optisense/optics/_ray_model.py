@@ -9,6 +9,7 @@ from optisense.design import SensorDesign, set_value
 from optisense.design.responses import PictureChain
 from optisense.design.sensor_design import refuse_no_design
 from optisense.geometry import Contact, Indenter, SensingSurface, TriangleMesh
+from optisense.geometry.contact import refuse_no_contacts
 from optisense.mechanics import ELASTIC, PressedSkin
 from optisense.optics._skin_view import SkinView, ray_camera
 from optisense.optics.backend.interrupts import reraise_interrupts
@@ -189,7 +190,12 @@ class RayModel:
             resolution: (width, height) pixels; the camera's own by default.
             skin: "conforming" or "elastic", as in `OpticalModel.render`. On an elastic skin
                 triangles have no numbers.
+
+        Raises:
+            ContactError: as in `OpticalModel.render`.
+            RenderError: the resolution is invalid.
         """
+        refuse_no_contacts(contacts)
         camera, fine = self.camera(resolution), self.scenes.fine
         if not contacts:
             return trace_chief_rays(fine.scene, camera, fine.sensing_faces)
@@ -266,6 +272,7 @@ class RayModel:
             ContactError: a contact is off the surface or deeper than the gel, or its pressure does
                 not converge.
         """
+        refuse_no_contacts(contacts)
         return self._view.gel.pressed(contacts, placed)
 
     def _deformed_scenes(self, contacts: Sequence[Contact]) -> ContactScenes:

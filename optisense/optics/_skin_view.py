@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property, partial
+from numbers import Real
+from typing import TypeGuard
 
 import numpy as np
 
@@ -33,15 +35,29 @@ camera sees. Their end points on built-in sensors are less than 1 mm apart, half
 cache's `VIEW_MARGIN`."""
 
 
+def is_size(value: object) -> TypeGuard[tuple[float, float]]:
+    """Return whether a value is two whole numbers."""
+    return (
+        isinstance(value, tuple | list | np.ndarray)
+        and len(value) == 2
+        and all(isinstance(each, Real) and float(each).is_integer() for each in value)
+    )
+
+
 def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) -> RayCamera:
     """Return the design's camera, at the given resolution (width, height) if there is one.
 
     Raises:
-        RenderError: the resolution is below one pixel.
+        RenderError: the resolution is not two whole numbers, or below one pixel.
         DesignError: the lens folds the picture over itself.
     """
     camera = design.camera
-    width, height = camera.resolution if resolution is None else resolution
+    size: object = camera.resolution if resolution is None else resolution
+    if not is_size(size):
+        raise RenderError(
+            f"the resolution is {size!r}", hint="Give width and height in pixels, as (320, 240)"
+        )
+    width, height = size
     if width < 1 or height < 1:
         raise RenderError(
             f"a picture of {width}x{height} pixels has no pixel", hint="Give e.g. 320x240"

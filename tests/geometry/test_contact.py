@@ -144,6 +144,8 @@ def test_contacts_that_cannot_be_are_refused(contact: Contact, expected: str) ->
 
 
 def test_contact_arguments_are_checked() -> None:
+    with pytest.raises(ContactError, match="both `depth` and `force`"):
+        Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.3, force=2.0)
     with pytest.raises(ContactError, match="both"):
         Contact(Sphere(1), at=(0, 0), point=(0, 0, 0))
     with pytest.raises(ContactError, match="2 finite numbers"):

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
+import math
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from comparing import ROUNDING, SCORE_ROUNDING, TURNED_BESIDE_CONTACT, same_ligh
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
-from optisense.errors import LibraryError, RenderError
+from optisense.errors import ContactError, LibraryError, RenderError
 from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
 from optisense.optics.radiance_cache._direction_bins import COARSE_BINS
@@ -134,6 +136,9 @@ def test_an_image_relit_is_the_image_of_the_design_with_those_lights() -> None:
     assert same(relit, expected)
     with pytest.raises(RenderError, match="no light group 'rde'"):
         plain.relight({"rde": (1, 1, 1)})
+    for wrong in (2.0, (-1, 0, 0), (math.nan, 0, 0), (1, 0), ("1", "0", "0")):
+        with pytest.raises(RenderError, match="power of the light group 'red'"):
+            plain.relight({"red": wrong})
 
 
 def test_an_image_does_not_depend_on_what_was_rendered_before() -> None:
@@ -240,6 +245,28 @@ def test_ground_truth_of_a_ball_is_a_sphere(skin: str, square_of_radius: float) 
     assert np.abs(np.abs((unit * image.normals[inside]).sum(axis=1)) - 1).max() < 0.01
     area = inside.sum() * (18.6 / PIXELS[0]) ** 2
     assert area == pytest.approx(np.pi * square_of_radius, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("resolution", "message"),
+    [
+        ((100_000, 100_000), "too large"),
+        ("60x80", "the resolution is '60x80'"),
+        ((60, 80, 3), "the resolution is"),
+        ((60.5, 80), "the resolution is"),
+        ((0, 80), "has no pixel"),
+    ],
+)
+def test_an_impossible_resolution_is_refused(resolution: Any, message: str) -> None:
+    with pytest.raises(RenderError, match=message):
+        model().render(resolution=resolution, photons=PHOTONS)
+
+
+@pytest.mark.parametrize("contacts", [BALL, [Sphere(1.5)]])
+def test_contacts_that_are_no_list_of_contacts_are_refused(contacts: Any) -> None:
+    for ask in (model().render, model().pressed, partial(model().chief_rays, PIXELS)):
+        with pytest.raises(ContactError, match="no list of contacts"):
+            ask(contacts)
 
 
 def test_an_unknown_skin_is_refused() -> None:

@@ -82,13 +82,20 @@ class TactileImage:
                 named keeps its light. ``LightGroup.channel_flux()`` returns the values of a design.
 
         Raises:
-            RenderError: there is no such light group.
+            RenderError: there is no such light group, or a power is not three finite numbers from
+                0.
         """
-        for name in flux:
+        for name, values in flux.items():
             if name not in self.unit_layers:
                 raise RenderError(
                     f"the image has no light group '{name}'",
                     hint="It has: " + ", ".join(self.unit_layers),
+                )
+            power = np.asarray(values)
+            if power.shape != (3,) or power.dtype.kind not in "iuf" or not _is_power(power):
+                raise RenderError(
+                    f"the power of the light group '{name}' is {values!r}",
+                    hint="Give the power of each light in R, G and B, mW, such as (2.0, 0.0, 0.0)",
                 )
         changed = {
             name: _scaled(self.unit_layers[name], np.asarray(values, dtype=np.float32))
@@ -205,6 +212,10 @@ def _layers_before(folder: Path) -> set[str]:
         return {name for name in names if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]*", name)}
     except (OutputError, LookupError, TypeError):
         return set()
+
+
+def _is_power(values: NDArray[Any]) -> bool:
+    return bool((np.isfinite(values) & (values >= 0)).all())
 
 
 def _scaled(layer: NDArray[np.float32], factors: NDArray[np.float32]) -> NDArray[np.float32]:
