@@ -337,7 +337,7 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("bounds", "said"),
         [
-            ((1.0, 0.0), "reversed"),
+            ((1.0, 0.0), "reversed.* Give 0 first and 1 second"),
             ((1.0, 1.0), "empty"),
             ((0.0, float("inf")), "not finite"),
             ((float("nan"), 1.0), "not finite"),

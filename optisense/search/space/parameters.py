@@ -199,7 +199,8 @@ def check_bounds(low: float, high: float) -> None:
         raise SearchError(f"the bounds {low:g} to {high:g} are not finite")
     if low > high:
         raise SearchError(
-            f"the bounds are reversed: {low:g} is above {high:g}", hint=f"Write {high:g}:{low:g}"
+            f"the bounds are reversed: {low:g} is above {high:g}",
+            hint=f"Give {high:g} first and {low:g} second",
         )
     if low == high:
         raise SearchError(
