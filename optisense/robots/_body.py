@@ -137,8 +137,8 @@ def sensor_body(
     if mass is None:
         of = ", ".join(f"{s.name} {m / KILOGRAMS:g}" for s, m in zip(solids, masses, strict=True))
         notes.append(
-            f"the mass is {1e3 * total:.3g} g by densities in g/cm^3 ({of}), without the camera, "
-            "boards and screws; you can give what a real sensor weighs"
+            f"the mass is {1e3 * total:.3g} g by densities in g/cm^3 ({of}), without what "
+            "the design does not contain, such as screws; you can give what a real sensor weighs"
         )
     else:
         inertia *= 1e-3 * mass / total

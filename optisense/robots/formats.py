@@ -51,7 +51,7 @@ ROBOT_FORMATS: Registry[RobotFormat] = Registry(
 def export_robot(
     design: SensorDesign,
     folder: str | Path,
-    formats: Sequence[str] = ("mujoco",),
+    formats: str | Sequence[str] = ("mujoco",),
     notes: list[str] | None = None,
     *,
     mass: float | None = None,
@@ -64,7 +64,7 @@ def export_robot(
     Args:
         design: the design.
         folder: folder for the files.
-        formats: names in `ROBOT_FORMATS`.
+        formats: one name in `ROBOT_FORMATS`, or several.
         notes: list to which notes about the files are added, one sentence each.
         mass: mass of the whole sensor, g; see `sensor_body`.
         densities: densities (g/cm^3) of parts by name; see `sensor_body`.
@@ -77,7 +77,8 @@ def export_robot(
         OutputError: there is no such format, the folder can't be written, or it holds a design or
             files of the user with such names.
     """
-    kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(formats)]
+    wanted = [formats] if isinstance(formats, str) else formats
+    kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(wanted)]
     body = sensor_body(design, mass=mass, densities=densities)
     meshes = [*body.looks, *body.hulls]
     names = [each.name.casefold() for each in meshes]

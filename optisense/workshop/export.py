@@ -32,7 +32,7 @@ Writer = Callable[[Path], object]
 def export(
     design: SensorDesign,
     folder: str | Path,
-    formats: Sequence[str] = ("stl",),
+    formats: str | Sequence[str] = ("stl",),
     notes: list[str] | None = None,
     *,
     with_moulds: bool = False,
@@ -43,7 +43,7 @@ def export(
     No file appears under its own name before all are written.
 
     Args:
-        formats: names in `FORMATS`.
+        formats: one name in `FORMATS`, or several.
         notes: list to which notes about the files are added, one sentence each.
         with_moulds: whether to write the moulds of the gels, too.
 
@@ -57,16 +57,17 @@ def export(
             none, the folder can't be written, or it holds a design or files of the user with such
             names.
     """
-    for name in formats:
+    wanted = list(dict.fromkeys([formats] if isinstance(formats, str) else formats))
+    for name in wanted:
         FORMATS.find(name).require()
     made = shapes(design)
     writers: dict[str, Writer] = {}
-    for name in dict.fromkeys(formats):
+    for name in wanted:
         _add(writers, name, _shape_writers(name, design.name, made))
     if with_moulds:
         cast = moulds(made)
         halves = [half for each in cast for half in each.shapes()]
-        for name in dict.fromkeys(formats) if halves else ():
+        for name in wanted if halves else ():
             _add(writers, name, _shape_writers(name, f"{design.name}-moulds", halves))
         if notes is not None:
             notes += [note for each in cast for note in each.notes()]

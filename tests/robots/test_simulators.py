@@ -108,6 +108,15 @@ def test_mass_properties() -> None:
     np.testing.assert_allclose(inertia, expected, rtol=1e-6, atol=1e-15)
 
 
+def test_a_format_can_be_given_alone(tmp_path: Path) -> None:
+    notes: list[str] = []
+    first, *_ = export_robot(sensors.build("gelsight360"), tmp_path, "mujoco", notes)
+    assert first.suffix == ".xml"
+    # The boards of this sensor are a part, which has a mass.
+    assert "boards" in notes[0].split("), without")[0]
+    assert "boards" not in notes[0].split("), without")[1]
+
+
 def test_a_weighed_sensor() -> None:
     design = sensors.build("gelsight-mini-ideal")
     one, other = sensor_body(design), sensor_body(design, mass=20.0)
