@@ -25,6 +25,10 @@ the others no longer represent the contact.
 CLIPPED = 254.5 / 255
 """Value from which on a channel is stored as 255 of 255 levels and counts as saturated."""
 
+FEW_ACROSS = 96
+"""Number of pixels across a picture below which its resolution may be the reason why no pixel sees
+a press: the nine places are found with as many rays (`optisense.optics`)."""
+
 DARK = 1.5 / 255
 """Value of the brightest channel up to which a pixel is black."""
 
@@ -143,7 +147,13 @@ class Press:
             ObjectiveError: the camera does not see the press.
         """
         if not self.mask.any():
-            raise ObjectiveError(f"the camera does not see {self.name}")
+            picture = self.window or PictureWindow.whole(*self.mask.shape)
+            where = f" in {picture.width} x {picture.height} pixels"
+            few = picture.width < FEW_ACROSS
+            raise ObjectiveError(
+                f"the camera does not see {self.name}{where if few else ''}",
+                hint="Use a higher resolution" if few else None,
+            )
 
     def check(self) -> None:
         """Check that the press can be scored.

@@ -284,6 +284,7 @@ def test_progress_only_grows(model: OpticalModel) -> None:
         ({"places": ((11.0, 9.0),)}, "does not see place 1"),
         ({"places": ((0.0, 0.0), (90.0, 0.0))}, "off the sensing surface"),
         ({"resolution": (16, 12)}, "needs"),
+        ({"resolution": (1, 1)}, "in 1 x 1 pixels. Use a higher resolution"),
         ({"exposure": 1e6}, "overexposed"),
         ({"exposure": 1e-9}, "black"),
     ],
