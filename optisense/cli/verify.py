@@ -166,6 +166,7 @@ def _designs(
 
     Raises:
         SearchError: there is no such trial, or it is the start itself.
+        DesignError: there is no such folder or built-in sensor.
         typer.BadParameter: only one design is named.
     """
     from optisense.errors import SearchError
@@ -180,6 +181,8 @@ def _designs(
         names = (first, second) if one.name == other.name else (one.name, other.name)
         return names, (one, other)
     if not (Path(first) / STUDY_FILE).is_file():
+        if not Path(first).exists():
+            load(first)  # raises if there is no built-in sensor of this name
         raise typer.BadParameter(
             f"'{first}' is no study; name a second design to compare it with", param_hint="DESIGN"
         )

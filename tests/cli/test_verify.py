@@ -60,6 +60,12 @@ def test_one_design_alone_is_refused() -> None:
     assert "name a second design" in told
 
 
+def test_a_folder_that_does_not_exist_is_told() -> None:
+    code, _, told = run("nope")
+    assert code == 2
+    assert "no built-in sensor and no folder 'nope'" in told
+
+
 def test_a_study_without_finished_trials_is_refused(tmp_path: Path) -> None:
     from optisense.search import Continuous, Plan, SearchSpace, Study
 
