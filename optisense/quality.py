@@ -41,6 +41,10 @@ QUICK_PHOTONS = 500_000
 MOST_PHOTONS = 10_000_000_000
 """Largest number of photons of an image; it takes days, so more is a typing error."""
 
+MOST_PIXELS = 20_000_000
+"""Largest number of pixels of a picture that may be asked for; more would take all memory, and is a
+typing error."""
+
 LEVELS = "|".join(PHOTONS)
 """Names of the levels, as help texts list them."""
 

@@ -11,9 +11,8 @@ from typing import Annotated, Any, Literal
 from annotated_types import Ge, Le
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
 
-from optisense.design.camera import MOST_PIXELS
 from optisense.mechanics.skins import SKINS
-from optisense.quality import LEVELS, photons_of
+from optisense.quality import LEVELS, MOST_PIXELS, photons_of
 
 LONGEST_RENDER = 7 * 24 * 3600.0
 """Longest time that a picture may be asked to take, s: a week; more is a typing error."""

@@ -34,10 +34,6 @@ from optisense.design.responses.electronics import ChannelMatrix
 
 Pixels = Annotated[Count, Field(le=65_536)]
 
-MOST_PIXELS = 20_000_000
-"""Largest number of pixels of a picture that may be asked for; more would take all memory, and is a
-typing error."""
-
 
 class ImagingModel(Model):
     """Effects of lens, sensor and processor on a picture; None stands for an ideal one.

@@ -13,7 +13,6 @@ from pydantic import Field
 
 from optisense.commands.rendering import LedgerOptions, RenderOptions
 from optisense.design import LightGroup, SensorDesign, set_value
-from optisense.design.camera import MOST_PIXELS
 from optisense.engine.contacts import (
     AnyContact,
     contacts_of,
@@ -29,6 +28,7 @@ from optisense.engine.requests import Lane, handles
 from optisense.engine.session import KeptImage, Session, name_of
 from optisense.errors import RenderError
 from optisense.near import suggestion
+from optisense.quality import MOST_PIXELS
 
 if TYPE_CHECKING:
     from optisense.optics import RenderProgress, TactileImage

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
-from optisense.design.camera import MOST_PIXELS
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact import refuse_no_contacts
@@ -39,7 +38,7 @@ from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
-from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
+from optisense.quality import MOST_PIXELS, PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
 
 SPPM_PASS_PHOTONS = 1_000_000
 """Largest number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on
