@@ -20,8 +20,8 @@ from optisense.objectives.named import named_in
 from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
 from optisense.objectives.score import json_ready
-from optisense.own_code import place_of
 from optisense.objectives.scoring import score_of
+from optisense.own_code import place_of
 from optisense.search.evaluation.models import ModelCache
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of

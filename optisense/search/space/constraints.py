@@ -18,7 +18,7 @@ from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.errors import OptiSenseError, SearchError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.crossings import crossings
-from optisense.objectives.files import place_of
+from optisense.own_code import place_of
 from optisense.search.space.pickling import PickledWithoutCaches
 
 Constraint = Callable[[SensorDesign], bool | str | None]
