@@ -70,11 +70,21 @@ def new(
             help="Overwrite the design in DIR: design.yaml, its meshes and its recipe.",
         ),
     ] = False,
+    discard_changes: Annotated[
+        bool,
+        typer.Option(
+            "--discard-changes",
+            help="With --from-meshes and --overwrite: also discard what was changed in the design "
+            "since a recipe made it, such as its cages.",
+        ),
+    ] = False,
 ) -> None:
     """Make a design of your own from a built-in sensor, or from CAD files."""
     if from_meshes is None:
-        if units is not None or yes:
-            raise typer.BadParameter("they need --from-meshes", param_hint="--units, --yes")
+        if units is not None or yes or discard_changes:
+            raise typer.BadParameter(
+                "they need --from-meshes", param_hint="--units, --yes, --discard-changes"
+            )
         if folder is None:
             raise typer.BadParameter(
                 "name a built-in sensor and the folder to write, or use --from-meshes",
@@ -88,7 +98,10 @@ def new(
         )
     if units is not None and units not in UNITS:
         raise typer.BadParameter(f"'{units}' is none of {', '.join(UNITS)}", param_hint="--units")
-    _from_cad(from_meshes, Path(name), units, yes, overwrite)
+    is_new = _take_folder(Path(name), overwrite)
+    if not is_new and not discard_changes:
+        _refuse_changed(Path(name))
+    _from_cad(from_meshes, Path(name), units, yes, is_new)
 
 
 def _from_built_in(name: str, folder: Path, overwrite: bool) -> None:
@@ -100,17 +113,17 @@ def _from_built_in(name: str, folder: Path, overwrite: bool) -> None:
     _print_next_steps(folder)
 
 
-def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrite: bool) -> None:
+def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: bool) -> None:
     from optisense.sensors import check, save_design
     from optisense.sensors.from_meshes import (
         RECIPE_FILE,
         design_from_meshes,
         guess_recipe,
         read_recipe,
+        save_made,
         save_recipe,
     )
 
-    is_new = _take_folder(folder, overwrite)
     if not source.exists():
         raise DesignError(
             "there is no such recipe, folder or CAD file",
@@ -149,6 +162,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, overwrit
             )
         raise
     save_design(made.design, folder, new=is_new)
+    save_made(folder)
     save_recipe(recipe, folder / RECIPE_FILE)
     for note in made.notes:
         messages.print(f"note: {note}", style="yellow")
@@ -185,6 +199,40 @@ def _take_folder(folder: Path, overwrite: bool) -> bool:
             hint="Name a folder that doesn't exist, or empty this one",
         )
     return False
+
+
+def _refuse_changed(folder: Path) -> None:
+    """Refuse to overwrite a design that was changed since a recipe made it.
+
+    Raises:
+        OutputError: it was changed, or it can't be known whether it was.
+    """
+    from optisense.design.difference import listed
+    from optisense.sensors import load
+    from optisense.sensors.from_meshes import MADE_FILE, changes_since_made
+
+    if not (folder / "design.yaml").is_file():
+        return
+    try:
+        changed = changes_since_made(folder)
+        cages = ", ".join(load(folder).cages)
+    except OptiSenseError as error:
+        message = f"the design in it can't be compared with what its recipe made: {error}"
+    else:
+        if changed == []:
+            return
+        if changed:
+            changed.sort(key=lambda line: not line.startswith("cages."))  # they are the most work
+            message = f"the design in it was changed since its recipe made it:\n{listed(changed)}"
+        else:
+            message = "it is not known what was changed in its design since a recipe made it, as "
+            message += f"there is no {MADE_FILE}" + (f"; it has the cages {cages}" if cages else "")
+    raise OutputError(
+        message,
+        where=str(folder),
+        hint="To keep the changes, write the new design into another folder and make them there; "
+        "to lose them, add --discard-changes",
+    )
 
 
 def _print_guesses(recipe: Recipe, guessed: bool) -> None:

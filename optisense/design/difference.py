@@ -21,6 +21,11 @@ LONGEST_LIST = 60
 SAME_PLACE = 1e-5
 """Distance up to which vertices count as equal, mm; mesh files hold a limited number of digits."""
 
+MOST_SHOWN = 8
+"""Largest number of differences that an error lists; the others are counted, so that the message
+fits on a screen.
+"""
+
 
 def fingerprint(design: SensorDesign) -> str:
     """Return a short text that is equal for designs whose simulations are equal."""
@@ -74,6 +79,13 @@ def plain_differences(old: Any, new: Any) -> list[str]:
     found: list[str] = []
     _compare(old, new, (), found)
     return found
+
+
+def listed(changed: list[str]) -> str:
+    """Return the first of some differences, one per line."""
+    shown = "\n".join(f"  {line}" for line in changed[:MOST_SHOWN])
+    more = len(changed) - MOST_SHOWN
+    return shown + (f"\n  and {more} more" if more > 0 else "")
 
 
 def _values(design: SensorDesign) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import optisense
 from optisense.cli import app
 from optisense.cli import new as new_module
-from optisense.design import SensorDesign
+from optisense.design import SensorDesign, add_cage
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes import read_recipe
 
@@ -67,6 +67,51 @@ def test_the_recipe_beside_the_design_makes_it_again(tmp_path: Path) -> None:
     assert (folder / "design.yaml").read_bytes() == first
     assert new("--from-meshes", recipe, folder, "--overwrite")[0] == 0
     assert np.diff(places(optisense.load(folder), "red")[:, 0]) == pytest.approx([5.0] * 3)
+
+
+class TestChangesSinceTheRecipe:
+    """A design that was changed after its recipe made it is not overwritten by the way."""
+
+    @pytest.fixture
+    def caged(self, tmp_path: Path) -> Path:
+        folder = tmp_path / "pad"
+        assert new("--from-meshes", CAD / "sensor.yaml", folder)[0] == 0
+        made = optisense.load(folder)
+        changed = add_cage(optisense.set_value(made, "name", "mine"), "bump", ["gel", "skin"])
+        optisense.save_design(changed, folder)
+        return folder
+
+    def again(self, folder: Path, *more: str) -> tuple[int, str]:
+        return new("--from-meshes", folder / "recipe.yaml", folder, "--overwrite", *more)
+
+    def test_they_are_listed_and_kept(self, caged: Path) -> None:
+        code, text = self.again(caged)
+        assert code == 1 and "cages.bump: added" in text and "name: pad sensor -> mine" in text
+        assert list(optisense.load(caged).cages) == ["bump"]
+
+    def test_they_are_discarded_on_demand(self, caged: Path) -> None:
+        assert self.again(caged, "--discard-changes")[0] == 0
+        assert not optisense.load(caged).cages
+        assert self.again(caged)[0] == 0
+
+    def test_a_mesh_counts(self, caged: Path) -> None:
+        assert self.again(caged, "--discard-changes")[0] == 0
+        mesh = caged / "meshes" / "housing.obj"
+        moved = TriangleMesh.load(mesh)
+        moved.with_vertices(moved.vertices * 1.001).save_obj(mesh)
+        code, text = self.again(caged)
+        assert code == 1 and "mesh of part 'housing': vertices moved" in text
+
+    def test_a_design_that_no_recipe_made_is_kept(self, caged: Path) -> None:
+        (caged / "recipe-made.json").unlink()
+        code, text = self.again(caged)
+        assert code == 1 and "the cages bump" in text
+
+    @pytest.mark.parametrize("text", ["{}", "[1]", "not JSON"])
+    def test_a_damaged_summary(self, caged: Path, text: str) -> None:
+        (caged / "recipe-made.json").write_text(text)
+        code, said = self.again(caged)
+        assert code == 1 and "recipe-made.json" in said and "--discard-changes" in said
 
 
 def test_guesses_that_do_not_fit_are_kept_to_be_mended(tmp_path: Path) -> None:
@@ -194,6 +239,7 @@ class TestRefused:
             ("gelsight-mini-ideal",),
             ("gelsight-mini-ideal", "a", "--yes"),
             ("gelsight-mini-ideal", "a", "--units", "m"),
+            ("gelsight-mini-ideal", "a", "--discard-changes"),
             ("a", "b", "--from-meshes", CAD),
             ("a", "--from-meshes", CAD, "--units", "feet"),
         ],

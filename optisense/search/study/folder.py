@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from optisense.design import SensorDesign, load_design, save_design
-from optisense.design.difference import differences_from, fingerprint, plain_differences
+from optisense.design.difference import differences_from, fingerprint, listed, plain_differences
 from optisense.design.storage import files_of
 from optisense.errors import SearchError
 from optisense.folders import LOCK_FILE, FolderLock
@@ -16,11 +16,6 @@ DESIGN_FOLDER = "design"
 STORE_FILE = "trials.sqlite"
 SQLITE_ENDINGS = ("", "-wal", "-shm", "-journal")
 """Endings that SQLite appends to the name of a store for the files that it keeps beside it."""
-
-MOST_SHOWN = 8
-"""Largest number of differences between settings that an error lists; the others are counted, so
-that the message fits on a screen.
-"""
 
 
 def lock_new_folder(folder: Path, design: SensorDesign) -> FolderLock:
@@ -82,10 +77,3 @@ def unedited_design(folder: Path, settings: StudySettings, store: Store) -> Sens
 
 def _changes_in_words(changed: list[str]) -> str:
     return f":\n{listed(changed)}" if changed else ""
-
-
-def listed(changed: list[str]) -> str:
-    """Return the first of some differences, one per line."""
-    shown = "\n".join(f"  {line}" for line in changed[:MOST_SHOWN])
-    more = len(changed) - MOST_SHOWN
-    return shown + (f"\n  and {more} more" if more > 0 else "")

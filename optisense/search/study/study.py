@@ -19,7 +19,13 @@ from typing import Any
 import numpy as np
 
 from optisense.design import SensorDesign
-from optisense.design.difference import differences, fingerprint, notes, plain_differences
+from optisense.design.difference import (
+    differences,
+    fingerprint,
+    listed,
+    notes,
+    plain_differences,
+)
 from optisense.errors import ObjectiveError, SearchError
 from optisense.folders import FolderLock
 from optisense.library import with_own_lights
@@ -30,7 +36,6 @@ from optisense.search.space.search_space import BoundSpace, SearchSpace
 from optisense.search.study.best import best_of, nearest, without_rounding
 from optisense.search.study.folder import (
     STORE_FILE,
-    listed,
     lock_new_folder,
     save_and_reload,
     unedited_design,
