@@ -72,6 +72,7 @@ def _describe(design: SensorDesign) -> None:
     """Print the contents of the design, and the share of the skin that the camera sees."""
     from optisense.design.camera_checks import view_shares
     from optisense.design.parts import Role
+    from optisense.library import unused_imaging
     from optisense.mechanics import elasticity_in_words, is_attached, rims_in_words
 
     output.print(design.name, style="bold")
@@ -101,6 +102,9 @@ def _describe(design: SensorDesign) -> None:
         f"camera  {camera.model}, {camera.projection}, {camera.fov:g} degrees across, "
         f"{camera.resolution[0]} x {camera.resolution[1]} pixels"
     )
+    unused = unused_imaging(camera)
+    if unused is not None:
+        output.print(f"        {unused}")
     shares = view_shares(design, design.deformed_meshes())
     if shares is not None:
         output.print(

@@ -114,6 +114,7 @@ def _from_built_in(name: str, folder: Path, overwrite: bool) -> None:
 
 
 def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: bool) -> None:
+    from optisense.library import unused_imaging
     from optisense.sensors import check, save_design
     from optisense.sensors.from_meshes import (
         RECIPE_FILE,
@@ -166,6 +167,10 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
     save_recipe(recipe, folder / RECIPE_FILE)
     for note in made.notes:
         messages.print(f"note: {note}", style="yellow")
+    unused = unused_imaging(made.design.camera)
+    if unused is not None:
+        sentence = f"note: {unused}; set imaging: true in the recipe's camera to use them"
+        messages.print(sentence, style="yellow")
     for problem in problems:
         messages.print(f"warning: {problem}", style="yellow")
     _print_guesses(recipe, guessed)

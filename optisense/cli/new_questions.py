@@ -304,6 +304,9 @@ def _ask_camera(
     up = ask_word("Up in the picture (- for +y, or +z if it looks along y)", (*SIDES, "-"), "-")
     if up != "-":
         camera["up"] = up
+    if library.camera(camera["model"]).imaging():
+        say("The library knows its noise, colours or tone curve; without them it is ideal.")
+        camera["imaging"] = ask_yes("Use them", False)
     return camera
 
 

@@ -9,7 +9,7 @@ from optisense.library._entries import (
     Source,
     TypicalLight,
 )
-from optisense.library._imaging import with_imaging
+from optisense.library._imaging import unused_imaging, with_imaging
 from optisense.library._portable import with_own_lights
 from optisense.library.adding import Added, add_file, add_ies, add_tuning, parse_colour
 from optisense.library.loader import (
@@ -47,6 +47,7 @@ __all__ = [
     "own_folder",
     "parse_colour",
     "specularity_to_roughness",
+    "unused_imaging",
     "with_imaging",
     "with_own_lights",
 ]

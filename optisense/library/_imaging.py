@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from optisense.design.addressing import set_value
+from optisense.design.camera import Camera
 from optisense.design.sensor_design import Provenance, SensorDesign
 from optisense.errors import LibraryError
-from optisense.library.loader import camera, entry
+from optisense.library.loader import camera, entry, names
 
 
 def with_imaging(
@@ -65,3 +66,20 @@ def with_imaging(
             provenance[f"camera.{field}"] = Provenance(status=source.status, source=source.source)
     result.provenance = provenance
     return result
+
+
+def unused_imaging(used: Camera) -> str | None:
+    """Return a sentence that says which data of the library an ideal camera does not use.
+
+    Returns:
+        None if the camera is not ideal, or the library has no such camera or no data on its
+        shading, noise, colours or tone curve.
+    """
+    if not used.is_ideal or used.model not in names("camera"):
+        return None
+    fields = [field.replace("_", " ") for field in camera(used.model).imaging()]
+    if not fields:
+        return None
+    *others, last = fields
+    what = f"{', '.join(others)} and {last}" if others else last
+    return f"the camera is ideal: {what} of {used.model} are not used"

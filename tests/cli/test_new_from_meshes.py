@@ -13,9 +13,11 @@ import yaml
 from typer.testing import CliRunner
 
 import optisense
+from optisense import library
 from optisense.cli import app
 from optisense.cli import new as new_module
 from optisense.design import SensorDesign, add_cage
+from optisense.design.camera import ImagingModel
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes import read_recipe
 
@@ -54,6 +56,24 @@ def test_a_recipe_makes_a_design_that_passes_the_check(tmp_path: Path) -> None:
     np.testing.assert_allclose(places(design, "blue")[:, 0], 12.15, atol=1e-5)
     assert design.camera.position == pytest.approx((0, 0, -22), abs=1e-5)
     assert "# mm" in (tmp_path / "pad" / "design.yaml").read_text()
+
+
+def test_an_ideal_camera_is_told_until_the_recipe_takes_its_imaging(tmp_path: Path) -> None:
+    folder = tmp_path / "pad"
+    recipe = folder / "recipe.yaml"
+    told = "the camera is ideal: shading, crosstalk, noise"
+    text = new("--from-meshes", CAD / "sensor.yaml", folder)[1]
+    assert told in text and "imaging: true" in text
+    assert told in runner.invoke(app, ["check", str(folder)]).output
+    recipe.write_text(recipe.read_text().replace("imaging: false", "imaging: true"))
+    code, text = new("--from-meshes", recipe, folder, "--overwrite")
+    assert code == 0 and told not in text
+    assert told not in runner.invoke(app, ["check", str(folder)]).output
+    design, known = optisense.load(folder), library.camera("pi-v2")
+    for field in ImagingModel.model_fields:
+        assert getattr(design.camera, field) == getattr(known, field)
+    assert design.camera.resolution == (320, 240)
+    assert design.provenance["camera.noise"].source.startswith("rpi.noise")
 
 
 def test_the_recipe_beside_the_design_makes_it_again(tmp_path: Path) -> None:
@@ -158,7 +178,7 @@ class TestQuestions:
             "side", "nope", "smd-0805", "b", "-3", "2.5",
             "ring", "window", "6", "+z", "-", "0.4", "-1",
             "-",
-            "pi-v1", "0,0,-30", "skin", "-y",
+            "pi-v1", "0,0,-30", "skin", "-y", "yes",
         ]  # fmt: skip
         folder = tmp_path / "pad"
         code, text = new("--from-meshes", CAD, folder, answers="\n".join(answers) + "\n")
@@ -174,6 +194,7 @@ class TestQuestions:
         np.testing.assert_allclose(np.hypot(around[:, 0], around[:, 1]), 12.4, atol=1e-5)
         np.testing.assert_allclose(around[:, 2], -1.0)
         assert design.camera.model == "pi-v1"
+        assert design.camera.noise is not None
         assert design.camera.position == (0, 0, -30) and design.camera.up == (0, -1, 0)
 
     def test_lights_over_a_surface_and_along_an_edge(self, tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ from optisense.design import (
 from optisense.design.materials import kinds_for
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error
-from optisense.errors import DesignError, MeshError
+from optisense.errors import DesignError, LibraryError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
@@ -95,7 +95,7 @@ class _Builder(RecipeState):
             name: place_lights(self, name, choice) for name, choice in self.recipe.lights.items()
         }
         check_places(self, camera, groups)
-        design = self._design(materials, contacts.priorities, camera, groups)
+        design = self._imaged(self._design(materials, contacts.priorities, camera, groups))
         design.meshes.update({name: self.meshes[name] for name in self.recipe.parts})
         for name in self.of(Role.INDENTER):
             self.notes.append(
@@ -259,3 +259,20 @@ class _Builder(RecipeState):
             )
         except ValidationError as error:
             raise design_error(error, {}, where=f"recipe of '{self.recipe.name}'") from None
+
+    def _imaged(self, design: SensorDesign) -> SensorDesign:
+        """Return the design with the imaging of the library's camera if the recipe wants it.
+
+        Raises:
+            LibraryError: the library has no such data on the camera.
+        """
+        if not self.recipe.camera.imaging:
+            return design
+        try:
+            return library.with_imaging(design, self.recipe.camera.model)
+        except LibraryError as error:
+            raise LibraryError(
+                error.message,
+                where=self.recipe.where("camera", "imaging"),
+                hint="Leave imaging out, or choose a camera with such data",
+            ) from None

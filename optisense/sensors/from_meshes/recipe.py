@@ -60,6 +60,11 @@ class CameraChoice(Model):
     resolution: tuple[Pixels, Pixels] | None = Field(
         default=None, description="width and height, pixels; 320 wide if left out"
     )
+    imaging: bool = Field(
+        default=False,
+        description="whether shading, noise, colours and tone curve of the library are used; the "
+        "camera is ideal if not",
+    )
 
     @model_validator(mode="after")
     def _one_aim(self) -> CameraChoice:

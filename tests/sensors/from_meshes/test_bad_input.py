@@ -36,6 +36,12 @@ def sharing_an_edge(cad: Any) -> trimesh.Trimesh:
     )
 
 
+def test_imaging_that_the_library_lacks(cad: Any) -> None:
+    error = error_of(cad.write(cad.recipe.replace("pi-v2", "ovm7692, imaging: true")))
+    assert isinstance(error, LibraryError) and "no data on distortion, shading" in error.message
+    assert str(error.where).endswith("sensor.yaml:8") and "Leave imaging out" in str(error.hint)
+
+
 class TestFiles:
     @pytest.mark.parametrize(
         ("shape", "message", "advice"),
