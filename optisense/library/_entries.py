@@ -151,6 +151,11 @@ class LensFacts(Model):
     focal_length: Positive | None = None
     f_number: Positive | None = None
 
+    def size_at(self, width: int) -> tuple[int, int]:
+        """Return a width and the height, pixels, of a picture of the sensor's aspect ratio."""
+        across, down = self.resolution
+        return width, max(1, round(width * down / across))
+
 
 class CameraModel(ImagingModel, LensFacts):
     """Camera module as sold: its view, and the effects of its lens, sensor and processor.

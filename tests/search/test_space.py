@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense import library, sensors
-from optisense.design import Role, SensorDesign, add_cage, get_value
+from optisense.design import Role, SensorDesign, add_cage, get_value, set_value
 from optisense.design.cage import as_array
 from optisense.errors import DesignError, OptiSenseError, SearchError
 from optisense.search import (
@@ -416,3 +416,10 @@ def test_a_camera_from_the_library_brings_its_sensor_where_there_is_one() -> Non
     assert changed[0].is_ideal
     assert changed[1].noise == library.camera("pi-v1").noise
     assert changed[1].blur is None
+
+
+def test_a_camera_from_the_library_keeps_the_width_of_the_picture() -> None:
+    space = SearchSpace({"camera.model": ["gelsight-mini", "pi-v1", "pi-v3"]})
+    design = set_value(sensors.gelsight_mini_ideal(), "camera.resolution", [320, 240])
+    sizes = [space.bind(design).apply(np.array([i])).camera.resolution for i in (0.0, 1.0, 2.0)]
+    assert sizes == [(320, 240), (320, 240), (320, 180)]  # 4608 x 2592 is 16 to 9

@@ -75,7 +75,8 @@ class LibraryCoating(DesignVariable):
 
 
 class LibraryCamera(DesignVariable):
-    """Projection, field of view and resolution of a camera of the library; the pose stays.
+    """Projection, field of view and aspect ratio of a camera of the library; the pose and the width
+    of the picture stay.
 
     If the design's camera has a lens, a sensor or a processor that is not ideal, these are replaced
     by those of the library's camera.
@@ -94,7 +95,8 @@ class LibraryCamera(DesignVariable):
         if value == design.camera.model:
             return design
         known = library.camera(str(value))
-        optics = {"projection": known.projection, "fov": known.fov, "resolution": known.resolution}
+        size = known.size_at(design.camera.resolution[0])
+        optics = {"projection": known.projection, "fov": known.fov, "resolution": size}
         camera = design.camera.model_copy(update={"model": str(value), **optics})
         if not design.camera.is_ideal:
             imaging = {field: getattr(known, field) for field in ImagingModel.model_fields}

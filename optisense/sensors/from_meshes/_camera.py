@@ -13,7 +13,6 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.patches import mean_normal
-from optisense.library import CameraModel
 from optisense.sensors.from_meshes.directions import vector
 from optisense.sensors.from_meshes.recipe import CameraChoice
 
@@ -55,7 +54,7 @@ def make_camera(
             camera is more than a metre from the origin.
     """
     model = library.camera(choice.model)
-    width, height = choice.resolution or standard_resolution(model)
+    width, height = choice.resolution or model.size_at(WIDTH)
     fov = model.fov if choice.fov is None else choice.fov
     if place is None:
         way = mean_normal(skin)
@@ -99,12 +98,6 @@ def make_camera(
         direction=(dx, dy, dz),
         up=(ux, uy, uz),
     )
-
-
-def standard_resolution(model: CameraModel) -> tuple[int, int]:
-    """Return `WIDTH` pixels across, and the height by the camera's aspect ratio."""
-    width, height = model.resolution
-    return WIDTH, max(1, round(WIDTH * height / width))
 
 
 def upward(choice: CameraChoice, look: FloatArray) -> FloatArray:
