@@ -28,6 +28,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     contacts = parse_contacts(contact)
 
     from optisense import sensors
+    from optisense.library import overdriven_lights
 
     sensor = sensors.load(design)
     problems = sensors.check(sensor)
@@ -36,6 +37,8 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         output.print(f"warning: {problem}", style="yellow")
     if len(problems) > MOST_WARNINGS:
         output.print(f"warning: {len(problems) - MOST_WARNINGS:,} more like these", style="yellow")
+    for sentence in overdriven_lights(sensor):
+        output.print(f"warning: {sentence}", style="yellow")
     if any(part.role == "mirror" for part in sensor.parts.values()):
         _print_views(sensor)
     if contacts:

@@ -261,10 +261,12 @@ def _ask_way(usual: str) -> dict[str, Any]:
 
 
 def _ask_group(name: str, colour: str) -> dict[str, Any]:
+    model = _ask_known("light", f"{name}: model", guessing.LIGHT)
+    flux = guessing.usual_flux(model)
     return {
-        "model": _ask_known("light", f"{name}: model", guessing.LIGHT),
+        "model": model,
         "colour": ask_word(f"{name}: colour", NAMED_COLOURS, colour),
-        "flux": ask_number(f"{name}: flux of each light, mW", 10.0, least=0.0),
+        "flux": ask_number(f"{name}: flux of each light, mW", flux, least=0.0),
     }
 
 

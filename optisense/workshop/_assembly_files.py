@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from optisense.design import SensorDesign
+from optisense.library import typical_colour
 from optisense.text import cell
 from optisense.workshop._boards import axes_at_rest, boards_of
 from optisense.workshop._dxf import closed, dxf
@@ -19,7 +20,6 @@ from optisense.workshop._placement import (
     csv_table,
     digits,
     light_entry,
-    typical_colour,
     what_to_order,
 )
 
@@ -103,7 +103,7 @@ def _bom(design: SensorDesign, leds: Sequence[Placement]) -> str:
     rows = []
     for name in dict.fromkeys(led.group for led in leds):
         own = [led for led in leds if led.group == name]
-        colour = typical_colour(design.lights[name])
+        colour = typical_colour(design.lights[name].model, design.lights[name].colour)
         words = " ".join(filter(None, [own[0].model, colour[0] if colour else name]))
         designators = ",".join(led.designator for led in own)
         number = cell(what_to_order(design.lights[name]))

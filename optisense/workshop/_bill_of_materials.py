@@ -6,23 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from optisense.design import Role, SensorDesign, Status
-from optisense.library import AnyEntry
+from optisense.library import OVERDRIVEN, AnyEntry, typical_colour
 from optisense.library.facts import summary
 from optisense.text import cell, markdown
 from optisense.workshop._placement import (
     csv_table,
     entry_or_none,
     light_entry,
-    typical_colour,
     what_to_order,
 )
 from optisense.workshop.shapes import Shape, shapes
 
 MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0
 """Square millimetres in a square centimetre, and cubic ones in a cubic centimetre."""
-
-OVERDRIVEN = 1.05
-"""Ratio of a light's flux to its nominal flux from which on the bill has a remark."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +114,7 @@ def _lights(design: SensorDesign) -> list[Item]:
     count = 0
     for name, group in design.lights.items():
         first, count = count + 1, count + len(group.lights)
-        entry, colour = light_entry(group), typical_colour(group)
+        entry, colour = light_entry(group), typical_colour(group.model, group.colour)
         description, maker = _words(entry)
         if entry is None and group.emitter is not None:
             description += f": {group.emitter.in_words()}"

@@ -13,7 +13,7 @@ from optisense import library
 from optisense.array_types import FloatArray
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.errors import LibraryError
-from optisense.library import AnyEntry, LightEntry, TypicalLight
+from optisense.library import AnyEntry, LightEntry
 from optisense.workshop._boards import axes_at_rest, boards_of
 
 
@@ -84,20 +84,8 @@ def placements(design: SensorDesign) -> list[Placement]:
 
 def part_number(group: LightGroup) -> str:
     """Return the maker's order number for the colour of a group, "" if the library has none."""
-    colour = typical_colour(group)
+    colour = library.typical_colour(group.model, group.colour)
     return colour[1].part or "" if colour is not None else ""
-
-
-def typical_colour(group: LightGroup) -> tuple[str, TypicalLight] | None:
-    """Return name and numbers of the library light's colour that matches a group's, or None."""
-    entry = light_entry(group)
-    if entry is None:
-        return None
-    wanted = np.array(group.colour) / sum(group.colour)
-    for name, typical in entry.typical.items():
-        if np.allclose(np.array(typical.colour) / sum(typical.colour), wanted, atol=1e-3):
-            return name, typical
-    return None
 
 
 def what_to_order(group: LightGroup) -> str:
@@ -105,7 +93,7 @@ def what_to_order(group: LightGroup) -> str:
     number = part_number(group)
     if number:
         return number
-    entry, known = light_entry(group), typical_colour(group)
+    entry, known = light_entry(group), library.typical_colour(group.model, group.colour)
     words = ["no order number known: any LED"]
     if known is not None:
         words[0] = f"no order number known: any {known[0]} LED"

@@ -18,7 +18,7 @@ from optisense.sensors.from_meshes._camera import make_camera, share_seen
 from optisense.sensors.from_meshes._pick_and_place import read_pick_and_place
 from optisense.sensors.from_meshes._recipe_state import RecipeState
 from optisense.sensors.from_meshes._touching import refuse_contact_with_lamps
-from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow
+from optisense.sensors.from_meshes.recipe_lights import USUAL_FLUX, LightChoice, LightRow
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.sensors.from_meshes.surfaces import chosen, pick
 
@@ -64,14 +64,13 @@ def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGro
             raise DesignError(error.message, where=where, hint=error.hint) from None
         raise
     colour = choice.colour
-    state.provenance[f"lights.{name}.flux"] = Provenance(
-        status=Status.ASSUMED, source="from the recipe; see the LED's datasheet and current"
-    )
+    shares = NAMED_COLOURS[colour] if isinstance(colour, str) else colour
+    flux, state.provenance[f"lights.{name}.flux"] = _flux(choice, shares)
     try:
         group = LightGroup(
             model=choice.model,
-            colour=NAMED_COLOURS[colour] if isinstance(colour, str) else colour,
-            flux=choice.flux,
+            colour=shares,
+            flux=flux,
             lights=lights,
         )
     except ValidationError as error:
@@ -79,6 +78,27 @@ def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGro
     if choice.row is not None:
         _note_beyond(state, name, group, choice.row)
     return group
+
+
+def _flux(choice: LightChoice, colour: tuple[float, float, float]) -> tuple[float, Provenance]:
+    """Return the flux of each light of a group, mW, and its source."""
+    if choice.flux is not None:
+        source = "from the recipe; see the LED's datasheet and current"
+        return choice.flux, Provenance(status=Status.ASSUMED, source=source)
+    known = library.typical_colour(choice.model, colour)
+    if known is None or known[1].flux is None:
+        source = "a bright LED; neither the recipe nor the library states a flux"
+        return USUAL_FLUX, Provenance(status=Status.ASSUMED, source=source)
+    name, typical = known
+    assert typical.flux is not None
+    found = library.entry("light", choice.model).source(f"flux.{name}")
+    status = Status.ASSUMED if found is None else found.status
+    source = f"nominal flux of a {name} {choice.model} in the library"
+    if typical.current is not None:
+        source += f", at {typical.current:g} mA"
+    if found is not None:
+        source += f": {found.source}"
+    return typical.flux, Provenance(status=status, source=source)
 
 
 def _note_beyond(state: RecipeState, name: str, group: LightGroup, row: LightRow) -> None:

@@ -68,7 +68,7 @@ def is_round(gel: TriangleMesh, outward: str) -> bool:
 
 
 def lights_and_camera(
-    meshes: Mapping[str, TriangleMesh], clear: list[str], outward: str, light: str
+    meshes: Mapping[str, TriangleMesh], clear: list[str], outward: str, light: str, flux: float
 ) -> tuple[dict[str, LightChoice], CameraChoice] | None:
     """Return a ring of red, green and blue lights at the open side of a hollow dome, and a fisheye
     within it that looks into the dome; None if there is no cavity with room for them.
@@ -77,6 +77,8 @@ def lights_and_camera(
         meshes: meshes of all parts by name, mm.
         clear: names of the transparent parts, the gel first.
         outward: direction of the dome's tip, such as +z.
+        light: light of the library.
+        flux: flux of each light, mW.
     """
     axis, sign = axis_of(outward)
     way = vector(outward)
@@ -115,6 +117,8 @@ def lights_and_camera(
             "end": 120.0 * number + arc,
             "direction": outward,
         }
-        lights[colour] = LightChoice(model=light, colour=colour, ring=Ring.model_validate(ring))
+        lights[colour] = LightChoice(
+            model=light, colour=colour, flux=flux, ring=Ring.model_validate(ring)
+        )
     x, y, z = np.round(pupil, 3).tolist()
     return lights, CameraChoice(model=FISHEYE, at=(x, y, z), direction=outward)

@@ -15,9 +15,10 @@ from typing import Literal, cast
 import numpy as np
 
 from optisense.design import Role
-from optisense.errors import MeshError
+from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.patches import faces_towards
+from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors.from_meshes.directions import SIDES, nearest_side, vector
 from optisense.sensors.from_meshes.files import (
     ALL_FORMATS,
@@ -28,7 +29,12 @@ from optisense.sensors.from_meshes.files import (
 )
 from optisense.sensors.from_meshes.fingertips import LED_PITCH, is_round, lights_and_camera
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
-from optisense.sensors.from_meshes.recipe_lights import LightChoice, LightRow, LightsOver
+from optisense.sensors.from_meshes.recipe_lights import (
+    USUAL_FLUX,
+    LightChoice,
+    LightRow,
+    LightsOver,
+)
 from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
 from optisense.sensors.from_meshes.surfaces import WITHIN
 
@@ -274,6 +280,7 @@ def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightC
     return LightChoice(
         model=LIGHT,
         colour=colour,
+        flux=usual_flux(LIGHT),
         over=LightsOver(file=found.file, solid=found.body.name, towards=side, patches="all"),
     )
 
@@ -302,7 +309,7 @@ def usual_lights_and_camera(
         solid = {name: meshes[name] for name, part in parts.items() if part.faces_of is None}
         gels = [name for name, part in parts.items() if part.role is Role.ELASTOMER]
         clear = [carrier, *(name for name in [*gels, *supports] if name != carrier)]
-        inside = lights_and_camera(solid, clear, outward, LIGHT)
+        inside = lights_and_camera(solid, clear, outward, LIGHT, usual_flux(LIGHT))
         if inside is not None:
             return inside
     window = supports[0] if supports else carrier
@@ -320,8 +327,20 @@ def lights_around(part: str, mesh: TriangleMesh, outward: str) -> dict[str, Ligh
         along = across[0] if side[-1] == across[1] else across[1]
         count = max(1, int(size[along] / LED_PITCH))
         row = {"part": part, "side": side, "along": along, "count": count}
-        lights[colour] = LightChoice(model=LIGHT, colour=colour, row=LightRow.model_validate(row))
+        lights[colour] = LightChoice(
+            model=LIGHT, colour=colour, flux=usual_flux(LIGHT), row=LightRow.model_validate(row)
+        )
     return lights
+
+
+def usual_flux(model: str) -> float:
+    """Return the flux that a light has in each of its colours, mW, so that they are balanced: the
+    nominal one of its weakest colour, or `USUAL_FLUX` if the library states none.
+    """
+    try:
+        return balanced_flux(model)
+    except DesignError:
+        return USUAL_FLUX
 
 
 def _as_name(text: str) -> str:

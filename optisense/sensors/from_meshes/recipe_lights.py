@@ -14,6 +14,12 @@ from optisense.near import suggestion
 from optisense.sensors.from_meshes.directions import Direction, Side, Way, or_words
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference, Turn, Units
 
+USUAL_FLUX = 10.0
+"""Flux of each light if neither the recipe nor the library states one, mW; a bright LED of a few
+millimetres at its nominal current. Pictures are exposed automatically, so that only the ratios of
+the groups matter, unless the exposure is fixed.
+"""
+
 Lights = Annotated[Count, Field(le=MOST_LIGHTS)]
 
 
@@ -231,7 +237,10 @@ class LightChoice(Model):
 
     model: Name = Field(description="light of the library")
     colour: ColourWord = Field(description=", ".join(NAMED_COLOURS) + " or [r, g, b]")
-    flux: NonNegative = Field(default=10.0, description="flux of each light, mW")
+    flux: NonNegative | None = Field(
+        default=None,
+        description="flux of each light, mW; the nominal one of the library if left out",
+    )
     row: LightRow | None = Field(default=None, description="lights along one side of a part's box")
     ring: Ring | None = Field(default=None, description="lights in a circle around a part")
     over: LightsOver | None = Field(default=None, description="lights over a surface")

@@ -10,8 +10,8 @@ import pytest
 import trimesh
 from step_extra import needs_step
 
-from optisense import load
-from optisense.design import Role, SensorDesign, Status
+from optisense import library, load
+from optisense.design import Provenance, Role, SensorDesign, Status
 from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.sensors import check, save_design
@@ -258,3 +258,30 @@ class TestStep:
             design_from_meshes(cad.write(text.replace(", solid: gel", "")))
         with pytest.raises(DesignError, match="states its units"):
             design_from_meshes(cad.write(text.replace("solid: gel", "solid: gel, units: cm")))
+
+
+class TestFlux:
+    """The flux of a group whose recipe names none is that of the library, with its source."""
+
+    @staticmethod
+    def group(cad: Any, light: str) -> tuple[float, Provenance]:
+        made = design_from_meshes(cad.write(cad.recipe.replace("smd-3528, colour: red", light)))
+        return made.design.lights["red"].flux, made.design.provenance["lights.red.flux"]
+
+    def test_nominal(self, cad: Any) -> None:
+        entry: Any = library.entry("light", "smd-3528")
+        for colour in ("blue", "[0, 0, 0.5]"):
+            flux, source = self.group(cad, f"smd-3528, colour: {colour}")
+            assert flux == entry.typical["blue"].flux
+            assert source.status is entry.source("flux.blue").status
+            assert "blue smd-3528 in the library, at 20 mA" in source.source
+            assert source.source.endswith(entry.source("flux.blue").source)
+
+    def test_unknown_to_the_library(self, cad: Any) -> None:
+        flux, source = self.group(cad, "smd-3528, colour: white")
+        assert flux == 10.0 and source.status is Status.ASSUMED
+        assert "neither the recipe nor the library" in source.source
+
+    def test_of_the_recipe(self, cad: Any) -> None:
+        flux, source = self.group(cad, "smd-3528, colour: red, flux: 3.5")
+        assert flux == 3.5 and source.source.startswith("from the recipe")
