@@ -23,12 +23,12 @@ UNITS = ("mm", "cm", "m", "inch", "um")
 @handles_errors
 def new(
     name: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="NAME",
             help="A built-in sensor, such as gelsight-mini. Leave it out with --from-meshes.",
         ),
-    ],
+    ] = None,
     folder: Annotated[
         Path | None,
         typer.Argument(
@@ -85,13 +85,15 @@ def new(
             raise typer.BadParameter(
                 "they need --from-meshes", param_hint="--units, --yes, --discard-changes"
             )
-        if folder is None:
+        if name is None or folder is None:
             raise typer.BadParameter(
                 "name a built-in sensor and the folder to write, or use --from-meshes",
                 param_hint="NAME DIR",
             )
         _from_built_in(name, folder, overwrite)
         return
+    if name is None:
+        raise typer.BadParameter("name the folder to write", param_hint="DIR")
     if folder is not None:
         raise typer.BadParameter(
             "with --from-meshes, name only the folder to write", param_hint="DIR"

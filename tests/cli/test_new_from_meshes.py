@@ -266,6 +266,17 @@ class TestRefused:
         assert not (tmp_path / "pad").exists()
 
     @pytest.mark.parametrize(
+        ("words", "told"),
+        [
+            (("--from-meshes", CAD), "Invalid value for DIR: name the folder"),
+            ((), "name a built-in sensor and the folder"),
+        ],
+    )
+    def test_a_missing_name(self, words: tuple[object, ...], told: str) -> None:
+        code, text = new(*words)
+        assert code == 2 and told in text
+
+    @pytest.mark.parametrize(
         "words",
         [
             ("gelsight-mini-ideal",),
