@@ -48,6 +48,8 @@ class RecipeState:
             return posed(self.files.load(shape, self.recipe.units or "mm", where), shape)
         except MeshError as error:
             place = f"{where}: {error.where}" if error.where else where
+            if error.where and f"({shape.file})" in where:  # the place names the file again
+                place = where.replace(f"({shape.file})", f"({error.where})")
             raise MeshError(error.message, where=place, hint=error.hint) from None
 
     def check_known(self, kind: str, name: str, *path: str) -> None:

@@ -76,6 +76,13 @@ class TestFiles:
         error = error_of(cad.write(cad.recipe.replace("gel.stl", "gell.stl")))
         assert "there is no file 'gell.stl'" in error.message
         assert error.hint == "Did you mean 'gel.stl'?"
+        assert error.where == f"part gel ({cad.folder / 'gell.stl'})"
+
+    def test_a_missing_file_in_a_subfolder(self, cad: Any) -> None:
+        file = cad.write(cad.recipe.replace("gel.stl", "cad/gell.stl"))
+        (cad.folder / "cad").mkdir()
+        (cad.folder / "gel.stl").rename(cad.folder / "cad" / "gel.stl")
+        assert error_of(file).hint == "Did you mean 'cad/gel.stl'?"
 
     def test_another_format(self, cad: Any) -> None:
         file = cad.write(cad.recipe.replace("gel.stl", "gel.f3d"))
