@@ -215,8 +215,8 @@ def _coarse(
             f"part '{name}' has too large triangles to follow cage '{cage_name}': near "
             f"{_text(off.place)} it is {off.distance:.2g} mm off the shape that the cage gives",
             design.where("parts", name, "mesh"),
-            "Export it from the CAD tool with a finer mesh: only vertices are bent, and between "
-            "them it stays straight",
+            "Give the part cut_every: 1 (mm) in the recipe, or export it with a finer mesh: only "
+            "vertices are bent, and between them it stays straight",
             severity="warning",
         )
     ]

@@ -24,6 +24,7 @@ from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error
 from optisense.errors import DesignError, LibraryError, MeshError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.plane_cuts import cut_along_planes
 from optisense.geometry.repair import refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
 from optisense.sensors.from_meshes._moving import laid_on, resting_order
@@ -44,6 +45,11 @@ USUAL_MATERIAL = {
     Role.MIRROR: "mirror-silver",
 }
 """Materials of parts for which the recipe names none; they are marked as assumed."""
+
+MOST_CUT = 200_000
+"""Largest number of triangles of a part that is cut by `cut_every`; the largest part of a built-in
+sensor has an eighth of them, and a pad of 20 mm has them if it is cut every 0.1 mm.
+"""
 
 
 @dataclass
@@ -131,13 +137,32 @@ class _Builder(RecipeState):
             except MeshError as error:
                 raise MeshError(error.message, where=where, hint=error.hint) from None
             self.notes += [f"{name}: {note}" for note in notes]
-            self.meshes[name] = mended if part.towards is None else self._chosen(name, mended)
+            mended = mended if part.towards is None else self._chosen(name, mended)
+            self.meshes[name] = self._cut(name, mended)
             source = f"CAD file {part.file}" + (f", body {part.solid}" if part.solid else "")
             if part.on is not None:
                 source += f", laid on {part.on}"
             elif part.mirror or part.turn or part.move:
                 source += ", moved as the recipe says"
             self.provenance[f"parts.{name}"] = Provenance(status=Status.SOURCED, source=source)
+
+    def _cut(self, name: str, mesh: TriangleMesh) -> TriangleMesh:
+        """Return a mesh with its triangles cut as the recipe wants those of a part.
+
+        Raises:
+            DesignError: there would be too many of them.
+        """
+        spacing = self.recipe.parts[name].cut_every
+        if spacing is None:
+            return mesh
+        try:
+            return cut_along_planes(mesh, spacing, MOST_CUT)
+        except MeshError as error:
+            raise DesignError(
+                f"part '{name}': {error.message}",
+                where=self.recipe.where("parts", name, "cut_every"),
+                hint="Choose a larger cut_every",
+            ) from None
 
     def _pick_faces(self) -> None:
         """Make the parts that are faces of other parts, on the same vertices."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from optisense.design import Role
-from optisense.design.fields import Model, Name, Number, Vector
+from optisense.design.fields import Model, Name, Number, Positive, Vector
 from optisense.sensors.from_meshes.directions import Side, Way
 
 Units = Literal["mm", "cm", "m", "inch", "um", "mil"]
@@ -84,6 +84,11 @@ class PartChoice(ShapeReference):
     priority: Annotated[int, Field(strict=True, ge=-1000, le=1000)] | None = Field(
         default=None, description="where solids overlap, the one with the higher priority counts"
     )
+    cut_every: Positive | None = Field(
+        default=None,
+        description="distance of the planes along which triangles are cut, mm, so that cages can "
+        "bend them; not cut if left out",
+    )
     on: Name | None = Field(
         default=None, description="part on whose side this part lies with its own flat face"
     )
@@ -95,6 +100,12 @@ class PartChoice(ShapeReference):
     gap: Number | None = Field(
         default=None, description="distance between the two, mm; 0 if left out"
     )
+
+    @model_validator(mode="after")
+    def _cuts_a_file(self) -> PartChoice:
+        if self.cut_every is not None and self.faces_of is not None:
+            raise ValueError("cut_every is for files only; faces have the triangles of their part")
+        return self
 
     @model_validator(mode="after")
     def _lies_on_something(self) -> PartChoice:

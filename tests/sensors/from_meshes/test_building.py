@@ -11,7 +11,15 @@ import trimesh
 from step_extra import needs_step
 
 from optisense import library, load
-from optisense.design import Provenance, Role, SensorDesign, Status
+from optisense.design import (
+    Provenance,
+    Role,
+    SensorDesign,
+    Status,
+    add_cage,
+    cage_problems,
+    move_points,
+)
 from optisense.errors import DesignError
 from optisense.geometry.containment import inside
 from optisense.sensors import check, save_design
@@ -285,3 +293,22 @@ class TestFlux:
     def test_of_the_recipe(self, cad: Any) -> None:
         flux, source = self.group(cad, "smd-3528, colour: red, flux: 3.5")
         assert flux == 3.5 and source.source.startswith("from the recipe")
+
+
+def test_a_part_that_is_cut_follows_its_cage(cad: Any) -> None:
+    gel = "gel: {file: gel.stl, role: elastomer"
+    fine = cad.recipe.replace(gel, gel + ", cut_every: 1")
+    for recipe, coarse in ((cad.recipe, True), (fine, False)):
+        design = design_from_meshes(cad.write(recipe)).design
+        assert check(design) == []
+        assert design.meshes["gel"].volume == pytest.approx(20 * 16 * 4)
+        moved = move_points(add_cage(design, "bump", ["gel", "skin"]), "bump", {"1,1,2": (0, 0, 3)})
+        told = [p for p in cage_problems(moved) if "too large triangles" in p.message]
+        assert bool(told) is coarse
+        assert all("cut_every" in str(problem.hint) for problem in told)
+
+    with pytest.raises(DesignError, match=r"part 'gel': .* more than 200,000 triangles") as caught:
+        design_from_meshes(cad.write(fine.replace("cut_every: 1", "cut_every: 0.001")))
+    assert str(caught.value.where).endswith("sensor.yaml:3")
+    with pytest.raises(DesignError, match="cut_every is for files only"):
+        design_from_meshes(cad.write(cad.recipe.replace("faces_of", "cut_every: 1, faces_of")))
