@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydantic import ValidationError
 
+from optisense import library
 from optisense.design import Camera, LightGroup, Provenance, Role, Status
 from optisense.design.colour import NAMED_COLOURS
 from optisense.design.problems import design_error
