@@ -60,7 +60,7 @@ def _print_views(design: SensorDesign) -> None:
         from optisense.optics import OpticalModel
         from optisense.optics.mirror_checks import CHECK_RAYS, mirror_problems, views_in_words
 
-        views = OpticalModel(design).views_by_mirrors(CHECK_RAYS)
+        views = OpticalModel(design).views_by_mirrors(design.camera.size_at(CHECK_RAYS))
     except SetupError as error:  # the rest of the check needs no renderer
         output.print(f"note: its mirrors are not checked: {error}", style="yellow")
         return

@@ -166,9 +166,13 @@ class Camera(ImagingModel, Viewpoint):
             )
         return self
 
-    def size_at(self, width: int) -> tuple[int, int]:
-        """Return a width and the height, pixels, of a picture of the camera's aspect ratio."""
-        across, down = self.resolution
+    def size_at(self, width: int, shape: tuple[int, int] | None = None) -> tuple[int, int]:
+        """Return a width and the height, pixels, of a picture of the camera's aspect ratio.
+
+        Args:
+            shape: width and height of a picture whose aspect ratio is taken instead.
+        """
+        across, down = self.resolution if shape is None else shape
         return width, max(1, round(width * down / across))
 
     def axes(self) -> NDArray[np.float64]:

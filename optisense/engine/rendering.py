@@ -36,6 +36,10 @@ if TYPE_CHECKING:
 DRAFT_WIDTH = 160
 """Width of a draft, in pixels; it has a quarter of the pixels of an image 320 pixels wide."""
 
+RAYS_ACROSS = 16
+"""Default number of columns of the grid of chief rays that are drawn; more would hide the
+sensor."""
+
 NUDGE = 1e-3
 """Distance (mm) by which a light is moved to prepare drafts of moved lights. Any distance above 0
 compiles the same kernels."""
@@ -107,7 +111,7 @@ class ChiefRayGrid(DesignFields):
     """Fields of the request "chief_rays"; see docs/engine.md."""
 
     contacts: list[AnyContact] = Field(default_factory=list)
-    resolution: tuple[int, int] = (16, 12)
+    resolution: tuple[int, int] | None = None
 
 
 def design_of(session: Session, fields: DesignFields, job: Job) -> SensorDesign:
@@ -270,11 +274,11 @@ def chief_rays(session: Session, fields: ChiefRayGrid, job: Job) -> dict[str, An
 
     files = session.files(fields, job.id)
     design = design_of(session, fields, job)
-    _checked_size(fields.resolution, design)
+    size = _checked_size(fields.resolution, design) or design.camera.size_at(RAYS_ACROSS)
     model = session.renderer.model(design)
     contacts = contacts_of(fields.contacts)
     with errors_naming_contact(contacts, model.place):
-        paths = trace_paths(model, fields.resolution, contacts)
+        paths = trace_paths(model, size, contacts)
     return {
         "files": {
             "vertices": files.array("rays.vertices.npy", paths.vertices),

@@ -202,7 +202,7 @@ class Evaluation(CachedValues):
         ball = Sphere(self.settings.radius)
         if self.settings.places is None:
             self.view.refuse_less(self.settings)
-            return self.model.nine_contacts(ball, self.settings.depth)
+            return self.model.nine_contacts(ball, self.settings.depth, self.resolution)
         return [Contact(ball, at=at, depth=self.settings.depth) for at in self.settings.places]
 
     def each_press(self) -> Iterator[tuple[Press, TactileImage]]:

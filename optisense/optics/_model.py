@@ -16,7 +16,7 @@ from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact import refuse_no_contacts
 from optisense.mechanics import ELASTIC, SKINS, PressedSkin, SkinMesh
 from optisense.optics._ray_model import RayModel
-from optisense.optics._skin_view import VIEW_RESOLUTION, SkinView, is_size
+from optisense.optics._skin_view import VIEW_ACROSS, SkinView, is_size
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import bound_memory
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
@@ -119,7 +119,7 @@ class OpticalModel(RayModel):
         return self._caches
 
     def _new_store(self) -> CacheStore:
-        rays = self.chief_rays(VIEW_RESOLUTION)
+        rays = self.chief_rays(self.design.camera.size_at(VIEW_ACROSS))
         return self.store_type(LitScene.of(self.scenes, not self.is_draft), rays.points[rays.hit])
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:

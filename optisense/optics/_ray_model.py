@@ -243,12 +243,21 @@ class RayModel:
         chosen = {name: meshes[name] for name in moving}
         return DifferentiableRays(self.scenes.fine.scene, self.camera(resolution), chosen)
 
-    def nine_contacts(self, indenter: Indenter | None = None, depth: float = 0.8) -> list[Contact]:
+    def nine_contacts(
+        self,
+        indenter: Indenter | None = None,
+        depth: float = 0.8,
+        resolution: tuple[int, int] | None = None,
+    ) -> list[Contact]:
         """Return one contact at each of nine places that cover the visible sensing surface evenly.
 
         The default indenter is the OptiSense paper's ball of radius 1.5 mm.
+
+        Args:
+            resolution: (width, height), pixels, of the picture that shows the places, of which only
+                the aspect ratio matters; the camera's own by default.
         """
-        return self._view.nine_contacts(indenter, depth)
+        return self._view.nine_contacts(indenter, depth, resolution)
 
     def place(self, contact: Contact) -> TriangleMesh:
         """Return the part of an indenter that can touch the skin, placed by a contact in the

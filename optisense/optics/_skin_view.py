@@ -29,10 +29,13 @@ from optisense.optics.transport.chief_rays import (
 LEAST_SEEN = 9
 """Smallest number of chief rays that must arrive for nine contacts to be placed: one for each."""
 
-VIEW_RESOLUTION = (96, 72)
-"""Resolution (width, height), pixels, of the chief rays that find the part of the surface that the
-camera sees. Their end points on built-in sensors are less than 1 mm apart, half of the radiance
-cache's `VIEW_MARGIN`."""
+VIEW_ACROSS = 96
+"""Number of chief rays across the picture that find the part of the surface that the camera sees.
+Their end points on built-in sensors are less than 1 mm apart, half of the radiance cache's
+`VIEW_MARGIN`."""
+
+MIDDLE_ACROSS = 64
+"""Number of chief rays across the picture whose median end point is the middle of what is seen."""
 
 
 def is_size(value: object) -> TypeGuard[tuple[float, float]]:
@@ -113,7 +116,7 @@ class SkinView:
         if rays.hit[1, 1]:
             origin = rays.points[1, 1].astype(float)
         else:
-            fine = self.chief_rays((64, 48))
+            fine = self.chief_rays(self._design.camera.size_at(MIDDLE_ACROSS))
             if not fine.hit.any():
                 raise sees_nothing(fine)
             origin = np.median(fine.points[fine.hit].astype(float), axis=0)
@@ -145,9 +148,11 @@ class SkinView:
         contact = self.gel.at_depth(contact)
         return place_on_gels(contact, self.surface, self._scenes.assembly.gels, self.facet_error)
 
-    def nine_contacts(self, indenter: Indenter | None, depth: float) -> list[Contact]:
+    def nine_contacts(
+        self, indenter: Indenter | None, depth: float, resolution: tuple[int, int] | None
+    ) -> list[Contact]:
         """Return one contact at each of nine places; see `RayModel.nine_contacts`."""
-        rays = self.chief_rays(VIEW_RESOLUTION)
+        rays = self.chief_rays(self._design.camera.size_at(VIEW_ACROSS, resolution))
         if rays.hit.sum() < LEAST_SEEN:
             raise sees_nothing(rays)
         points = rays.points[rays.hit].astype(np.float64)

@@ -24,7 +24,7 @@ from optisense.optics._carried_contacts import PressedContacts
 from optisense.optics._draft_light import DraftCacheStore, KeptView
 from optisense.optics._model import ContactView, OpticalModel
 from optisense.optics._ray_model import RayModel
-from optisense.optics._skin_view import VIEW_RESOLUTION, SkinView
+from optisense.optics._skin_view import VIEW_ACROSS, SkinView
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.scene.assembly import assemble
@@ -262,7 +262,7 @@ class DraftModel(OpticalModel):
         lit = LitScene.of(self.scenes, may_trace_lobes=False)
         if before is not None and before.has_guide_for(lit):
             return DraftCacheStore(lit, before.seen, before)
-        rays = self.chief_rays(VIEW_RESOLUTION)
+        rays = self.chief_rays(self.design.camera.size_at(VIEW_ACROSS))
         return DraftCacheStore(lit, rays.points[rays.hit], before)
 
     def _straightened(self, design: SensorDesign) -> SensorDesign:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
+from optisense.optics._skin_view import VIEW_ACROSS
 from optisense.optics.backend.arrays import indices
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surface_cells import build_cells, cells_near
@@ -250,7 +251,7 @@ def cells_in_view(model: OpticalModel) -> TargetCells:
     """Return the cells of the sensing surface, with flags for those in the camera's view."""
     mesh = model.sensing
     cells = build_cells(mesh.vertices, mesh.faces, VIEW_CELL)
-    rays = model.chief_rays((96, 72))
+    rays = model.chief_rays(model.design.camera.size_at(VIEW_ACROSS))
     points = rays.points[rays.hit].astype(np.float64)
     near = cells_near(cells, points, IN_VIEW) if len(points) else np.zeros(cells.cells, dtype=bool)
     return TargetCells(cells, indices(near))

@@ -7,9 +7,9 @@ from optisense.design.parts import Role
 from optisense.design.problems import Diagnostic
 from optisense.optics.scene.assembly import is_mirror
 
-CHECK_RAYS = (96, 72)
-"""Numbers of chief rays of a check along the width and height of the picture. A column of 72 rays
-is then 0.01 of all, a tenth of `LEAST_BY_MIRROR`."""
+CHECK_RAYS = 96
+"""Number of chief rays of a check across the picture. A column of them is then 0.01 of all, a
+tenth of `LEAST_BY_MIRROR`."""
 
 LEAST_BY_MIRROR = 0.1
 """Smallest share of the chief rays on the sensing surface that a mirror must reflect to count as

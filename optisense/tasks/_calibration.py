@@ -215,7 +215,7 @@ class CalibratedSensor:
 
     @cached_property
     def _places(self) -> Places:
-        return Places.of(self._model)
+        return Places.of(self._model, self.resolution)
 
     def _render(self, contacts: Sequence[Contact]) -> TactileImage:
         image = self._model.render(

@@ -17,14 +17,23 @@ from optisense.geometry.indenter_kinds import tilted
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
 
-PLACES_SEEN = 320, 240
-"""Numbers of the camera's rays (across, down) whose end points are the places that are drawn from;
-on a GelSight Mini they are 0.07 mm apart.
-"""
+PLACES_ACROSS = 320
+"""Number of the camera's rays across the picture whose end points are the places that are drawn
+from; on a GelSight Mini they are 0.07 mm apart."""
 
 MARGIN = 0.02
 """Margin around a contact, as a share of the picture's width: 6 of 320 pixels, 0.4 mm on a GelSight
 Mini, so that the picture includes the shading just outside the contact."""
+
+
+def rays_of_places(model: OpticalModel, resolution: tuple[int, int] | None = None) -> ChiefRays:
+    """Return chief rays of the untouched sensor, whose end points are the places of contacts.
+
+    Args:
+        resolution: (width, height), pixels, of the pictures that show the places, of which only the
+            aspect ratio matters; the camera's own by default.
+    """
+    return model.chief_rays(model.design.camera.size_at(PLACES_ACROSS, resolution))
 
 
 def keeps_margin(mask: NDArray[np.bool_], margin: float) -> bool:
@@ -75,11 +84,11 @@ class Places:
         self._middle = int(np.linalg.norm((self._spots - 0.5) * (width, height), axis=1).argmin())
 
     @classmethod
-    def of(cls, model: OpticalModel) -> Places:
-        """Return the places that a model's camera sees."""
+    def of(cls, model: OpticalModel, resolution: tuple[int, int] | None = None) -> Places:
+        """Return the places that pictures of a resolution show; see `rays_of_places`."""
         from optisense.optics.transport.chief_rays import pixel_areas
 
-        rays = model.chief_rays(PLACES_SEEN)
+        rays = rays_of_places(model, resolution)
         return cls(rays, pixel_areas(rays))
 
     @property

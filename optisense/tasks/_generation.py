@@ -134,7 +134,7 @@ class _Maker:
         self._untouched = UntouchedSurface.of(rays)
         if not (folder / CAMERA).exists():  # release 0.1 wrote no such file
             self._write_arrays(CAMERA, ray_arrays(rays))
-        self._places = Places.of(model)
+        self._places = Places.of(model, self._resolution)
         self._larger_than_view = {
             text for text, each in self._indenters.items() if not self._fits(each)
         }

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 THICKNESS = 2.0
 """Thickness in mm of the plate, which has no effect, as only its face touches the skin."""
 
-RAYS = 32, 24
-"""Grid of chief rays (columns, rows) that find the extent of the view and the part that a plane
-covers, each to a few per cent.
+RAYS_ACROSS = 32
+"""Number of columns of the grid of chief rays that find the extent of the view and the part that a
+plane covers, each to a few per cent.
 """
 
 MARGIN = 0.5
@@ -99,10 +99,11 @@ class Misalignment:
         """
         from optisense.optics.scene.surfaces import Region
 
+        size = model.design.camera.size_at(RAYS_ACROSS)
         for angle_x in (-self.range, self.range):
             for angle_y in (-self.range, self.range):
                 contact = plane_contact(model, angle_x, angle_y, self.depth)
-                rays = model.chief_rays(RAYS, [contact], CONFORMING)
+                rays = model.chief_rays(size, [contact], CONFORMING)
                 self._ensure_covered(rays.hit & (rays.region == Region.INDENTER))
 
     def contact(
@@ -158,7 +159,7 @@ def plane_contact(model: OpticalModel, angle_x: float, angle_y: float, depth: fl
     """
     surface = model.surface
     spot = surface.point_at(0.0, 0.0)
-    rays = model.chief_rays(RAYS)
+    rays = model.chief_rays(model.design.camera.size_at(RAYS_ACROSS))
     seen = rays.points[rays.hit] - spot.point
     u, v = (float(np.abs(seen @ axis).max()) + MARGIN for axis in (surface.u_axis, surface.v_axis))
     # These are a contact's own axes; v may point opposite to y.

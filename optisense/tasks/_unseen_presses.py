@@ -16,7 +16,7 @@ from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
 from optisense.geometry.surface import closest_points
-from optisense.tasks._draws import PLACES_SEEN
+from optisense.tasks._draws import rays_of_places
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -96,13 +96,14 @@ class _Skin:
 
     models: Sequence[OpticalModel]
     seed: int
+    resolution: tuple[int, int] | None
     points: FloatArray = field(init=False)
     room: float = field(init=False)
     chosen: list[FloatArray] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        points = _seen_places(self.models, self.seed)
-        seen = [model.chief_rays(PLACES_SEEN) for model in self.models]
+        points = _seen_places(self.models, self.seed, self.resolution)
+        seen = [rays_of_places(model, self.resolution) for model in self.models]
         self.room = max(_narrower_side(rays.points[rays.hit].astype(np.float64)) for rays in seen)
         self.points = points[_inside(points, self.models, RIM * self.room)]
         if not len(self.points):
@@ -132,19 +133,26 @@ class _Skin:
 
 
 def choose_presses(
-    models: tuple[OpticalModel, OpticalModel], objects: Sequence[str], places: int, seed: int
+    models: tuple[OpticalModel, OpticalModel],
+    objects: Sequence[str],
+    places: int,
+    seed: int,
+    resolution: tuple[int, int] | None = None,
 ) -> UnseenPresses:
     """Choose places, depths and rotations of objects on the skin that either sensor's camera sees.
 
     Args:
         objects: keys of `OBJECTS`.
         places: number of presses of each object.
+        resolution: (width, height), pixels, of the pictures; only its aspect ratio matters. If it
+            is None, that of each camera is taken.
 
     Raises:
         TaskError: the cameras see nothing, or there is no place for an object.
     """
     alike = _have_one_skin(models)
-    skins = [_Skin(models, seed)] if alike else [_Skin([each], seed) for each in models]
+    groups: list[Sequence[OpticalModel]] = [models] if alike else [[each] for each in models]
+    skins = [_Skin(group, seed, resolution) for group in groups]
     longest = max(max(OBJECTS[name].size) for name in objects)
     scale = min(1.0, FITS * min(skin.room for skin in skins) / longest)
     presses = []
@@ -207,14 +215,16 @@ def _far_from(chosen: list[FloatArray], candidates: FloatArray) -> FloatArray:
     return candidates[int(np.argmax(away))]
 
 
-def _seen_places(models: Sequence[OpticalModel], seed: int) -> FloatArray:
+def _seen_places(
+    models: Sequence[OpticalModel], seed: int, resolution: tuple[int, int] | None
+) -> FloatArray:
     """Return points (n, 3), mm, that a camera sees, distributed uniformly by area."""
     from optisense.optics.transport.chief_rays import pixel_areas
 
     found: list[FloatArray] = []
     density = 0.0
     for number, model in enumerate(models):
-        rays = model.chief_rays(PLACES_SEEN)
+        rays = rays_of_places(model, resolution)
         areas = np.where(rays.hit, pixel_areas(rays), 0.0)
         if not areas.any():
             raise TaskError("a camera sees nothing of the sensing surface")

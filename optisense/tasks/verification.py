@@ -22,7 +22,7 @@ from optisense.mechanics.skins import CONFORMING
 from optisense.near import suggestion
 from optisense.objectives.score import json_ready
 from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
-from optisense.tasks._draws import PLACES_SEEN
+from optisense.tasks._draws import rays_of_places
 from optisense.tasks._unseen_presses import UnseenPress, choose_presses
 from optisense.tasks.paired_bootstrap import (
     BETTER,
@@ -258,13 +258,16 @@ def verify(
         TaskError: a camera sees nothing, an object has no place, or a sensor can't be calibrated.
     """
     settings = settings or VerificationSettings()
+    resolution = settings.reading.resolution
     for name, model in zip(names, models, strict=True):
-        if not model.chief_rays(PLACES_SEEN).hit.any():
+        if not rays_of_places(model, resolution).hit.any():
             raise TaskError(
                 f"the camera of {name} sees nothing of the sensing surface",
                 hint="Check the camera's position, direction and field of view",
             )
-    chosen = choose_presses(models, settings.objects, settings.places, settings.reading.seed)
+    chosen = choose_presses(
+        models, settings.objects, settings.places, settings.reading.seed, resolution
+    )
     _check_views(models, chosen.presses, settings.reading)
     readings: list[list[PressReading]] = []
     views = []

@@ -19,9 +19,6 @@ from . import figures, rays
 ABOUT = ("unit", "lower_is_better")
 """Entries of a score that describe its objective; the catalogue lacks the user's own ones."""
 
-RAYS = (16, 12)
-"""Columns and rows of the grid of chief rays; more rays would hide the sensor."""
-
 
 class OPTISENSE_OT_choose_objective(bpy.types.Operator):
     """Select or clear this objective for the evaluation"""
@@ -188,9 +185,7 @@ def draw_again(scene: bpy.types.Scene, _: str | None) -> None:
         design = design_transfer.design(scene)
     except EngineError:  # the buttons say that
         return
-    request = session.ask(
-        "chief_rays", traced, lambda _: None, design=design, resolution=list(RAYS)
-    )
+    request = session.ask("chief_rays", traced, lambda _: None, design=design)
     running = session.running()
     if bpy.app.background and request is not None and running is not None:
         running.wait(request)
@@ -212,9 +207,7 @@ class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):
                 bpy.context.window_manager.optisense_evaluation.rays = text
                 session.push_undo("Chief rays")
 
-        return start_with_design(
-            self, context, "Tracing rays", "chief_rays", traced, resolution=list(RAYS)
-        )
+        return start_with_design(self, context, "Tracing rays", "chief_rays", traced)
 
 
 class OPTISENSE_OT_hide_rays(polls.Checked, bpy.types.Operator):

@@ -184,6 +184,7 @@ def test_chief_rays_obey_snells_law_and_end_on_the_skin(engine: Any) -> None:
     rays = engine.ask("chief_rays", design="gelsight-mini-ideal", resolution=[8, 6])
     vertices, counts = load(rays["files"]["vertices"]), load(rays["files"]["counts"])
     outcomes = load(rays["files"]["outcomes"])
+    assert engine.ask("chief_rays", design="digit")["rays"] == 16 * 21  # its picture is 3:4
     assert rays["rays"] == 48 == len(counts) == len(outcomes)
     assert counts.sum() == len(vertices) and rays["hit"] == 1.0
     acrylic = opened["materials"]["acrylic"]["ior"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from reference_scenes import box, diffuse_coating, quad
 
-from optisense import OpticalModel
+from optisense import OpticalModel, set_value
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
@@ -159,3 +159,24 @@ def test_stretching_is_unknown_where_nothing_is_seen() -> None:
 def test_rays_in_a_plane_of_symmetry_miss_no_triangle() -> None:
     # A picture with an odd number of rows has one row in the plane y = 0 of DIGIT.
     assert OpticalModel(load("digit")).chief_rays((160, 213)).hit.all()
+
+
+@pytest.mark.parametrize("size", [(60, 80), (60, 60), (80, 40), (80, 60)])
+def test_nine_contacts_span_pictures_of_any_shape(
+    plain_mini: OpticalModel, size: tuple[int, int]
+) -> None:
+    # A narrow field of view, so that tall pictures show skin only.
+    narrow = set_value(plain_mini.design, "camera.fov", 45.0)
+    own = OpticalModel(set_value(narrow, "camera.resolution", list(size)))
+    for model, resolution in ((own, None), (OpticalModel(narrow), size)):
+        points = model.chief_rays(size).points
+        spots = []
+        for contact in model.nine_contacts(resolution=resolution):
+            away = np.linalg.norm(points - np.array(contact.point), axis=2)
+            row, column = np.unravel_index(away.argmin(), away.shape)
+            spots.append(((column + 0.5) / size[0], (row + 0.5) / size[1]))
+        low, high = np.min(spots, axis=0), np.max(spots, axis=0)
+        # A grid of three by three leaves a sixth of the picture at each side; on 2:1 pictures the
+        # even patches are no grid, and reach farther along the width.
+        assert (low < 0.25).all() and (low > 0.05).all()
+        assert (high > 0.75).all() and (high < 0.95).all()

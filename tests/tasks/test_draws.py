@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense import OpticalModel
+from optisense import Contact, OpticalModel, set_value
 from optisense.errors import TaskError
 from optisense.geometry import Cylinder, Plane, Sphere
 from optisense.geometry.indenter_kinds import tilted
@@ -26,6 +26,28 @@ def test_places_are_even_by_area(cylindrical_mini: OpticalModel) -> None:
     # Kolmogorov's bound at one in ten thousand, and the rays' spacing of 0.06 mm.
     assert np.abs(drawn - share).max() < 2.2 / np.sqrt(len(points)) + 0.06 / 18
     assert points[:, 1].mean() == pytest.approx(0, abs=0.15)
+
+
+@pytest.mark.parametrize("size", [(60, 80), (60, 60), (80, 40), (80, 60)])
+def test_places_fill_pictures_of_any_shape_and_lie_in_the_middles_of_contacts(
+    mini: OpticalModel, size: tuple[int, int]
+) -> None:
+    # A narrow field of view, so that tall pictures show skin only.
+    narrow = set_value(mini.design, "camera.fov", 45.0)
+    own = OpticalModel(set_value(narrow, "camera.resolution", list(size)))
+    for model, resolution in ((own, None), (OpticalModel(narrow), size)):
+        places = Places.of(model, resolution)
+        rng = np.random.default_rng(1)
+        drawn = [places.draw(rng) for _ in range(1000)]
+        spots = np.array([spot for _, spot in drawn])
+        assert spots.min(axis=0) == pytest.approx((0, 0), abs=0.02)
+        assert spots.max(axis=0) == pytest.approx((1, 1), abs=0.02)
+        whole = [each for each in drawn if np.abs(each[1] - 0.5).max() < 0.3][:4]
+        for (x, y, z), spot in whole:
+            touch = Contact(Sphere(1.5), point=(x, y, z), depth=0.1)
+            rows, columns = np.nonzero(model.chief_rays(size, [touch], "conforming").contact_mask)
+            middle = columns.mean() + 0.5, rows.mean() + 0.5
+            assert middle == pytest.approx(spot * size, abs=0.7)
 
 
 def test_a_range_leaves_the_draws_of_others_alone(mini: OpticalModel) -> None:

@@ -12,7 +12,7 @@ import pytest
 from comparing import same_pictures
 from scipy.ndimage import binary_erosion
 
-from optisense import OpticalModel, SensorDesign, library, load
+from optisense import OpticalModel, SensorDesign, library, load, set_value
 from optisense.design import LightGroup
 from optisense.errors import ContactError, OutputError, TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
@@ -79,6 +79,19 @@ def test_labels_are_true(made: Dataset, mini: OpticalModel) -> None:
         # A pixel of these pictures is 0.31 mm.
         assert np.linalg.norm(rays.points[row, column] - place) < 0.31
         assert labels["contact_pixels"] == sample.mask.sum()
+
+
+def test_rows_and_columns_are_the_middles_of_contacts_in_a_tall_picture(
+    mini: OpticalModel, tmp_path: Path
+) -> None:
+    # A narrow field of view, so that the picture shows skin only.
+    model = OpticalModel(set_value(mini.design, "camera.fov", 45.0))
+    draw = ContactDraw(("sphere:1.5",), depth=(0.3, 0.3))
+    settings = DatasetSettings(contacts=draw, resolution=(48, 64), photons=5_000, seed=2)
+    for sample in generate(model, tmp_path / "data", 2, settings):
+        rows, columns = np.nonzero(sample.mask)
+        middle = columns.mean() + 0.5, rows.mean() + 0.5
+        assert middle == pytest.approx((sample.labels["column"], sample.labels["row"]), abs=0.7)
 
 
 def test_depth_normals_and_mask_describe_the_ball(made: Dataset) -> None:

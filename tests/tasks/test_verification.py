@@ -19,7 +19,7 @@ from optisense.optics import TactileImage
 from optisense.sensors._gelsight_mini_ideal import gelsight_mini_ideal
 from optisense.tasks import ReconstructionSettings, VerificationSettings, verify
 from optisense.tasks._calibration import CalibratedSensor
-from optisense.tasks._unseen_presses import MOST_DEEP, choose_presses
+from optisense.tasks._unseen_presses import MOST_DEEP, VIEW_RIM, choose_presses
 from optisense.tasks.paired_bootstrap import INCONCLUSIVE, WORSE
 from optisense.tasks.press_readings import PressReading, check_seen, whole_errors
 
@@ -125,6 +125,21 @@ def test_presses_are_alike_in_both_and_not_too_deep(mini: OpticalModel) -> None:
         assert first == second
         # The gel is thick enough for far more.
         mini.place(replace(first, depth=first.depth / MOST_DEEP))
+
+
+def test_presses_fill_a_tall_view_but_its_border(mini: OpticalModel) -> None:
+    tall = set_value(set_value(mini.design, "camera.fov", 45.0), "camera.resolution", [60, 80])
+    model = OpticalModel(tall)
+    seen = model.chief_rays((60, 80)).points
+    sides = np.sort(np.ptp(seen.reshape(-1, 3)[:, :2], axis=0))
+    chosen = choose_presses((model, model), ["nut", "bean", "wedge"], 10, seed=0)
+    places = np.array([press.contacts[0].point for press in chosen.presses])
+    border = np.concatenate([seen[0], seen[-1], seen[:, 0], seen[:, -1]])
+    away, _ = cKDTree(border).query(places)
+    pixel = sides[0] / 60
+    assert away.min() > VIEW_RIM * sides[0] - pixel
+    # Places between these borders span 0.7 of the height.
+    assert np.ptp(places[:, 1]) > 0.6 * sides[1]
 
 
 def test_presses_are_less_deep_where_the_gel_is_thin() -> None:

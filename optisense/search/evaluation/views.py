@@ -18,10 +18,10 @@ design, is useless, and cameras that see 0.56 of the start or more
 (`benchmarks/single_parameters.py`) are useful zooms.
 """
 
-VIEW_RAYS = (48, 36)
-"""Width and height, in rays, of the grid of chief rays that shows by which mirrors the camera sees
-the skin. Of GelSight Svelte's, 500 arrive; shares are off by at most one column of the picture,
-0.03, and a trial by AOAP takes at most a twentieth longer.
+VIEW_RAYS = 48
+"""Number of columns of the grid of chief rays that shows by which mirrors the camera sees the skin.
+Of GelSight Svelte's, 500 arrive; shares are off by at most one column of the picture, 0.03, and a
+trial by AOAP takes at most a twentieth longer.
 """
 
 MOST_BY_OTHER_MIRRORS = 0.1
@@ -69,7 +69,7 @@ class SameMirrors:
         )
 
     def _seen(self, design: SensorDesign) -> dict[frozenset[str], float]:
-        return self._models.model(design).views_by_mirrors(VIEW_RAYS)
+        return self._models.model(design).views_by_mirrors(design.camera.size_at(VIEW_RAYS))
 
 
 def least_skin(design: SensorDesign, models: ModelCache) -> float:
