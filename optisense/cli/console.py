@@ -9,7 +9,7 @@ import functools
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -59,6 +59,13 @@ class PlainConsole(Console):
 
 output = PlainConsole(soft_wrap=True)
 messages = PlainConsole(stderr=True, soft_wrap=True)
+
+
+def print_notes(notes: Iterable[str]) -> None:
+    """Print notes for the user, beside the results."""
+    for note in notes:
+        messages.print(f"note: {note}", style="yellow")
+
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")

@@ -72,7 +72,7 @@ def dataset(
 
             settings = DatasetSettings(**options.settings())
             settings.contacts.parsed()
-            model = load_sensor(line, design, out, variant)
+            model = load_sensor(line, design, out, variant, settings.resolution)
             show = sample_progress(line, model, "samples", "reading the dataset")
             made = generate(model, out, count, settings, show, mend=mend)
             if parquet:

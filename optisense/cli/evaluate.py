@@ -15,6 +15,7 @@ from optisense.cli.console import (
     handles_errors,
     messages,
     output,
+    print_notes,
     table_of,
 )
 from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
@@ -87,8 +88,9 @@ def evaluate(
 
         objectives = resolve(options.objectives or BUILT_IN)
         shared, _ = split_settings(settings, objectives)
-        Settings(**shared)
+        sizes = Settings(**shared)
         sensor = load(design)
+        print_notes(sensor.camera.shape_notes(sizes.resolution, sizes.ray_resolution))
         if out is not None:
             take_folder(out, (JSON_FILE, *([REPORT_FILE] if report else [])), MARK)
 

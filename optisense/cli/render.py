@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
+from optisense.cli.console import (
+    EXIT_INTERRUPTED,
+    handles_errors,
+    messages,
+    output,
+    print_notes,
+)
 from optisense.cli.options import (
     ContactOption,
     DesignArgument,
@@ -66,6 +72,7 @@ def render(
         from optisense.sensors import load
 
         sensor = load(design)
+        print_notes(sensor.camera.shape_notes(size))
         layers = [f"layers/{group}.exr" for group in sensor.lights]
         take_folder(out, [*FILES, *layers], MARK)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from optisense.cli.console import print_notes
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine
 
@@ -15,13 +16,20 @@ if TYPE_CHECKING:
 LOADING, BUILDING = "loading", "building the scene"
 
 
-def load_sensor(line: ProgressLine, source: str, out: Path | None, variant: str) -> OpticalModel:
+def load_sensor(
+    line: ProgressLine,
+    source: str,
+    out: Path | None,
+    variant: str,
+    resolution: tuple[int, int] | None,
+) -> OpticalModel:
     """Return the model of a command's sensor, after the design was loaded, the output folder taken
-    and the scene built.
+    and the scene built; print a note if its pictures have another shape than the camera's.
 
     Args:
         source: name or folder of the design.
         out: output folder, if there is one.
+        resolution: (width, height) of the pictures; None is the camera's own.
 
     Raises:
         OptiSenseError: the design can't be loaded or built, or the folder can't be taken.
@@ -29,6 +37,7 @@ def load_sensor(line: ProgressLine, source: str, out: Path | None, variant: str)
     from optisense.sensors import load
 
     design = load(source)
+    print_notes(design.camera.shape_notes(resolution))
     if out is not None:
         take_folder(out)
     from optisense.optics import OpticalModel

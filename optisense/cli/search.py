@@ -13,7 +13,13 @@ import typer
 
 from optisense.cli import stopping
 from optisense.cli.asking import ask_yes
-from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
+from optisense.cli.console import (
+    EXIT_INTERRUPTED,
+    handles_errors,
+    messages,
+    output,
+    print_notes,
+)
 from optisense.cli.options import VariantOption, WorkersOption, json_option, out_option
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
@@ -165,7 +171,9 @@ def _new_study(out: Path, design: str | None, options: SearchOptions) -> Study:
     hint = advice(plan.space.parameters, options.objectives)
     if hint is not None:
         messages.print(f"hint: {hint}", style="yellow")
-    return Study.create(out, sensor, plan)
+    study = Study.create(out, sensor, plan)
+    print_notes(study.shape_notes)
+    return study
 
 
 def _resumed_study(out: Path, design: str | None, wanted: dict[str, Any], trust: bool) -> Study:

@@ -28,6 +28,7 @@ from optisense.writing import inside
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from optisense.optics import OpticalModel
     from optisense.tasks import PerceptionTask
 
 RESULT = "result.json"
@@ -193,15 +194,16 @@ def reconstruction(
     with progress_line() as line:
         line.begin(LOADING)
         settings = tasks.ReconstructionSettings(**options.model_dump())
-        model = load_sensor(line, design, out, variant)
+        model = load_sensor(line, design, out, variant, settings.resolution)
         show = sample_progress(line, model, "pictures", "comparing")
         result = tasks.reconstruct(model, settings, contacts, show)
+    values = _with_notes(result.to_dict(), model, settings.resolution)
     if out is not None:
         from optisense.tasks.figures import draw_reconstruction
 
-        _write(out, result.to_dict(), draw_reconstruction(result, model.design.camera.axes()))
+        _write(out, values, draw_reconstruction(result, model.design.camera.axes()))
     if as_json:
-        _print_json(result.to_dict())
+        _print_json(values)
     else:
         print_reconstruction(result)
         _print_folder(out)
@@ -216,22 +218,22 @@ def _perceive(
     variant: str,
 ) -> None:
     """Run tasks, which are made by name, one after the other; several have a folder each."""
-    results = []
+    results, values = [], []
     with _kept_samples_note(out), progress_line() as line:
         line.begin(LOADING)
         settings = tasks.SampleSettings(**options.settings())
         made = [make() for make in wanted.values()]
-        model = load_sensor(line, design, out, variant)
+        model = load_sensor(line, design, out, variant, settings.resolution)
         from optisense.tasks.figures import draw_perception
 
         for task in made:
             folder = out if out is None or len(wanted) == 1 else inside(out, task.name)
             show = sample_progress(line, model, task.name, f"{task.name}: reading the samples")
             results.append(tasks.perceive(task, model, settings, options.neighbours, folder, show))
+            values.append(_with_notes(results[-1].to_dict(), model, settings.resolution))
             if folder is not None:
-                _write(folder, results[-1].to_dict(), draw_perception(results[-1]))
+                _write(folder, values[-1], draw_perception(results[-1]))
     if as_json:
-        values = [result.to_dict() for result in results]
         _print_json(values[0] if len(values) == 1 else {"tasks": values})
     else:
         print_perception(results)
@@ -247,6 +249,13 @@ def _kept_samples_note(out: Path | None) -> Iterator[None]:
         if out is not None:
             messages.print("finished samples are kept; the same command continues")
         raise
+
+
+def _with_notes(
+    values: dict[str, Any], model: OpticalModel, resolution: tuple[int, int] | None
+) -> dict[str, Any]:
+    """Return a result for JSON with the notes on the shape of its pictures."""
+    return {**values, "notes": model.design.camera.shape_notes(resolution)}
 
 
 def _write(folder: Path, values: dict[str, Any], figure: Figure) -> None:

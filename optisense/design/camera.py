@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -33,6 +34,10 @@ from optisense.design.responses.chain import SoftFocus
 from optisense.design.responses.electronics import ChannelMatrix
 
 Pixels = Annotated[Count, Field(le=65_536)]
+
+SAME_SHAPE = 0.01
+"""Largest difference between the height of a picture and that of the camera's aspect ratio, as a
+share of it, up to which both have the same shape: 1280x960 is that of a camera of 3280x2464."""
 
 
 class ImagingModel(Model):
@@ -174,6 +179,30 @@ class Camera(ImagingModel, Viewpoint):
         """
         across, down = self.resolution if shape is None else shape
         return width, max(1, round(width * down / across))
+
+    def shape_notes(self, *resolutions: tuple[int, int] | None) -> list[str]:
+        """Return a note for each resolution whose aspect ratio is not the camera's.
+
+        The field of view is that along the width, so that such a picture shows less or more along
+        the height.
+
+        Args:
+            resolutions: (width, height), pixels; None is the camera's own. One given twice has one
+                note.
+        """
+        across, down = self.resolution
+        notes = []
+        for width, height in dict.fromkeys(each for each in resolutions if each is not None):
+            off = height - width * down / across
+            if abs(off) <= max(1.0, SAME_SHAPE * height):
+                continue
+            same = self.size_at(max(1, round(math.sqrt(width * height * across / down))))
+            what = "shows more above and below than" if off > 0 else "cuts off top and bottom of"
+            notes.append(
+                f"a picture of {width}x{height} {what} the camera's picture, which is "
+                f"{across}x{down}: use {same[0]}x{same[1]}"
+            )
+        return notes
 
     def axes(self) -> NDArray[np.float64]:
         """Return orthonormal rows (3, 3): image right, image up, viewing direction."""

@@ -97,6 +97,12 @@ class Evaluation(CachedValues):
         return self.settings.ray_resolution or self.design.camera.size_at(ACROSS)
 
     @property
+    def notes(self) -> list[str]:
+        """Notes on the shapes of the images and rays; see `Camera.shape_notes`."""
+        settings = self.settings
+        return self.design.camera.shape_notes(settings.resolution, settings.ray_resolution)
+
+    @property
     def sensing_faces(self) -> int:
         """Number of triangles of the sensing surface; `ChiefRays.face` counts them."""
         return len(self.model.sensing.faces)

@@ -79,6 +79,7 @@ class Scored:
         content = {
             "design": self.design.name,
             "settings": settings,
+            "notes": first.notes,
             "scores": {name: score.to_dict() for name, score in self.scores.items()},
             "shared_seconds": first.seconds,
         }

@@ -251,6 +251,7 @@ class OpticalModel(RayModel):
             "design": self.design.name,
             "seed": seed,
             "resolution": [camera.width, camera.height],
+            "notes": self.design.camera.shape_notes((camera.width, camera.height)),
             "estimator": estimator,
             "units": {"radiance": RADIANCE_UNIT, "length": "mm"},
             "photons": layers.photons,

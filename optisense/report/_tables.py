@@ -23,7 +23,7 @@ LABELS = {
 }
 """Labels of settings whose name is not what a reader would call them."""
 
-ELSEWHERE = ("design", "contacts", "presses", "resolution", "interrupted")
+ELSEWHERE = ("design", "contacts", "presses", "resolution", "notes", "interrupted")
 """Settings that the page shows in another place."""
 
 

@@ -128,6 +128,7 @@ class Verification:
         views: measures of the view of each sensor.
         pictures: pictures of each sensor at the first place of each object.
         contacts: contacts of each object with the first sensor.
+        shape_notes: notes on pictures of another shape than the cameras', as of `Camera`.
     """
 
     names: tuple[str, str]
@@ -140,6 +141,7 @@ class Verification:
     views: tuple[SensorView, SensorView]
     pictures: dict[str, tuple[PressPictures, PressPictures]]
     contacts: dict[str, list[Contact]]
+    shape_notes: tuple[str, ...] = ()
 
     @property
     def normal_change(self) -> ErrorChange:
@@ -184,7 +186,7 @@ class Verification:
 
     def notes(self) -> list[str]:
         """Remarks on the procedure for the user, as sentences without a full stop."""
-        found = []
+        found = list(self.shape_notes)
         if self.scale < 1.0:
             found.append(
                 f"the objects are larger than the skin and were scaled to {100 * self.scale:.0f} %"
@@ -297,8 +299,10 @@ def verify(
     )
     flats = np.array([flat_errors(max(pair, key=lambda each: each.areas.sum())) for pair in pairs])
     step = settings.places
+    notes = [note for each in models for note in each.design.camera.shape_notes(resolution)]
     return Verification(
         names=names,
+        shape_notes=tuple(dict.fromkeys(notes)),
         settings=settings,
         scale=chosen.scale,
         same_places=chosen.same_places,

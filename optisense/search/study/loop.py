@@ -137,6 +137,7 @@ class StudyRun:
         found_notes = [moved_start_note(study.space), tie, condition_note(study.trials)]
         found_notes += [] if several else [worsened_note(study.best, study.start)]
         notes = [
+            *study.shape_notes,
             *self._notes,
             *self.method.notes(),
             *(note for note in found_notes if note is not None),

@@ -77,6 +77,12 @@ class Study:
         self._lock = lock
         self._trusted = folder is None
 
+    @property
+    def shape_notes(self) -> list[str]:
+        """Notes on images and rays of another shape than the camera's; see `Camera`."""
+        sizes = (self.settings.settings.get(name) for name in ("resolution", "ray_resolution"))
+        return self.space.design.camera.shape_notes(*(each and tuple(each) for each in sizes))
+
     @staticmethod
     def create(folder: str | Path | None, design: SensorDesign, plan: Plan) -> Study:
         """Create a study; nothing is scored yet. It holds the lock of its folder until it is
