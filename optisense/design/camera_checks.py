@@ -47,7 +47,7 @@ SMALLEST_CAMERA = 0.65
 
 LEAST_SKIN = 0.25
 """Share of the sensing surface's area that the camera must see for a score. The built-in sensors
-see 0.44 (GelBelt) to 0.76 (GelSight360). Scores reward a camera that looks at one spot, the more
+see 0.45 (GelBelt) to 0.75 (GelSight360). Scores reward a camera that looks at one spot, the more
 the smaller the spot, so without a limit a search would end at a field of view of nearly nothing.
 """
 

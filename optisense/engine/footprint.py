@@ -40,7 +40,7 @@ def footprint(session: Session, fields: FootprintGrid, job: Job) -> dict[str, An
     # The model for drafts follows the edits; that for whole pictures keeps its light.
     model = session.renderer.draft_model(design)
     rays = model.chief_rays((fields.columns, rows))
-    view = view_of(rays, model.sensing.face_areas)
+    view = view_of(rays, model.sensing)
     return {
         "files": {
             "points": files.array("footprint.points.npy", rays.points.astype(np.float32)),

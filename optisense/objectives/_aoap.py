@@ -10,7 +10,7 @@ import numpy as np
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
-from optisense.objectives._coverage import share_of_area, triangles_seen
+from optisense.objectives._coverage import triangles_seen
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
@@ -80,7 +80,7 @@ def aoap(
     coverage = float(seen.mean())
     parts = {
         "coverage": coverage,
-        "coverage_by_area": share_of_area(evaluation, seen),
+        "coverage_by_area": evaluation.view.skin,
         "mean_cosine": mean_cosine,
         "mean_cosine_of_rays_that_arrive": mean_cosine / float(hit.mean()),
         "pixels_that_see_the_surface": float(hit.mean()),

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
 
 
-USUAL = (0.484, 0.789)
+USUAL = (0.455, 0.751)
 """Values of the poorest and the best built-in sensor: GelBelt, GelSight360."""
 
 
@@ -37,20 +37,21 @@ USUAL = (0.484, 0.789)
 def coverage(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any]]:
     """The share of the sensing surface that the camera sees.
 
-    The value is the area of the triangles on which a chief ray arrives, divided by the area of the
-    surface. The part `by_triangles` divides their numbers instead, as AOAP does; it depends on how
-    finely each place of the surface is divided into triangles.
+    The value is the area that footprints of pixels cover, divided by the area of the surface. It
+    depends neither on the mesh's triangles nor on the resolution of the rays, and a place that is
+    visible by two mirrors counts once. The part `by_triangles` is the number of triangles on which
+    a chief ray arrives, divided by the number of all, as AOAP counts them.
     """
-    rays = evaluation.checked_rays
+    rays, share = evaluation.checked_rays, evaluation.view.skin
     seen = triangles_seen(evaluation)
     parts = {
         "by_triangles": float(seen.mean()),
-        "area": float(evaluation.model.sensing.face_areas[seen].sum()),
+        "area": share * evaluation.model.sensing.area,
         "triangles_seen": int(seen.sum()),
         "triangles": len(seen),
         "pixels_that_see_the_surface": float(rays.hit.mean()),
     }
-    return share_of_area(evaluation, seen), parts, {"hit": rays.hit}
+    return share, parts, {"hit": rays.hit}
 
 
 def triangles_seen(evaluation: Evaluation) -> NDArray[np.bool_]:
@@ -58,11 +59,3 @@ def triangles_seen(evaluation: Evaluation) -> NDArray[np.bool_]:
     rays, faces = evaluation.checked_rays, evaluation.sensing_faces
     seen: NDArray[np.bool_] = np.bincount(rays.face[rays.hit], minlength=faces)[:faces] > 0
     return seen
-
-
-def share_of_area(evaluation: Evaluation, seen: NDArray[np.bool_]) -> float:
-    """Return the area of some triangles of the sensing surface, given as a mask (f,), divided by
-    the area of the surface.
-    """
-    areas = evaluation.model.sensing.face_areas
-    return float(areas[seen].sum() / areas.sum())

@@ -11,7 +11,6 @@ from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
 from optisense.objectives._uniformity import COLOURS, UNLIT
 from optisense.objectives.registry import no_pixels, objective
-from optisense.objectives.settings import VIEW_ACROSS
 from optisense.quality import SCORE_PHOTONS
 
 if TYPE_CHECKING:
@@ -22,6 +21,10 @@ if TYPE_CHECKING:
 LOST = 0.25
 """Share of a colour's light from which on its loss counts: a quarter, which a reader can detect,
 and several times the noise of an image's light."""
+
+ACROSS = 160
+"""Width (pixels) of the images. Shadows are larger than a ball's contact, which at this width has
+some hundred pixels on the built-in sensors."""
 
 
 @objective(
@@ -75,7 +78,7 @@ def _image(evaluation: Evaluation, contacts: Sequence[Contact]) -> TactileImage:
     settings = evaluation.settings
     image = evaluation.model.render(
         contacts,
-        resolution=evaluation.design.camera.size_at(VIEW_ACROSS),
+        resolution=evaluation.design.camera.size_at(ACROSS),
         photons=SCORE_PHOTONS if settings.photons is None else settings.photons,
         seed=settings.seed,
         partial=False,

@@ -133,9 +133,7 @@ class Evaluation(CachedValues):
     def view(self) -> View:
         """The share of the surface that the camera sees, by separate rays (`VIEW_ACROSS`)."""
         size = self.design.camera.size_at(VIEW_ACROSS)
-        return self.shared(
-            "view", lambda: view_of(self.model.chief_rays(size), self.model.sensing.face_areas)
-        )
+        return self.shared("view", lambda: view_of(self.model.chief_rays(size), self.model.sensing))
 
     @property
     def checked_rays(self) -> ChiefRays:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
 from optisense.errors import ObjectiveError
-from optisense.objectives._projection_warping import triangle_areas
+from optisense.geometry import TriangleMesh
+from optisense.objectives._seen_area import seen_area
 from optisense.objectives.settings import Settings
 
 if TYPE_CHECKING:
@@ -22,9 +20,9 @@ class View:
 
     Attributes:
         picture: share of the pixels that see the sensing surface, 0 to 1.
-        skin: share of the sensing surface's area that the pixels see, 0 to 1. It is the area
-            between the points of neighbouring pixels, so it does not depend on the size of the
-            mesh's triangles, and on the number of pixels only at the borders.
+        skin: share of the sensing surface's area that the pixels see, 0 to 1. It does not depend on
+            the sizes of the mesh's triangles, and a place that is visible by two mirrors counts
+            once.
     """
 
     picture: float
@@ -59,13 +57,11 @@ class View:
                 )
 
 
-def view_of(rays: ChiefRays, face_areas: NDArray[np.float64]) -> View:
+def view_of(rays: ChiefRays, surface: TriangleMesh) -> View:
     """Return the view of chief rays.
 
     Args:
         rays: chief rays of the untouched sensor.
-        face_areas: (m,) areas of the sensing surface's triangles, mm².
+        surface: mesh of the sensing surface, mm.
     """
-    seen = float(np.nansum(triangle_areas(rays.points, rays.hit).areas, dtype=np.float64))
-    # A place that is visible by two mirrors counts twice.
-    return View(float(rays.hit.mean()), min(1.0, seen / float(face_areas.sum())))
+    return View(float(rays.hit.mean()), seen_area(rays, surface) / surface.area)

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
+from optisense.geometry.surface_samples import surface_samples
 from optisense.optics.ledger import cells_in_view
-from optisense.optics.scene.surface_cells import surface_samples
 from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photons import TargetCells
 from optisense.optics.transport.place_light import (

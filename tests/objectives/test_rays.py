@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from optisense.objectives._aoap import aoap
 from optisense.objectives._coverage import coverage
 from optisense.objectives._distortion import distortion, footprints
 from optisense.objectives._projection_warping import projection_warping, triangle_areas
+from optisense.objectives.view import View, view_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
@@ -31,14 +33,20 @@ PIXEL_MIDDLES = 2e-4
 class PlateModel:
     """A pinhole over a plate of triangles; only what objectives of rays look at."""
 
-    def __init__(self, plate: TriangleMesh) -> None:
+    def __init__(self, plate: TriangleMesh, others: Sequence[Piece] = ()) -> None:
         self.sensing = plate
+        self.others = others
 
     def chief_rays(self, resolution: tuple[int, int]) -> ChiefRays:
         camera = RayCamera((0, 0, DISTANCE), (0, 0, -1), (0, 1, 0), FOV, *resolution, False)
         coating = Surface(SurfaceKind.OPAQUE, reflectance=(0.5,) * 3, region=Region.SENSING)
         piece = Piece("plate", self.sensing.vertices, self.sensing.faces, coating)
-        return trace_chief_rays(RayScene([piece]), camera, np.arange(len(self.sensing.faces)))
+        scene = RayScene([piece, *self.others])
+        return trace_chief_rays(scene, camera, np.arange(len(self.sensing.faces)))
+
+    def share(self, resolution: tuple[int, int] = (320, 240)) -> float:
+        """The share of the plate that is seen."""
+        return view_of(self.chief_rays(resolution), self.sensing).skin
 
 
 class RaysOf:
@@ -49,11 +57,16 @@ class RaysOf:
         self.chief_rays = self.checked_rays = rays or self.model.chief_rays(PIXELS)
         self.sensing_faces = len(plate.faces)
 
+    @property
+    def view(self) -> View:
+        return view_of(self.chief_rays, self.model.sensing)
+
 
 def evaluation(plate: TriangleMesh, rays: ChiefRays | None = None) -> Any:
     stand_in: Any = RaysOf(plate, rays)
     assert hasattr(Evaluation, "checked_rays")
     assert hasattr(Evaluation, "sensing_faces")
+    assert hasattr(Evaluation, "view")
     return stand_in
 
 
@@ -96,13 +109,61 @@ def test_coverage_weighs_as_much_as_asked() -> None:
     assert high - low == pytest.approx(0.5 * parts["coverage"])
 
 
-def test_coverage_of_a_finely_cut_surface_is_the_area_seen() -> None:
-    tall = PIXELS[1] / PIXELS[0]
-    area = (2 * DISTANCE * SLOPE) ** 2 * tall / 20**2
-    off = [aoap(evaluation(plate(20, n)))[1]["coverage_by_area"] - area for n in (10, 20, 80)]
-    # A triangle counts when a corner of it is seen, so the border is counted in.
-    assert off[0] > off[1] > off[2] > 0
-    assert off[2] < 0.01
+WIDE, TALL = 2 * DISTANCE * SLOPE, 2 * DISTANCE * SLOPE * PIXELS[1] / PIXELS[0]
+"""Size (mm) of the rectangle that the pinhole sees of a plate: 11.55 x 8.66."""
+
+
+@pytest.mark.parametrize("divisions", [1, 7, 80])
+@pytest.mark.parametrize("resolution", [(80, 60), (160, 120), (640, 480)])
+def test_coverage_is_the_area_in_view_for_any_triangles_and_rays(
+    divisions: int, resolution: tuple[int, int]
+) -> None:
+    found = PlateModel(plate(20, divisions)).share(resolution)
+    assert found == pytest.approx(WIDE * TALL / 20**2, rel=0.02)
+
+
+def test_coverage_of_a_surface_that_is_wholly_in_view_is_one() -> None:
+    assert PlateModel(plate(7, 1)).share() == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("divisions", [(3, 2), (60, 40)])
+def test_coverage_of_a_coarse_or_fine_cylinder_is_its_arc_in_view(
+    divisions: tuple[int, int],
+) -> None:
+    """A trough of radius 8 mm along y, of which the camera sees all angles within its picture."""
+    radius, half = 8.0, np.radians(80.0)
+    grid = TriangleMesh.grid((2.0 * half, 4.0), (60, divisions[1]))
+    angle, along = grid.vertices[:, 0], grid.vertices[:, 1]
+    bent = np.stack([radius * np.sin(angle), along, radius * (1.0 - np.cos(angle))], axis=1)
+    trough = TriangleMesh(bent, grid.faces)
+    # The picture's side, x = (DISTANCE - z) * SLOPE, meets the cylinder at this angle.
+    angles = np.linspace(0.0, half, 100_000)
+    seen = radius * np.sin(angles) <= (DISTANCE - radius * (1.0 - np.cos(angles))) * SLOPE
+    assert PlateModel(trough).share() == pytest.approx(angles[seen].max() / half, rel=0.02)
+
+
+def test_coverage_leaves_out_what_a_part_hides() -> None:
+    """A blocker at half the distance hides twice its width and height."""
+    black = Surface(SurfaceKind.OPAQUE, reflectance=(0.0,) * 3)
+    screen = TriangleMesh.grid((2.0, 3.0), (1, 1))
+    raised = Piece("screen", screen.vertices + [1.0, 0.5, 5.0], screen.faces, black)
+    found = PlateModel(plate(20, 1), [raised]).share()
+    assert found == pytest.approx((WIDE * TALL - 4.0 * 6.0) / 20**2, rel=0.02)
+
+
+def test_coverage_counts_what_a_mirror_shows_again_once() -> None:
+    """A mirror upright at x = 3 mm shows the camera the places left of it a second time."""
+    shiny = Surface(SurfaceKind.MIRROR, reflectance=(1.0,) * 3)
+    flat = TriangleMesh.grid((9.0, 30.0), (1, 1))
+    wall = np.stack(
+        [0 * flat.vertices[:, 0] + 3.0, flat.vertices[:, 1], flat.vertices[:, 0] + 4.6], 1
+    )
+    model = PlateModel(plate(20, 1), [Piece("mirror", wall, flat.faces, shiny)])
+    rays = model.chief_rays((320, 240))
+    twice = rays.hit & (rays.mirrors > 0)
+    assert 0.15 < twice.mean() < 0.3
+    seen = (0.5 * WIDE + 3.0) * TALL  # and nothing behind the mirror
+    assert model.share() == pytest.approx(seen / 20**2, rel=0.02)
 
 
 @pytest.mark.parametrize("tilt", [10.0, 30.0])
@@ -264,5 +325,4 @@ def test_coverage_is_that_of_aoap() -> None:
     value, parts, _ = coverage(view)
     assert value == aoap(view)[1]["coverage_by_area"]
     assert parts["by_triangles"] == aoap(view)[1]["coverage"]
-    # The picture sees 11.55 mm x 8.66 mm of the plate.
-    assert value * 400.0 == pytest.approx(12 * 10, abs=4)
+    assert value * 400.0 == parts["area"]
