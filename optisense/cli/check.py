@@ -111,8 +111,8 @@ def _describe(design: SensorDesign) -> None:
     shares = view_shares(design, design.deformed_meshes())
     if shares is not None:
         output.print(
-            f"        without refraction, {100 * shares[0]:.0f} % of the sensing surface is in the "
-            f"picture, and fills {100 * shares[1]:.0f} % of it"
+            f"        without refraction, {100 * shares.skin:.0f} % of the sensing surface is in "
+            f"the picture, and fills {100 * shares.picture:.0f} % of it"
         )
     if design.parts_of(Role.ELASTOMER):
         output.print(f"elasticity  {elasticity_in_words(design)}")

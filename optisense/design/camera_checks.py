@@ -6,6 +6,8 @@ assumed.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +19,9 @@ from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
+from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import closest_points
+from optisense.geometry.surface_samples import surface_samples
 
 WIDEST_PERSPECTIVE = 135.0
 """Angle from corner to corner of the widest lens that keeps straight lines straight, degrees.
@@ -56,6 +60,15 @@ LEAST_PICTURE = 0.2
 0.31 (GelSight Svelte) to 1. 2to3PW does not count the other pixels, so without a limit the best
 camera would be far away and show the sensor as a few pixels.
 """
+
+
+VIEW_POINTS = 1000
+"""Number of points of the sensing surface that are looked for in the picture; they give its share
+to about 0.01."""
+
+BEFORE = 1e-6
+"""Share of the distance to a point by which a blocker must be nearer to hide it; a housing that
+ends at the skin does not. It covers rounding."""
 
 
 def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
@@ -149,6 +162,21 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagn
     return found[0] if found else None
 
 
+class ViewShares(NamedTuple):
+    """Shares of the camera's view along straight rays, 0 to 1.
+
+    Attributes:
+        skin: share of the sensing surface's area that is in the picture and not hidden.
+        picture: share of the picture that shows the sensing surface.
+        hidden: share of the sensing surface's area that is in the picture behind a blocker, by the
+            name of the blocker that is nearest to the camera.
+    """
+
+    skin: float
+    picture: float
+    hidden: dict[str, float]
+
+
 def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
     """Return a warning if too little of the sensing surface is in the camera's straight view.
 
@@ -161,11 +189,24 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     shares = view_shares(design, meshes)
     if shares is None:
         return []
-    camera, (share, picture) = design.camera, shares
-    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
-    areas = [skin.face_areas for skin in skins]
     where = design.where("camera", "direction")
-    if picture == 0.0 and not any(in_picture(camera, skin.vertices).any() for skin in skins):
+    if shares.picture >= LEAST_PICTURE and shares.skin >= LEAST_SKIN:
+        return []
+    hider = max(shares.hidden, key=lambda name: shares.hidden[name], default=None)
+    if hider is not None and shares.hidden[hider] > shares.skin:
+        return [
+            Diagnostic(
+                f"part '{hider}' (blocker) hides {100 * shares.hidden[hider]:.0f} % of the sensing "
+                f"surface from the camera, which sees {100 * shares.skin:.0f} %, if refraction is "
+                "neglected",
+                design.where("parts", hider, "role"),
+                "If it is clear, its role is support; otherwise move it or the camera",
+                severity="warning",
+            )
+        ]
+    skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
+    in_sight = any(in_picture(design.camera, skin.vertices).any() for skin in skins)
+    if shares.picture == 0.0 and shares.skin == 0.0 and not in_sight:
         return [
             Diagnostic(
                 "the sensing surface is not in the camera's field of view",
@@ -175,37 +216,53 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
                 severity="warning",
             )
         ]
-    fine = all(np.sqrt(area.max()) < 0.1 * np.sqrt(area.sum()) for area in areas)
-    if picture < LEAST_PICTURE:
-        return [_small(f"the sensing surface fills {100 * picture:.0f} % of the picture", where)]
-    if fine and share < LEAST_SKIN:
-        return [_small(f"{100 * share:.0f} % of the sensing surface is in the picture", where)]
-    return []
+    if shares.picture < LEAST_PICTURE:
+        filled = 100 * shares.picture
+        return [_small(f"the sensing surface fills {filled:.0f} % of the picture", where)]
+    return [_small(f"{100 * shares.skin:.0f} % of the sensing surface is in the picture", where)]
 
 
-def view_shares(
-    design: SensorDesign, meshes: dict[str, TriangleMesh]
-) -> tuple[float, float] | None:
-    """Return the share of the sensing surface in the picture, and the share of the picture on it,
-    along straight rays.
+def view_shares(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> ViewShares | None:
+    """Return the shares of the camera's view along straight rays.
 
     Args:
         meshes: deformed meshes, mm, by part.
 
     Returns:
-        Share of the surface's area, by whole triangles, and share of the picture, both 0 to 1; None
-        if there is no sensing surface, or a mirror.
+        The shares; None if there is no sensing surface, or a mirror.
     """
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
-    if not skins or design.parts_of(Role.MIRROR):
+    total = sum(skin.area for skin in skins)
+    if total == 0.0 or design.parts_of(Role.MIRROR):
         return None
     camera = design.camera
-    seen = [
-        float(skin.face_areas[in_picture(camera, skin.triangles.mean(axis=1))].sum())
-        for skin in skins
-    ]
+    points = np.concatenate([_even_points(skin, total) for skin in skins])
+    inside = points[in_picture(camera, points)]
+    position = np.array(camera.position)
+    nearest, hider = np.ones(len(inside)), np.full(len(inside), -1)
+    blockers = [name for name in design.parts_of(Role.BLOCKER) if name in meshes]
+    for number, name in enumerate(blockers):
+        hits = ray_hits(meshes[name], position + 0 * inside, inside - position)
+        closest = np.ones(len(inside))
+        np.minimum.at(closest, hits.ray, hits.distance)
+        closer = closest < nearest - BEFORE
+        nearest[closer], hider[closer] = closest[closer], number
     picture = float(np.isfinite(skin_distances(design, meshes, straight_rays(camera))).mean())
-    return sum(seen) / max(sum(float(skin.face_areas.sum()) for skin in skins), 1e-300), picture
+    counts = np.bincount(hider + 1, minlength=len(blockers) + 1) / len(points)
+    hidden = {name: float(n) for name, n in zip(blockers, counts[1:], strict=True) if n > 0.0}
+    return ViewShares(float(counts[0]), picture, hidden)
+
+
+def _even_points(skin: TriangleMesh, total: float) -> NDArray[np.float64]:
+    """Return the points (k, 3), mm, of one of several sensing surfaces that stand for equal shares
+    of their `total` area, mm².
+    """
+    spacing = float(np.sqrt(total / VIEW_POINTS))
+    points, _, areas = surface_samples(skin.vertices, skin.faces, spacing)
+    count = max(1, round(VIEW_POINTS * skin.area / total))
+    reached = np.cumsum(areas)
+    chosen = np.searchsorted(reached, (np.arange(count) + 0.5) / count * reached[-1])
+    return np.asarray(points.T[chosen], dtype=np.float64)
 
 
 def _small(message: str, where: str) -> Diagnostic:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
+from optisense.design.camera_checks import view_shares
 from optisense.design.check import inside
 from optisense.geometry import TriangleMesh
 
@@ -171,7 +172,7 @@ class TestView:
         ("direction", "seen"),
         [
             ([0, 0, 1], True),
-            ([0.3, 0, 1], True),  # its left edge, 11 degrees inside the axis, meets the skin
+            ([0.05, 0, 1], True),
             ([0, 0, -1], False),
             ([1, 0, 1], False),
             ([0, 1, 0.3], False),
@@ -191,8 +192,40 @@ class TestView:
     def test_a_surface_whose_corners_are_all_out_of_the_picture_is_seen(
         self, plain: SensorDesign
     ) -> None:
-        plain.meshes["skin"] = TriangleMesh.grid((10, 8), (1, 1)).flipped()
+        plain.meshes["skin"] = TriangleMesh.grid((6, 5), (1, 1)).flipped()
         assert check_design(set_value(plain, "camera.position", [0, 0, -10])) == []
+
+    @pytest.mark.parametrize("divisions", [1, 50])
+    def test_the_share_in_the_picture_is_that_of_the_area(
+        self, plain: SensorDesign, divisions: int
+    ) -> None:
+        plain.meshes["skin"] = TriangleMesh.grid((8, 7), (divisions, divisions)).flipped()
+        design = set_value(plain, "camera.position", [0, 0, -10])
+        shares = view_shares(design, design.meshes)
+        half = 10.0 * np.tan(np.radians(design.camera.fov / 2.0))
+        width, height = design.camera.resolution
+        assert shares is not None
+        assert shares.skin == pytest.approx(4 * half**2 * height / width / 56.0, abs=0.015)
+        assert (
+            "of the sensing surface is in the picture"
+            in only(check_design(design), "warning").message
+        )
+
+    def test_a_blocker_that_hides_the_skin_is_named(self, plain: SensorDesign) -> None:
+        plain.meshes["skin"] = TriangleMesh.grid((6, 5), (1, 1)).flipped()
+        screen = TriangleMesh.grid((30, 30), (1, 1))
+        plain.meshes["wall"] = screen.with_vertices(screen.vertices + [14.5, 0, -5])
+        design = set_value(plain, "camera.position", [0, 0, -10])
+        problem = only(check_design(design), "warning")
+        shares = view_shares(design, design.meshes)
+        assert shares is not None
+        # The screen begins 0.5 mm left of the axis, half way to the skin, so it hides x > -1 mm.
+        width = 2 * 10.0 * np.tan(np.radians(design.camera.fov / 2.0))
+        assert shares.hidden["wall"] == pytest.approx(
+            shares.skin * (width / 2 + 1.0) / (width / 2 - 1.0), rel=0.1
+        )
+        assert problem.message.startswith("part 'wall' (blocker) hides 2")
+        assert problem.where == "parts.wall.role" and "its role is support" in str(problem.hint)
 
     def test_a_fisheye_sees_what_is_beside_it(self, plain: SensorDesign) -> None:
         wide = set_value(plain, "camera.projection", "equidistant")
