@@ -32,15 +32,15 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
 
     sensor = sensors.load(design)
     problems = sensors.check(sensor)
-    _describe(sensor)
+    warnings = len(problems) + _describe(sensor)
     for problem in problems[:MOST_WARNINGS]:
         output.print(f"warning: {problem}", style="yellow")
     if len(problems) > MOST_WARNINGS:
         output.print(f"warning: {len(problems) - MOST_WARNINGS:,} more like these", style="yellow")
     for sentence in overdriven_lights(sensor):
-        output.print(f"warning: {sentence}", style="yellow")
+        output.print(f"note: {sentence}")
     if any(part.role == "mirror" for part in sensor.parts.values()):
-        _print_views(sensor)
+        warnings += _print_views(sensor)
     if contacts:
         from optisense.optics import OpticalModel
 
@@ -48,14 +48,22 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         pressed = model.pressed(contacts, [model.place(each) for each in contacts])
         for warning in pressed.warnings:
             output.print(f"warning: {warning}", style="yellow")
-        print_small_indenters(contacts)
+        warnings += len(pressed.warnings) + print_small_indenters(contacts)
         word = "contact fits" if len(contacts) == 1 else "contacts fit"
         output.print(f"{len(contacts)} {word} on the sensing surface.")
-    output.print("The design is in order.", style="green")
+    if warnings:
+        number = "1 warning" if warnings == 1 else f"{warnings:,} warnings"
+        output.print(f"No errors, {number}.", style="yellow")
+    else:
+        output.print("The design is in order.", style="green")
 
 
-def _print_views(design: SensorDesign) -> None:
-    """Trace chief rays, and print by which mirrors they go and which mirrors are not used."""
+def _print_views(design: SensorDesign) -> int:
+    """Trace chief rays, and print by which mirrors they go and which mirrors are not used.
+
+    Returns:
+        The number of warnings.
+    """
     try:
         from optisense.optics import OpticalModel
         from optisense.optics.mirror_checks import CHECK_RAYS, mirror_problems, views_in_words
@@ -63,16 +71,22 @@ def _print_views(design: SensorDesign) -> None:
         views = OpticalModel(design).views_by_mirrors(design.camera.size_at(CHECK_RAYS))
     except SetupError as error:  # the rest of the check needs no renderer
         output.print(f"note: its mirrors are not checked: {error}", style="yellow")
-        return
+        return 0
     if views:
         sentence = f"Views of the sensing surface, by their mirrors: {views_in_words(views)}."
         output.print(sentence)
-    for problem in mirror_problems(design, views):
+    problems = mirror_problems(design, views)
+    for problem in problems:
         output.print(f"warning: {problem}", style="yellow")
+    return len(problems)
 
 
-def _describe(design: SensorDesign) -> None:
-    """Print the contents of the design, and the share of the skin that the camera sees."""
+def _describe(design: SensorDesign) -> int:
+    """Print the contents of the design, and the share of the skin that the camera sees.
+
+    Returns:
+        The number of warnings.
+    """
     from optisense.design.camera_checks import view_shares
     from optisense.design.parts import Role
     from optisense.library import unused_imaging
@@ -114,9 +128,11 @@ def _describe(design: SensorDesign) -> None:
             f"        without refraction, {100 * shares.skin:.0f} % of the sensing surface is in "
             f"the picture, and fills {100 * shares.picture:.0f} % of it"
         )
+    loose = False
     if design.parts_of(Role.ELASTOMER):
         output.print(f"elasticity  {elasticity_in_words(design)}")
-        if not is_attached(design):
+        loose = not is_attached(design)
+        if loose:
             sentence = "warning: the gel touches no rigid part; its elastic skin can't be pressed"
             output.print(sentence, style="yellow")
         elif limits := rims_in_words(design):
@@ -124,3 +140,4 @@ def _describe(design: SensorDesign) -> None:
     assumed = sum(entry.status == "assumed" for entry in design.provenance.values())
     if assumed:
         output.print(f"{assumed} of its values are marked as assumed.", style="yellow")
+    return int(loose)

@@ -78,10 +78,14 @@ def parse_contacts(texts: list[str] | None) -> list[Contact]:
     return [parse_contact(text) for text in texts or []]
 
 
-def print_small_indenters(contacts: Sequence[Contact]) -> None:
-    """Print a warning for each indenter that is too small to be in millimetres."""
+def print_small_indenters(contacts: Sequence[Contact]) -> int:
+    """Print a warning for each indenter that is too small to be in millimetres, and return their
+    number.
+    """
     from optisense.cli.console import output
     from optisense.geometry.indenter_sizes import size_warning
 
-    for warning in filter(None, map(size_warning, contacts)):
+    warnings = list(filter(None, map(size_warning, contacts)))
+    for warning in warnings:
         output.print(f"warning: {warning}", style="yellow")
+    return len(warnings)

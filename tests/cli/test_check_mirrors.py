@@ -37,14 +37,16 @@ def test_mirrors_that_the_camera_looks_past_are_told(
     space = SearchSpace({path: (-200.0, 200.0)})
     moved = space.bind(sensors.load("gelsight-svelte"), tried=False).apply(np.array([value]))
     ots.save_design(moved, tmp_path / "design")
-    _, odd = checked(str(tmp_path / "design"))
+    text, odd = checked(str(tmp_path / "design"))
     assert len(odd) == len(said)
     assert all(each in told for each, told in zip(said, odd, strict=True))
+    assert text.endswith(f"No errors, {len(said)} warning{'s' if len(said) > 1 else ''}.")
 
 
 def test_mirrors_that_are_used_are_told_with_their_shares() -> None:
     text, odd = checked("gelsight-svelte")
     assert "100 % by 'M1' and 'M2'" in text and odd == []
+    assert text.endswith("The design is in order.")
     assert " by " not in checked("gelsight-mini-ideal")[0].split("camera")[-1]
 
 
