@@ -4,6 +4,8 @@ nine places (the OptiSense paper, "RGB2Normal mapping objective function").
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -31,6 +33,9 @@ LEAST_PIXELS = 8
 
 MOST_LEAST_PIXELS = 10_000
 """Largest number of pixels that a line or press may be asked to have; none has as many."""
+
+WIDTH_STEP = 40
+"""Multiple of pixels to which a suggested width is rounded up; 120, 160, 240 and 320 are such."""
 
 LINE, PRESS = "line", "press"
 """Pixels whose colours one principal component describes: those of a line (the OptiSense paper), or
@@ -122,7 +127,12 @@ def rgb2normal(
     places: list[dict[str, Any]] = []
     lines = []
     for press in evaluation.presses:
-        tilted = _tilts_on_lines(press, directions, half_lines, least_pixels)
+        try:
+            tilted = _tilts_on_lines(press, directions, half_lines, least_pixels)
+        except ObjectiveError:
+            # The shortest line of all presses tells which resolution they all need.
+            presses = evaluation.presses
+            raise _short_line(presses, directions, half_lines, least_pixels) from None
         read = {angle: press.colours(chosen, colours) for angle, (chosen, _) in tilted.items()}
         axis = principal_axis(np.concatenate(list(read.values()))) if dominant == PRESS else None
         fits = {
@@ -168,13 +178,31 @@ def lines_of(
         chosen = line(press, angle, half_lines)
         count = int(chosen.sum())
         if count < least_pixels:
-            raise ObjectiveError(
-                f"{press.name} has {count} of the {least_pixels} pixels that the line at "
-                f"{angle:g} degrees needs",
-                hint="Use a higher resolution",
-            )
+            raise _short_line([press], directions, half_lines, least_pixels)
         found[angle] = chosen
     return found
+
+
+def _short_line(
+    presses: Sequence[Press], directions: int, half_lines: bool, least_pixels: int
+) -> ObjectiveError:
+    """Return the error about the shortest line of presses, with a resolution that suffices for it:
+    lines are one pixel wide, so that their pixels grow in number with the image's width.
+    """
+    angles = np.arange(directions if half_lines else directions // 2) * 360.0 / directions
+    count, number, angle = min(
+        (int(line(press, angle, half_lines).sum()), number, angle)
+        for number, press in enumerate(presses)
+        for angle in angles.tolist()
+    )
+    height, width = presses[number].mask.shape
+    needed = width * (least_pixels + 1) / max(count, 1)  # a pixel more or less is chance
+    finer = WIDTH_STEP * math.ceil(needed / WIDTH_STEP)
+    return ObjectiveError(
+        f"{presses[number].name} has {count} of the {least_pixels} pixels that the line at "
+        f"{angle:g} degrees needs",
+        hint=f"Use a higher resolution, such as {finer}x{round(finer * height / width)}",
+    )
 
 
 def _tilts_on_lines(

@@ -226,9 +226,14 @@ def test_the_dominant_colour_is_that_of_largest_variance() -> None:
 def test_too_few_pixels_say_where(
     make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
 ) -> None:
-    press = make_press(lambda n: n, DEPTH, pixels=7, number=3)
-    with pytest.raises(ObjectiveError, match=r"place 3 .* higher resolution"):
-        rgb2normal(evaluation_of(press))
+    press = make_press(lambda n: n, DEPTH, pixels=9, number=3)
+    coarser = make_press(lambda n: n, DEPTH, pixels=5, number=4)
+    with pytest.raises(ObjectiveError, match=r"place 4 .* higher resolution") as told:
+        rgb2normal(evaluation_of(press, coarser))
+    # With that many pixels (and a middle one), the press with the shortest line is scored.
+    width, height = (int(each) for each in str(told.value.hint).split()[-1].split("x"))
+    assert width == height == 40 * (width // 40)
+    assert rgb2normal(evaluation_of(make_press(lambda n: n, DEPTH, pixels=width + 1)))[0] > 0.8
 
 
 def test_an_odd_number_of_directions_needs_half_lines(
