@@ -17,6 +17,7 @@ import numpy as np
 from optisense.design import Role
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.joining import touching_area
 from optisense.geometry.patches import faces_towards
 from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors.from_meshes.directions import SIDES, nearest_side, vector
@@ -61,6 +62,14 @@ WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
     ),
 )  # fmt: skip
 """Words in the names of parts by use; those listed first take precedence."""
+
+CARRIED = 0.2
+"""Share of a gel's surface that a body of unknown use touches if it carries the gel. The inner side
+of a flat gel or of a shell is a third to a half of its surface, the sides are less."""
+
+NEAR = 0.003
+"""Distance at which bodies touch, as a share of the gel's length: 0.1 mm on a gel of 36 mm, as
+coarse meshes of one curved face differ by that."""
 
 LIGHT, CAMERA = "smd-3528", "pi-v2"
 """Default light and camera of the library."""
@@ -117,7 +126,8 @@ def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
             where=str(source),
             hint="In the CAD tool: export each part as STL, OBJ or PLY, or all as one STEP file",
         )
-    reader, found, taken = CadFiles(folder), [], set[str]()
+    reader, found, taken = CadFiles(folder), list[CadBody](), set[str]()
+    unknown = set[str]()
     for file in files:
         bodies = reader.bodies(file.name)
         for body in bodies:
@@ -126,8 +136,22 @@ def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
                 name, use = file.stem, guess_use(file.stem)
             name = _fresh(_as_name(name), taken)
             taken.add(name)
+            if use is None:
+                unknown.add(name)
             found.append(CadBody(name, file.name, body, use or Role.BLOCKER))
-    return found
+    gels = [each.body.mesh for each in found if each.use is Role.ELASTOMER]
+    return [
+        replace(each, use=Role.SUPPORT)
+        if each.name in unknown and any(_carries(each.body.mesh, gel) for gel in gels)
+        else each
+        for each in found
+    ]
+
+
+def _carries(mesh: TriangleMesh, gel: TriangleMesh) -> bool:
+    """Return whether a body touches so much of a gel that light must come through it."""
+    near = NEAR * float(np.ptp(gel.bounds, axis=0).max())
+    return touching_area(mesh, gel, near) > CARRIED * gel.area
 
 
 def guess_use(name: str) -> Use | None:

@@ -218,6 +218,17 @@ class TestGuessing:
         assert design.camera.position == pytest.approx((0, 0, -20))
         assert check(design) == []
 
+    def test_a_body_of_unknown_use_that_carries_the_gel_is_clear(self, cad: Any) -> None:
+        cad.write()
+        (cad.folder / "plate.stl").rename(cad.folder / "core.stl")
+        low, high = cad.shapes()["gel"].bounds
+        cad.block((high[0], low[1], low[2]), (high[0] + 1, high[1], high[2])).export(
+            cad.folder / "thing.stl"
+        )  # beside the gel
+        parts = guess_recipe(cad.folder).parts
+        assert parts["core"].role is Role.SUPPORT
+        assert parts["thing"].role is Role.BLOCKER
+
     def test_a_single_file_gets_lights_and_a_camera(self, cad: Any) -> None:
         cad.write()
         design = design_from_meshes(guess_recipe(cad.folder / "gel.stl")).design
