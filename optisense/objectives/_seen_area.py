@@ -22,9 +22,9 @@ from optisense.objectives._projection_warping import JUMP, discontinuous_edges
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays
 
-CELLS = 2000
+CELLS = 1000
 """Area of the surface over the square of a cell's side. With twice as many, the seen shares of the
-built-in sensors change by less than 0.002."""
+built-in sensors change by less than 0.002, and take twice the time."""
 
 SAMPLES_ACROSS = 6
 """Smallest number of samples of the surface, and of the footprints of pixels, along the side of a
@@ -60,14 +60,10 @@ def seen_area(rays: ChiefRays, surface: TriangleMesh) -> float:
     low = places.min(axis=0) - 1
     # With a margin of one cell, for footprints that reach beyond the surface's border.
     shape = places.max(axis=0) - low + 2
-    cells, piece = np.unique(_numbers(places, low, shape), return_inverse=True)
-    whole = np.bincount(piece, areas)
-
+    count = int(shape.prod())
+    whole = np.bincount(_numbers(places, low, shape), areas, count)
     landings, shares = _footprint_samples(rays, size / SAMPLES_ACROSS)
-    numbers = _numbers(_places(landings, size), low, shape)
-    nearest = np.minimum(np.searchsorted(cells, numbers), len(cells) - 1)
-    on_it = cells[nearest] == numbers
-    covered = np.bincount(nearest[on_it], shares[on_it], minlength=len(cells))
+    covered = np.bincount(_numbers(_places(landings, size), low, shape), shares, count)
     share = np.clip(0.5 + CONTRAST * (covered / np.maximum(whole, 1e-300) - 0.5), 0.0, 1.0)
     return float((share * whole).sum())
 
