@@ -15,12 +15,12 @@ from optisense.design import LightGroup, SensorDesign
 from optisense.design.responses import PictureChain
 from optisense.geometry import Contact
 from optisense.report import _tables as tables
+from optisense.report._drawing import swatch_of
 from optisense.report._files import as_json, page, script
 from optisense.report._mixing import mixing_data
 from optisense.report._pictures import data_uri, mask_overlay, normal_colours, pressure_colours
 from optisense.report._scene_view import scene_data
 from optisense.report.camera_rays import CameraRays
-from optisense.report.drawing import swatch_of
 from optisense.report.light_section import LightSection
 from optisense.report.real_sensor import RealComparison
 from optisense.writing import write_text

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
-from optisense.report.drawing import swatch_of
+from optisense.report._drawing import swatch_of
 
 if TYPE_CHECKING:
     from optisense.optics.place_light import GroupLight, PlaceLight

@@ -13,8 +13,8 @@ from optisense.design.looks import ROLE_LOOKS
 from optisense.design.projection import directions
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
+from optisense.report._drawing import encoded
 from optisense.report.camera_rays import CameraRays
-from optisense.report.drawing import encoded
 
 CREASE = 35.0
 """Angle between faces, degrees, from which on their edge is drawn and not shaded smoothly: a

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.report import _study_tables as tables
+from optisense.report._drawing import figure_uri
 from optisense.report._pictures import data_uri
-from optisense.report.drawing import figure_uri
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 from optisense.text import visible

@@ -13,9 +13,9 @@ from optisense.calibration.comparing import Comparison
 from optisense.calibration.realism import PATCH, PressRealism, Realism, distances
 from optisense.design import SensorDesign
 from optisense.figures import new_figure
+from optisense.report._drawing import figure_uri
 from optisense.report._files import page
 from optisense.report._pictures import data_uri
-from optisense.report.drawing import figure_uri
 from optisense.writing import write_text
 
 if TYPE_CHECKING:

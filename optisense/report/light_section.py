@@ -11,10 +11,10 @@ import numpy as np
 
 from optisense.design import SensorDesign
 from optisense.quality import photons_of
+from optisense.report._drawing import encoded, swatch_of
 from optisense.report._files import as_json, page, script
 from optisense.report._place_section import places_values
 from optisense.report._scene_view import scene_data
-from optisense.report.drawing import encoded, swatch_of
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel

@@ -14,9 +14,9 @@ from optisense.errors import OptiSenseError
 from optisense.objectives.registry import Objective
 from optisense.objectives.score import Score, shown_number
 from optisense.objectives.scored import Scored
+from optisense.report._drawing import figure_uri
 from optisense.report._files import page
 from optisense.report.camera_rays import CameraRays
-from optisense.report.drawing import figure_uri
 from optisense.writing import write_text
 
 Table = tuple[list[str], list[list[str]]]

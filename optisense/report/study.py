@@ -20,11 +20,11 @@ from optisense.report import _study_figures as study_figures
 from optisense.report import _study_tables as tables
 from optisense.report._balls import count_in_words, marks_svg
 from optisense.report._cage_changes import CageChange, cage_changes, cage_figure
+from optisense.report._drawing import figure_uri
 from optisense.report._files import as_json, page, script
 from optisense.report._pictures import MOST_STRETCHED, data_uri, stretching_colours
 from optisense.report._trial_marks import Marks, TrialFigure, page_data, selectable
 from optisense.report.before_after import DesignView
-from optisense.report.drawing import figure_uri
 from optisense.report.tolerance import shown_size
 from optisense.search.methods import find
 from optisense.search.study.best import best_of, nearest

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optisense.figures import AMBER, BLUE, GREY, RED, new_figure
+from optisense.report._drawing import figure_uri, legend_above
 from optisense.report._files import page
-from optisense.report.drawing import figure_uri, legend_above
 from optisense.search.space.manufacturing import unit_of
 from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
 from optisense.search.tolerance.sensitivity import Estimate

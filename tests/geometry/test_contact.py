@@ -56,7 +56,7 @@ def test_contact_text(text: str, contact: Contact) -> None:
         ("donut:1@0,0:0.8", "cylinder, mesh, object, plane, sphere"),
         ("sphere:1.5", "no '@'"),
         ("sphere:1.5@0,0", "no depth"),
-        ("sphere@0,0:1", "sphere:radius"),
+        ("sphere@0,0:1", "sphere:RADIUS"),
         ("sphere:1.5@0:0.8", "the place needs 2 or 3 numbers"),
         ("sphere:1.5@0,0:deep", "the depth"),
         ("sphere:1.5@0,0:-1", "depth above 0"),

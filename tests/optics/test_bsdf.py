@@ -9,6 +9,7 @@ import pytest
 from scipy import stats
 
 from benchmarks.mitsuba_export import surface_bsdf
+from optisense.optics.scene._ggx import sample_ggx
 from optisense.optics.scene.coating_bsdf import (
     CoatingBsdf,
     coating_density,
@@ -16,7 +17,6 @@ from optisense.optics.scene.coating_bsdf import (
     peak_share,
     sample_coating,
 )
-from optisense.optics.scene.ggx import sample_ggx
 from optisense.optics.scene.interfaces import refract, sample_rough_interface
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 

@@ -16,8 +16,8 @@ from optisense.design import SensorDesign
 from optisense.report import _study_figures as study_figures
 from optisense.report._balls import Ball
 from optisense.report._cage_changes import cage_changes
+from optisense.report._drawing import figure_uri
 from optisense.report.before_after import DesignView, RayFigures
-from optisense.report.drawing import figure_uri
 from optisense.report.study import render_study, write_study_report
 from optisense.search import Around, CagePoints, SearchResult, Study, search
 

@@ -106,8 +106,13 @@ class Limits(NamedTuple):
 
 
 SHARE = Limits("a number within 0..1", low=0.0, high=1.0)
+"""Limits of a share or a GGX roughness."""
+
 THREE_ABOVE_0 = Limits("3 numbers above 0", (3,), above=0.0)
+"""Limits of a refractive index for R, G and B."""
+
 THREE_FROM_0 = Limits("3 numbers that are not negative", (3,), low=0.0)
+"""Limits of absorption coefficients (1/mm) or of the imaginary part of an index, for R, G and B."""
 
 LIMITS: dict[type, dict[str, Limits]] = {
     Medium: {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.scene.ggx import sample_ggx, smith_g1
+from optisense.optics.scene._ggx import sample_ggx, smith_g1
 
 SMOOTH_ALPHA = 1e-3
 """GGX roughness below which a dielectric is treated as smooth. With 0.001, half of the micro-facets
