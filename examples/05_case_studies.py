@@ -80,7 +80,7 @@ CASES = {
             "--require 'distortion<=1.14' --method gradient --budget 60 --no-verify --out mirror",
             "apply mirror --trial best --out bent",
             "search bent --vary lights.red.aim.x=-75:75 --vary lights.green.aim.x=-75:75 "
-            "--objective reading --coarse-first --budget 40 --may-cross --no-verify --out lights",
+            "--objective reading --coarse-first --budget 40 --no-verify --out lights",
             "apply lights --trial best --out better",
             "verify gelsight-svelte better --out proof",
         ),

@@ -59,7 +59,9 @@ def contact_of(given: AnyContact) -> Contact:
     """
     if isinstance(given, str):
         return parse_contact(given)
-    numbers = given.model_dump(exclude={"indenter"}, exclude_none=True)
+    # Front ends send the depth of their control with a force, too, which then determines the depth.
+    left_out = {"indenter"} if given.force is None else {"indenter", "depth"}
+    numbers = given.model_dump(exclude=left_out, exclude_none=True)
     return Contact(indenter_from_plain(given.indenter), **numbers)
 
 

@@ -119,17 +119,15 @@ class Dataset:
         return len(self.labels)
 
     def lacking(self) -> list[dict[str, Any]]:
-        """Return the labels of the samples that lack a file. Damaged files are found when they are
-        read.
-
-        Raises:
-            TaskError: the table of labels names a file outside the folder.
+        """Return the labels of the samples that lack a file in the folder. Damaged files are found
+        when they are read.
         """
-        return [
-            row
-            for row in self.labels
-            if not all(is_file(self._inside(row[name])) for name in ("file_name", "arrays"))
-        ]
+
+        def has(name: str) -> bool:
+            path = inside(self.folder, name)
+            return path is not None and is_file(path)
+
+        return [row for row in self.labels if not (has(row["file_name"]) and has(row["arrays"]))]
 
     def __getitem__(self, number: int) -> Sample:
         """Read a sample.
@@ -207,7 +205,7 @@ class Dataset:
             )
         return [number for number, row in enumerate(self.labels) if row["split"] == name]
 
-    def _inside(self, name: str) -> Path:
+    def _existing(self, name: str) -> Path:
         path = inside(self.folder, name)
         if path is None:
             raise TaskError(
@@ -215,10 +213,6 @@ class Dataset:
                 where=str(self.folder / LABELS),
                 hint="The dataset may be manipulated: use only files that you trust",
             )
-        return path
-
-    def _existing(self, name: str) -> Path:
-        path = self._inside(name)
         if not is_file(path):
             raise TaskError(
                 f"the dataset lacks the file '{brief(name)}'",

@@ -82,7 +82,7 @@ def test_a_flux_above_the_nominal_one_is_told(tmp_path: Path) -> None:
     recipe = cad / "sensor.yaml"
     assert "times the nominal" not in new("--from-meshes", recipe, tmp_path / "pad")[1]
     recipe.write_text(recipe.read_text().replace("flux: 2.1", "flux: 4.2", 1))
-    told = "warning: lights red: 4.2 mW each is 2 times the nominal flux of a red smd-3528"
+    told = "lights red: 4.2 mW each is 2 times the nominal flux of a red smd-3528"
     assert told in new("--from-meshes", recipe, tmp_path / "bright")[1]
     assert told in runner.invoke(app, ["check", str(tmp_path / "bright")]).output
 

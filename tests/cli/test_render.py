@@ -51,14 +51,14 @@ def written(folder: Path) -> set[str]:
 
 
 def test_an_indenter_in_metres_is_told(tmp_path: Path) -> None:
-    """A cube of 4 mm whose file is in metres, pressed 0.5 mm deep."""
+    """A cube of 15 mm whose file is in metres, pressed 0.5 mm deep."""
     file = tmp_path / "cube.stl"
-    trimesh.creation.box((0.004, 0.004, 0.004)).export(file)
+    trimesh.creation.box((0.015, 0.015, 0.015)).export(file)
     hint = f"mesh:{file},1000"
     words = ("--contact", f"mesh:{file}@0,0:0.5")
     _, said = render(*words, *SMALL, "--out", str(tmp_path / "out"))
     flat = "".join(said.split())
-    assert "anindenter0.004mmlargeispressed0.5mmdeep" in flat
+    assert "anindenter0.015mmlargeispressed0.5mmdeep" in flat
     assert hint in flat
     assert "warning:nopixelseesacontact" in flat
     for text, warned in ((f"mesh:{file}@0,0:0.5", True), (f"{hint}@0,0:0.5", False)):

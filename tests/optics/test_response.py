@@ -88,7 +88,7 @@ def test_other_lights_scale_the_layers_of_unit_lights() -> None:
     units = {name: generator.random((5, 7, 3)).astype(np.float32) for name in ("a", "b")}
     blank = np.zeros((5, 7, 3), dtype=np.float32)
     image = TactileImage(dict(units), blank, blank[..., 0] > 0, blank, unit_layers=units)
-    relit = image.relight({"a": (1.0, 0.0, 2.0), "b": 0.5})
+    relit = image.relight({"a": (1.0, 0.0, 2.0), "b": (0.5, 0.5, 0.5)})
     expected = units["a"] * [1.0, 0.0, 2.0] + 0.5 * units["b"]
     assert relit.radiance == pytest.approx(expected, rel=1e-6)
     assert image.radiance == pytest.approx(units["a"] + units["b"], rel=1e-6)

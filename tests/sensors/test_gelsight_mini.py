@@ -99,12 +99,12 @@ def test_the_first_sensor_marks_what_is_assumed() -> None:
 
 
 def test_dimensions_can_be_chosen() -> None:
-    design = sensors.gelsight_mini_ideal(gel_thickness=3.0, leds_per_group=8, led_pitch=2.5)
+    design = sensors.gelsight_mini_ideal(gel_thickness=3.0, leds_per_group=8, led_pitch=2.8)
     assert design.meshes["gel"].bounds[0, 2] == -3.0
     assert design.camera.position[2] == -3.0 - 1.0 - 17.0
     assert len(design.lights["blue"].lights) == 8
     assert sensors.check(design) == []
-    assert design.description.endswith("chosen: gel_thickness 3, leds_per_group 8, led_pitch 2.5")
+    assert design.description.endswith("chosen: gel_thickness 3, leds_per_group 8, led_pitch 2.8")
 
 
 def test_a_bent_sensor_takes_dimensions_too() -> None:

@@ -193,7 +193,8 @@ class LightsOnSupports:
 
 
 class LightsOutsideParts:
-    """Constraint: no window of a light may reach into a part in which it is not at the start.
+    """Constraint: no light may lie in a part in which it is not at the start: the middle of its
+    window is in the part, and a corner is deeper than `FLUSH`.
 
     A light in the acrylic of a tray is brighter than one in front of it, but there is no room for
     an LED. Lights that are cast into a part from the beginning, as those of GelSight360, are
@@ -206,15 +207,14 @@ class LightsOutsideParts:
         self._always = {
             (each.group, each.number, each.part)
             for each in windows_in(design, parts, set())
-            if each.middle or each.depth(parts[each.part]) > FLUSH
+            if each.middle
         }
 
     def __call__(self, design: SensorDesign) -> str | None:
         """Return a message with the light that is inside of a part, or None."""
         parts = _solids(design)
         for each in windows_in(design, parts, self._always):
-            deep = each.depth(parts[each.part])
-            if deep > FLUSH:
+            if each.middle and (deep := each.depth(parts[each.part])) > FLUSH:
                 return (
                     f"the window of light {each.number} of group '{each.group}' reaches "
                     f"{deep:.2g} mm inside part '{each.part}', where no light can be, and is "
