@@ -280,9 +280,7 @@ class Engine:
         try:
             self._process.wait(SHUTDOWN_SECONDS)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            with contextlib.suppress(subprocess.TimeoutExpired):  # the system is slow to end it
-                self._process.wait(SHUTDOWN_SECONDS)
+            self.kill()
         self._gone = True
         self._close_files()
 
@@ -295,8 +293,10 @@ class Engine:
             self._ended()
 
     def kill(self) -> None:
-        """Kill the process."""
+        """Kill the process, which the next request finds dead."""
         self._process.kill()
+        with contextlib.suppress(subprocess.TimeoutExpired):  # the system is slow to end it
+            self._process.wait(SHUTDOWN_SECONDS)
 
     def _greeted(self, result: dict[str, Any]) -> None:
         self.version = result.get("version")
