@@ -66,6 +66,11 @@ VIEW_POINTS = 1000
 """Number of points of the sensing surface that are looked for in the picture; they give its share
 to about 0.01."""
 
+HIDDEN_STEP = 10
+"""Of the points in the picture, each of this number is looked for behind blockers. The hidden share
+is then known to about 0.05. A check precedes every draft in the studio: with all points, that of
+DIGIT takes 115 instead of 40 ms."""
+
 BEFORE = 1e-6
 """Share of the distance to a point by which a blocker must be nearer to hide it; a housing that
 ends at the skin does not. It covers rounding."""
@@ -239,16 +244,18 @@ def view_shares(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> ViewSh
     points = np.concatenate([_even_points(skin, total) for skin in skins])
     inside = points[in_picture(camera, points)]
     position = np.array(camera.position)
-    nearest, hider = np.ones(len(inside)), np.full(len(inside), -1)
+    some = inside[::HIDDEN_STEP]
+    nearest, hider = np.ones(len(some)), np.full(len(some), -1)
     blockers = [name for name in design.parts_of(Role.BLOCKER) if name in meshes]
     for number, name in enumerate(blockers):
-        hits = ray_hits(meshes[name], position + 0 * inside, inside - position)
-        closest = np.ones(len(inside))
+        hits = ray_hits(meshes[name], position + 0 * some, some - position)
+        closest = np.ones(len(some))
         np.minimum.at(closest, hits.ray, hits.distance)
         closer = closest < nearest - BEFORE
         nearest[closer], hider[closer] = closest[closer], number
     picture = float(np.isfinite(skin_distances(design, meshes, straight_rays(camera))).mean())
-    counts = np.bincount(hider + 1, minlength=len(blockers) + 1) / len(points)
+    counts = np.bincount(hider + 1, minlength=len(blockers) + 1) / max(1, len(some))
+    counts *= len(inside) / len(points)
     hidden = {name: float(n) for name, n in zip(blockers, counts[1:], strict=True) if n > 0.0}
     return ViewShares(float(counts[0]), picture, hidden)
 

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from optisense.design import SensorDesign, load_design, set_value
+from optisense.design import SensorDesign, check_design, load_design, set_value
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, design_error
 from optisense.design.sensor_design import dotted
@@ -19,6 +19,7 @@ from optisense.design.storage import DESIGN_FILE, file_inside
 from optisense.engine.failures import InvalidDesignError, ProtocolError, place_in
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
+from optisense.library import names
 from optisense.near import near_match
 from optisense.sensors import load
 from optisense.sensors.registry import find_problems
@@ -115,20 +116,25 @@ class Designs:
         return design
 
     def problems(self, design: SensorDesign) -> list[Diagnostic]:
-        """Return all problems that `check` finds; the answer for the last design is cached."""
+        """Return all problems that `check` finds."""
+        return find_problems(design, self._without_lights(design))
+
+    def _without_lights(self, design: SensorDesign) -> list[Diagnostic]:
+        """Return the problems of `check_design`; the answer for the last design is cached."""
         if self._sound is not None and _same(self._sound[0], design):
             return self._sound[1]
-        found = find_problems(design)
+        found = check_design(design, light_names=names("light"))
         self._sound = design, found
         return found
 
     def require_valid(self, design: SensorDesign) -> list[Diagnostic]:
-        """Return the warnings about a design.
+        """Return the warnings about a design, without those about where its lights are, which take
+        as long as a draft.
 
         Raises:
             InvalidDesignError: the design can't be simulated, or its simulation would be wrong.
         """
-        found = self.problems(design)
+        found = self._without_lights(design)
         if any(problem.severity == "error" for problem in found):
             raise InvalidDesignError(found, f"design '{design.name}'")
         return found

@@ -133,11 +133,14 @@ def check(design: SensorDesign) -> list[Diagnostic]:
     return found
 
 
-def find_problems(design: SensorDesign) -> list[Diagnostic]:
+def find_problems(design: SensorDesign, known: list[Diagnostic] | None = None) -> list[Diagnostic]:
     """Return all problems of a design that can be found without rendering it: those of
     `optisense.design.check_design`, then those of its lights.
+
+    Args:
+        known: the former, if they are known.
     """
-    found = check_design(design, light_names=library.names("light"))
-    if not any(each.severity == "error" for each in found):
-        found += light_problems(design)
-    return found
+    found = check_design(design, light_names=library.names("light")) if known is None else known
+    if any(each.severity == "error" for each in found):
+        return found
+    return [*found, *light_problems(design)]
