@@ -18,7 +18,13 @@ from optisense.cli.console import (
     print_notes,
     table_of,
 )
-from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
+from optisense.cli.options import (
+    DesignArgument,
+    VariantOption,
+    json_option,
+    out_option,
+    print_summaries,
+)
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
 from optisense.cli.sampling import BUILDING, LOADING
@@ -40,10 +46,9 @@ MARK = (JSON_FILE, '"shared_seconds"')
 @handles_errors
 def _print_objectives(wanted: bool) -> None:
     if wanted:
-        from optisense.objectives import find, names
+        from optisense.objectives.registry import OBJECTIVES
 
-        for name in names():
-            output.print(f"{name:<14} {find(name).summary}")
+        print_summaries(OBJECTIVES)
         raise typer.Exit
 
 

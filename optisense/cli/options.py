@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from optisense.errors import OptiSenseError
     from optisense.geometry import Contact
+    from optisense.registry import Registry
 
 DesignArgument = Annotated[
     str,
@@ -89,3 +91,14 @@ def print_small_indenters(contacts: Sequence[Contact]) -> int:
     for warning in warnings:
         output.print(f"warning: {warning}", style="yellow")
     return len(warnings)
+
+
+def print_summaries(registry: Registry[Any]) -> None:
+    """Print name and summary of all objects of a registry, and why others can't be loaded."""
+    from optisense.cli.console import messages, output
+
+    failures: dict[str, OptiSenseError] = {}
+    for name, thing in registry.loadable(failures):
+        output.print(f"{name:<14} {thing.summary}")
+    for name, error in failures.items():
+        messages.print(f"{name:<14} unavailable: {error}", style="yellow")

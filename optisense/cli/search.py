@@ -20,7 +20,13 @@ from optisense.cli.console import (
     output,
     print_notes,
 )
-from optisense.cli.options import VariantOption, WorkersOption, json_option, out_option
+from optisense.cli.options import (
+    VariantOption,
+    WorkersOption,
+    json_option,
+    out_option,
+    print_summaries,
+)
 from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
 from optisense.commands.searching import SearchOptions
@@ -88,7 +94,9 @@ def search(
     killed continues with exactly the same trials.
     """
     if methods:
-        _print_methods()
+        from optisense.search.methods import METHODS
+
+        print_summaries(METHODS)
         return
     if out is None:
         raise typer.BadParameter("name a folder for the study", param_hint="--out")
@@ -199,13 +207,3 @@ def _ask_trust(strange: list[str]) -> bool:
     for each in strange:
         messages.print(f"  {each}")
     return ask_yes("Do you trust it", default=False)
-
-
-def _print_methods() -> None:
-    from optisense.search.methods import METHODS
-
-    failures: dict[str, OptiSenseError] = {}
-    for name, method in METHODS.loadable(failures):
-        output.print(f"{name:<14} {method.summary}")
-    for name, error in failures.items():
-        messages.print(f"{name:<14} unavailable: {error}", style="yellow")

@@ -83,8 +83,8 @@ def test_a_flux_above_the_nominal_one_is_told(tmp_path: Path) -> None:
     assert "times the nominal" not in new("--from-meshes", recipe, tmp_path / "pad")[1]
     recipe.write_text(recipe.read_text().replace("flux: 2.1", "flux: 4.2", 1))
     told = "lights red: 4.2 mW each is 2 times the nominal flux of a red smd-3528"
-    assert told in new("--from-meshes", recipe, tmp_path / "bright")[1]
-    assert told in runner.invoke(app, ["check", str(tmp_path / "bright")]).output
+    assert f"warning: {told}" in new("--from-meshes", recipe, tmp_path / "bright")[1]
+    assert f"note: {told}" in runner.invoke(app, ["check", str(tmp_path / "bright")]).output
 
 
 def test_the_recipe_beside_the_design_makes_it_again(tmp_path: Path) -> None:

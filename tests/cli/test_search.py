@@ -83,7 +83,7 @@ def test_sizes_and_photons_are_given_as_for_a_score(tmp_path: Path) -> None:
                 "--set", "ray_resolution=40x30", "--photons", "draft")  # fmt: skip
     assert again.exit_code == 0, again.output
     other = run(*words, "--set", "resolution=40", "--out", tmp_path / "other")
-    assert other.exit_code != 0 and "resolution" in other.output
+    assert other.exit_code == 2 and "resolution" in other.output
 
 
 def test_the_study_holds_all_trials(study: Path) -> None:
