@@ -67,9 +67,9 @@ VIEW_POINTS = 1000
 to about 0.01."""
 
 HIDDEN_STEP = 10
-"""Of the points in the picture, each of this number is looked for behind blockers. The hidden share
-is then known to about 0.05. A check precedes every draft in the studio: with all points, that of
-DIGIT takes 115 instead of 40 ms."""
+"""Number of points in the picture of which one is looked for behind blockers. The hidden share is
+then known to about 0.05. A check precedes every draft in the studio: with all points, that of DIGIT
+takes 115 instead of 40 ms."""
 
 BEFORE = 1e-6
 """Share of the distance to a point by which a blocker must be nearer to hide it; a housing that
