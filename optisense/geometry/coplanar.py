@@ -14,8 +14,11 @@ SAME_DIRECTION = 1e-10
 """Largest difference from 1 of the cosine between the normals of coplanar faces. It corresponds to
 8e-4 degrees, the rounding of a small face's corners in single precision."""
 SAME_PLANE = 1e-6
-"""Distance (mm) below which two parallel planes are one: about the rounding of coordinates in
-single precision."""
+"""Distance (mm) below which a point lies in a plane, in a mesh close to the origin: files often
+round coordinates to this step."""
+SINGLE_PRECISION = 2.0**-22
+"""The same distance over the largest coordinate, without a unit, in a mesh farther away: four times
+the rounding of a coordinate in single precision, as four rounded points determine the distance."""
 STRAIGHT = 1e-6
 """Sine of the angle between the sides of a corner (6e-5 degrees) below which the outline is
 straight there, so that the corner is not needed."""
@@ -26,43 +29,51 @@ Loop = list[int]
 def merge_coplanar(mesh: TriangleMesh) -> TriangleMesh:
     """Triangulate every flat, connected patch of triangles of a mesh again from its outline.
 
-    Patches keep their outlines, except for points along straight lines. Shading normals are
-    dropped, so this is for meshes with flat facets. A patch whose outline touches itself is not
-    changed.
+    Patches keep their outlines, except for points along straight lines, which all patches that
+    touch there leave out alike, so that a closed mesh remains closed. Shading normals are dropped,
+    so this is for meshes with flat facets. A patch whose outline touches itself is not changed.
     """
     mesh = mesh.welded()
-    patches = _patches(mesh)
-    faces: list[NDArray[np.int64]] = []
-    for members in np.split(
-        np.argsort(patches, kind="stable"), np.cumsum(np.bincount(patches))[:-1]
-    ):
-        old = np.asarray(mesh.faces[members], dtype=np.int64)
-        new = _triangulated(mesh, old) if len(old) > 2 else None
-        faces.append(old if new is None else new)
-    merged = TriangleMesh(mesh.vertices, np.concatenate(faces).astype(np.int32))
-    return merged.compacted()
+    room = max(SAME_PLANE, SINGLE_PRECISION * float(np.abs(mesh.vertices).max(initial=0.0)))
+    patches = _patches(mesh, room)
+    members = np.split(np.argsort(patches, kind="stable"), np.cumsum(np.bincount(patches))[:-1])
+    parts = [np.asarray(mesh.faces[each], dtype=np.int64) for each in members]
+    outlines = [_outline(part) if len(part) > 2 else None for part in parts]
+    needed = np.zeros(len(mesh.vertices), dtype=bool)
+    for part, outline in zip(parts, outlines, strict=True):
+        needed[part if outline is None else _corners(mesh.vertices, outline)] = True
+    faces = [
+        part if outline is None else _triangulated(mesh, part, outline, needed)
+        for part, outline in zip(parts, outlines, strict=True)
+    ]
+    merged = TriangleMesh(mesh.vertices, np.concatenate(faces).astype(np.int32)).compacted()
+    return merged if merged.is_closed or not mesh.is_closed else mesh
 
 
-def _patches(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Return the number (m,) of the coplanar, connected patch that each face belongs to."""
-    faces = np.asarray(mesh.faces, dtype=np.int64)
+def _patches(mesh: TriangleMesh, room: float) -> NDArray[np.int64]:
+    """Return the number (m,) of the coplanar, connected patch that each face belongs to.
+
+    ``room`` is the distance (mm) of a neighbour's vertices from the plane of a face up to which
+    both are coplanar.
+    """
     normals = mesh.face_normals
-    offsets = np.einsum("ij,ij->i", normals, mesh.vertices[faces[:, 0]])
     one, other = inner_edges(mesh)[1].T
-    flat = (np.einsum("ij,ij->i", normals[one], normals[other]) > 1 - SAME_DIRECTION) & (
-        np.abs(offsets[one] - offsets[other]) < SAME_PLANE
-    )
-    return connected_components(len(faces), one[flat], other[flat])
+    flat = np.einsum("ij,ij->i", normals[one], normals[other]) > 1 - SAME_DIRECTION
+    for face, neighbour in ((one, other), (other, one)):
+        offsets = mesh.triangles[neighbour] - mesh.triangles[face][:, :1]
+        flat &= (np.abs(np.einsum("ikj,ij->ik", offsets, normals[face])) < room).all(axis=1)
+    return connected_components(len(mesh.faces), one[flat], other[flat])
 
 
-def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """Return new faces for a patch, or None if its outline does not consist of simple loops."""
-    loops = _outline(faces)
-    if loops is None:
-        return None
-    loops = [_corners(mesh.vertices, loop) for loop in loops]
+def _triangulated(
+    mesh: TriangleMesh, faces: NDArray[np.int64], outline: list[Loop], needed: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Return new faces for a patch from the needed vertices of its outline, or its faces if there
+    would not be fewer.
+    """
+    loops = [[vertex for vertex in loop if needed[vertex]] for loop in outline]
     if any(len(loop) < 3 for loop in loops):
-        return None
+        return faces
     a, b, c = mesh.vertices[faces[0]]
     x = (b - a) / np.linalg.norm(b - a)
     normal = np.cross(b - a, c - a)
@@ -71,7 +82,7 @@ def _triangulated(mesh: TriangleMesh, faces: NDArray[np.int64]) -> NDArray[np.in
     corners = np.concatenate([np.asarray(loop, dtype=np.int64) for loop in loops])
     triangles = np.asarray(manifold3d.triangulate(flat), dtype=np.int64)
     if len(triangles) == 0 or len(triangles) >= len(faces):
-        return None
+        return faces
     return np.asarray(corners[triangles])
 
 
@@ -97,10 +108,13 @@ def _outline(faces: NDArray[np.int64]) -> list[Loop] | None:
     return loops
 
 
-def _corners(vertices: NDArray[np.float64], loop: Loop) -> Loop:
-    """Return the loop without the vertices that lie on a straight line between their neighbours."""
-    points = vertices[loop]
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    sine = np.linalg.norm(np.cross(before, after), axis=1)
-    bent = sine > STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    return [vertex for vertex, keep in zip(loop, bent, strict=True) if keep]
+def _corners(vertices: NDArray[np.float64], outline: list[Loop]) -> Loop:
+    """Return the vertices of loops that don't lie on a straight line between their neighbours."""
+    corners: Loop = []
+    for loop in outline:
+        points = vertices[loop]
+        before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+        sine = np.linalg.norm(np.cross(before, after), axis=1)
+        bent = sine > STRAIGHT * np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
+        corners += [vertex for vertex, keep in zip(loop, bent, strict=True) if keep]
+    return corners
