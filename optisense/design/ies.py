@@ -1,7 +1,7 @@
 """Reader of IES files (ANSI/IESNA LM-63): luminous intensity over direction.
 
 Only type C photometry is read: the vertical angle is measured from the lamp's axis (0 is
-straight ahead), the horizontal angle around it.
+straight ahead), the horizontal angle around it, right-handed about the lamp's direction.
 """
 
 from __future__ import annotations

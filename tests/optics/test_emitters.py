@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from scipy import stats
 
+import optisense as ots
 import optisense.library
-from optisense.design.emitters import Intensity, SpotEmitter
+from optisense.design.emitters import IesEmitter, Intensity, SpotEmitter
 from optisense.design.ies import read_ies
+from optisense.optics import OpticalModel
 from optisense.optics.backend.sequences import sequence_4d
 from optisense.optics.scene.emitters import (
     Emitter,
@@ -134,9 +136,42 @@ def test_tabulated_lights_radiate_as_their_table(intensity: Intensity) -> None:
     total = flux(intensity)
 
     def density(polar: np.ndarray, around: np.ndarray) -> np.ndarray:
-        return intensity.at(*np.broadcast_arrays(polar, around)) / total
+        azimuth = around - 90.0  # azimuth 0 is at the light's `up`, which is +y
+        return intensity.at(*np.broadcast_arrays(polar, azimuth)) / total
 
     assert fits(directions(upright(intensity=intensity)), density, float(intensity.polar[-1]))
+
+
+LOBES = """IESNA:LM-63-2002
+TILT=NONE
+1 -1 1 3 5 1 2 0 0 0 1 1 1
+0 45 90
+0 90 180 270 360
+0 10 0  0 5 0  0 0 0  0 0 0  0 10 0
+"""
+
+
+def test_a_lamp_with_lobes_shines_towards_its_up(tmp_path: Path) -> None:
+    """A lobe at azimuth 0, and one of half the power at azimuth 90: direction x `up`."""
+    design = ots.load("gelsight-mini-ideal")
+    (tmp_path / "lobes.ies").write_text(LOBES)
+    lamp = IesEmitter(file="lobes.ies").located(tmp_path)
+    for group, up in (("red", (0.0, 1.0, 0.0)), ("green", (1.0, 0.0, 0.0))):
+        design.lights[group].emitter = lamp
+        light = design.lights[group].lights[0]
+        pose = {"position": (0.0, 0.0, -12.0), "direction": (0.0, 0.0, 1.0), "up": up}
+        design.lights[group].lights = [light.model_copy(update=pose)]
+    image = OpticalModel(design).render([], resolution=(40, 30), photons=50_000)
+    points = np.nan_to_num(image.points)
+
+    def middle(group: str) -> np.ndarray:
+        light = image.layers[group].sum(axis=2)
+        return np.einsum("ij,ijk->k", light, points) / light.sum()
+
+    x, y, _ = middle("red")
+    assert y > 2.0 and -0.9 * y < x < -0.2 * y
+    x, y, _ = middle("green")
+    assert x > 2.0 and 0.2 * x < y < 0.9 * x
 
 
 def test_the_chi_square_test_notices_a_wrong_profile() -> None:

@@ -17,7 +17,8 @@ from optisense.design.ies import IesProfile, read_ies
 
 class IesEmitter(LightModel):
     """A point that radiates as an IES file says; the file's vertical angle 0 is the light's
-    direction, its horizontal angle 0 the light's `up`."""
+    direction, its horizontal angle the azimuth: 0 at the light's `up`, and right-handed about the
+    direction."""
 
     title: ClassVar[str] = "IES profile"
 

@@ -60,7 +60,8 @@ class LightModel(KindModel):
 
     A kind needs its fields and `relative_intensity`; code that simulates, draws or lists lamps
     calls only the methods below. Angles are in degrees: polar from the light's direction, 0 to 180;
-    azimuth about it, 0 at the light's `up`.
+    azimuth about it, 0 at the light's `up` and right-handed, so that azimuth 90 is at the cross
+    product of direction and `up`.
     """
 
     kinds: ClassVar[Registry[Any]] = Registry(

@@ -29,6 +29,9 @@ power)."""
 AZIMUTH_CELLS = 128
 """Number of azimuthal cells of each polar cell, all of equal power; those of a round profile are
 2.8 degrees wide, finer than the usual tables of luminaires (5 degrees and more)."""
+UP_TURN = 90.0
+"""Angle (degrees) about a light's direction, right-handed, from the width axis of its frame to its
+`up`, at which the azimuth of its profile is 0."""
 DISC_CORNERS = 12
 """Number of corners of the polygon that represents a round light window for rays that meet it.
 Twelve give 95 % of the disc's area; photons start from the exact disc."""
@@ -115,8 +118,9 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatingArray, FloatingArray]:
     """Return the inverse tables of an angular profile.
 
     Returns:
-        Cosines (POLAR_CELLS + 1,) at the borders of the polar cells, and azimuths divided by 2 pi
-        (POLAR_CELLS, AZIMUTH_CELLS + 1) at the borders of the azimuthal cells.
+        Cosines (POLAR_CELLS + 1,) at the borders of the polar cells, and angles from the light's
+        width axis divided by 2 pi (POLAR_CELLS, AZIMUTH_CELLS + 1) at the borders of the azimuthal
+        cells.
     """
     fine = 8192
     # Cells are evenly spaced in angle, which resolves narrow beams near the axis, and weighted with
@@ -150,7 +154,7 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatingArray, FloatingArray]:
         values = intensity.at(np.full(len(phi), centre[k]), phi) + 1e-12
         cdf = np.concatenate([[0.0], np.cumsum(values)]) / values.sum()
         rows[k] = np.interp(steps, cdf, np.linspace(0, 1, len(cdf)))
-    return cosines, rows
+    return cosines, rows + UP_TURN / 360.0
 
 
 def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
@@ -190,7 +194,8 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
 def profile_direction(
     table: EmitterTable, profile: mi.UInt32, exponent: mi.Float, sample: mi.Point2f
 ) -> mi.Vector3f:
-    """Return the unit directions (3, n) of samples of equal power, with the light's axis along +z.
+    """Return the unit directions (3, n) of samples of equal power, along the light's width axis,
+    height axis and direction.
 
     Args:
         profile: number (n,) of the inverse table of the light's profile plus 1; 0 is a power of the

@@ -11,7 +11,7 @@ import numpy as np
 from optisense.array_types import FloatingArray
 from optisense.design.emitters import Intensity
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.scene.emitters import Emitter
+from optisense.optics.scene.emitters import UP_TURN, Emitter
 
 POLAR_STEPS = 720
 """Number of steps of a tabulated profile over the polar angles from 0 to 180 degrees: steps of a
@@ -35,7 +35,7 @@ class LampWindows:
             entry stands for no light, and the lights follow in their order.
         groups: light group of each entry.
         profiles: intensity (1/sr) of each table, of a power of 1 over all directions, on a grid of
-            polar angles and azimuths.
+            polar angles and of angles from the width axis.
         exist: whether any light has a window.
     """
 
@@ -95,11 +95,14 @@ class LampWindows:
         return shape * first.w, dr.gather(mi.UInt32, self.groups, light, lit), lit
 
     def _intensity(
-        self, profile: mi.UInt32, cosine: mi.Float, azimuth: mi.Float, active: mi.Bool
+        self, profile: mi.UInt32, cosine: mi.Float, angle: mi.Float, active: mi.Bool
     ) -> mi.Float:
-        """Return the intensity (n,) of tables, linear between the entries of the grid."""
+        """Return the intensity (n,) of tables, linear between the entries of the grid.
+
+        ``angle`` is the angle (n,) from the width axis, radians.
+        """
         up = dr.safe_acos(cosine) * (POLAR_STEPS / dr.pi)
-        turn = azimuth * (AZIMUTH_STEPS / dr.two_pi)
+        turn = angle * (AZIMUTH_STEPS / dr.two_pi)
         turn = dr.select(turn < 0, turn + AZIMUTH_STEPS, turn)
         i = dr.minimum(mi.UInt32(up), POLAR_STEPS - 1)
         j = dr.minimum(mi.UInt32(turn), AZIMUTH_STEPS - 1)
@@ -114,10 +117,12 @@ class LampWindows:
 
 
 def _grid(intensity: Intensity) -> FloatingArray:
-    """Return the intensity (AZIMUTH_STEPS + 1, POLAR_STEPS + 1), 1/sr, of a power of 1."""
+    """Return the intensity (AZIMUTH_STEPS + 1, POLAR_STEPS + 1), 1/sr, of a power of 1, over the
+    angle from the width axis and the polar angle.
+    """
     polar = np.linspace(0, 180, POLAR_STEPS + 1)
-    azimuth = np.linspace(0, 360, AZIMUTH_STEPS + 1)
-    values = intensity.at(*np.broadcast_arrays(polar, azimuth[:, None]))
+    turn = np.linspace(0, 360, AZIMUTH_STEPS + 1)
+    values = intensity.at(*np.broadcast_arrays(polar, turn[:, None] - UP_TURN))
     # The trapezoidal rule in azimuth; in the polar angle, cells have their exact solid angle.
     ring = (values[1:] + values[:-1]).mean(axis=0) / 2
     cells = -np.diff(np.cos(np.radians(polar)))
