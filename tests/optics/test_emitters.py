@@ -54,6 +54,22 @@ LOPSIDED = Intensity(
         ]
     ),
 )
+RING = Intensity(
+    np.array([0.0, 30.0, 40.0, 60.0, 70.0]), np.zeros(1), np.array([[0.0, 0.0, 1.0, 1.0, 0.0]])
+)
+CONES = Intensity(
+    np.array([0.0, 15.0, 20.0, 50.0, 55.0, 70.0]),
+    np.zeros(1),
+    np.array([[1.0, 1.0, 0.0, 0.0, 1.0, 1.0]]),
+)
+BACKWARD = Intensity(
+    np.array([90.0, 95.0, 120.0, 180.0]), np.zeros(1), np.array([[0.0, 1.0, 1.0, 1.0]])
+)
+SECTORS = Intensity(
+    np.array([0.0, 60.0]),
+    np.array([0.0, 60.0, 90.0, 150.0, 180.0, 240.0, 270.0, 300.0, 360.0]),
+    np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0])[:, None] * [1.0, 1.0],
+)
 
 
 def ies_lamp() -> Intensity:
@@ -129,8 +145,22 @@ def test_flat_lights_radiate_as_a_power_of_the_cosine(shape: EmitterShape, expon
         SpotEmitter(cutoff=40, beam=20).intensity(),
         SpotEmitter(cutoff=12, beam=12).intensity(),
         ISOTROPIC,
+        RING,
+        CONES,
+        BACKWARD,
+        SECTORS,
     ],
-    ids=["ies", "asymmetric ies", "spot", "hard spot", "isotropic"],
+    ids=[
+        "ies",
+        "asymmetric ies",
+        "spot",
+        "hard spot",
+        "isotropic",
+        "dark axis",
+        "dark between cones",
+        "backward",
+        "dark between sectors",
+    ],
 )
 def test_tabulated_lights_radiate_as_their_table(intensity: Intensity) -> None:
     total = flux(intensity)

@@ -37,6 +37,8 @@ DISC_CORNERS = 12
 Twelve give 95 % of the disc's area; photons start from the exact disc."""
 FLOATS_PER_EMITTER = 20
 """Number of floats of a light in the emitter table; five gathers of four floats read them."""
+FLOATS_PER_CELL = 5
+"""Number of floats of a cell of the inverse tables: the columns of `_inverse`."""
 
 
 class EmitterShape(IntEnum):
@@ -102,7 +104,8 @@ class EmitterTable:
     """All lights on the device.
 
     ``rows`` holds `FLOATS_PER_EMITTER` floats per light, ``polar`` and ``azimuth`` the inverse
-    tables of the profiles, and ``absorption`` three floats per light (1/mm at R, G, B).
+    tables of the profiles, with five floats per cell, and ``absorption`` three floats per light
+    (1/mm at R, G, B).
     """
 
     count: int
@@ -115,12 +118,11 @@ class EmitterTable:
 
 
 def inverse_tables(intensity: Intensity) -> tuple[FloatingArray, FloatingArray]:
-    """Return the inverse tables of an angular profile.
+    """Return the inverse tables of an angular profile; see `_inverse` for their columns.
 
     Returns:
-        Cosines (POLAR_CELLS + 1,) at the borders of the polar cells, and angles from the light's
-        width axis divided by 2 pi (POLAR_CELLS, AZIMUTH_CELLS + 1) at the borders of the azimuthal
-        cells.
+        Polar cells (POLAR_CELLS, 5) in cosines, and azimuthal cells (POLAR_CELLS, AZIMUTH_CELLS, 5)
+        in angles from the light's width axis divided by 2 pi.
     """
     fine = 8192
     # Cells are evenly spaced in angle, which resolves narrow beams near the axis, and weighted with
@@ -139,22 +141,58 @@ def inverse_tables(intensity: Intensity) -> tuple[FloatingArray, FloatingArray]:
             ],
             axis=0,
         )
-    power = np.concatenate([[0.0], np.cumsum(ring * -np.diff(edges))])
-    power /= power[-1]
-    keep = np.concatenate([[True], np.diff(power) > 0])
     # Cells get smaller towards the rim, where the intensity falls to zero.
     share = 1 - (1 - np.linspace(0, 1, POLAR_CELLS + 1)) ** 2
-    cosines = np.interp(share, power[keep], edges[keep])
+    polar = _inverse(ring * -np.diff(edges), edges, share)
     steps = np.linspace(0.0, 1.0, AZIMUTH_CELLS + 1)
     if len(intensity.azimuth) == 1:
-        return cosines, np.tile(steps, (POLAR_CELLS, 1))
-    rows = np.empty((POLAR_CELLS, AZIMUTH_CELLS + 1))
-    centre = np.degrees(np.arccos(np.clip(0.5 * (cosines[1:] + cosines[:-1]), -1, 1)))
-    for k in range(POLAR_CELLS):
-        values = intensity.at(np.full(len(phi), centre[k]), phi) + 1e-12
-        cdf = np.concatenate([[0.0], np.cumsum(values)]) / values.sum()
-        rows[k] = np.interp(steps, cdf, np.linspace(0, 1, len(cdf)))
-    return cosines, rows + UP_TURN / 360.0
+        return polar, np.tile(_inverse(np.ones(AZIMUTH_CELLS), steps, steps), (POLAR_CELLS, 1, 1))
+    start, before, after, end, share_before = polar.T
+    cosine = np.where(share_before >= 0.5, start + before, after + end) / 2
+    centre = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+    # Dark parts end at angles of the table.
+    borders = np.union1d(np.linspace(0.0, 360.0, len(phi) + 1), intensity.azimuth)
+    parts, turns = np.diff(borders), (borders + UP_TURN) / 360.0
+    between = 0.5 * (borders[1:] + borders[:-1])
+    rows = [intensity.at(np.full(len(between), angle), between) for angle in centre]
+    rows = [values if values.any() else np.ones(len(between)) for values in rows]
+    return polar, np.stack([_inverse(values * parts, turns, steps) for values in rows])
+
+
+def _inverse(power: FloatingArray, edges: FloatingArray, shares: FloatingArray) -> FloatingArray:
+    """Return cells that divide the power along an axis by given shares, without its dark parts.
+
+    A cell has no dark part at its ends, and at most one gap, the widest dark part in between.
+    Photons are distributed evenly over the part before the gap and over the part after it.
+
+    Args:
+        power: power (n,) between the edges.
+        edges: places (n + 1,) along the axis, which ascend or descend.
+        shares: shares (m + 1,) of the power at the borders of the cells, from 0 to 1.
+
+    Returns:
+        For each cell (m, 5): its start, the start and the end of its gap, its end, and the share of
+        its power before the gap. A cell without a gap is all before it.
+    """
+    sums = np.concatenate([[0.0], np.cumsum(power)])
+    sums /= sums[-1]
+    lit = np.diff(sums) > 0
+    dark = np.concatenate([[0.0], np.cumsum(np.where(lit, 0.0, np.diff(edges)))])
+    keep = np.concatenate([[True], lit])
+    borders = np.interp(shares, sums[keep], (edges - dark)[keep])  # with all gaps closed
+    first = np.flatnonzero(~lit & np.concatenate([[True], lit[:-1]]))
+    last = np.flatnonzero(~lit & np.concatenate([lit[1:], [True]])) + 1
+    at, widths = sums[first], edges[last] - edges[first]
+    passed = np.concatenate([[0.0], np.cumsum(widths)])
+    start = borders[:-1] + passed[np.searchsorted(at, shares[:-1], "right")]
+    end = borders[1:] + passed[np.searchsorted(at, shares[1:], "left")]
+    cells = np.stack([start, end, end, end, np.ones(len(start))], axis=1)
+    for gap in np.argsort(np.abs(widths)):
+        cell = np.searchsorted(shares, at[gap], "right") - 1
+        if cell < len(cells) and at[gap] > shares[cell]:
+            before = (at[gap] - shares[cell]) / (shares[cell + 1] - shares[cell])
+            cells[cell, [1, 2, 4]] = edges[first[gap]], edges[last[gap]], before
+    return cells
 
 
 def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
@@ -168,9 +206,10 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
         if emitter.intensity is not None:
             profile = profiles.setdefault(id(emitter.intensity), len(profiles))
             if profile == len(polar):
-                cosines, turns = inverse_tables(emitter.intensity)
-                polar.append(cosines)
-                azimuth.append(turns.ravel())
+                for cells, all_cells in zip(
+                    inverse_tables(emitter.intensity), (polar, azimuth), strict=True
+                ):
+                    all_cells.append(cells.ravel())
         frame = emitter.frame
         row[0:3] = emitter.position
         row[4:7], row[8:11], row[12:15] = frame
@@ -179,7 +218,7 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
         bits = np.array([emitter.group, emitter.shape, profile + 1], dtype=np.uint32)
         row[3], row[16], row[17] = bits.view(np.float32)
     if not polar:
-        polar, azimuth = [np.zeros(1)], [np.zeros(1)]
+        polar, azimuth = [np.zeros(FLOATS_PER_CELL)], [np.zeros(FLOATS_PER_CELL)]
     return EmitterTable(
         count=len(emitters),
         groups=groups,
@@ -208,23 +247,32 @@ def profile_direction(
     # The inverse of the spacing of cells in ``inverse_tables``.
     place = (1 - dr.safe_sqrt(1 - sample.x)) * POLAR_CELLS
     cell = dr.minimum(mi.UInt32(place), POLAR_CELLS - 1)
-    start = base * (POLAR_CELLS + 1) + cell
-    c0 = dr.gather(mi.Float, table.polar, start, tabulated)
-    c1 = dr.gather(mi.Float, table.polar, start + 1, tabulated)
+    ring = base * POLAR_CELLS + cell
     cosine = dr.select(
         tabulated,
-        dr.lerp(c0, c1, place - mi.Float(cell)),
+        _place(table.polar, ring, place - mi.Float(cell), tabulated),
         dr.power(1 - sample.x, dr.rcp(exponent + 1)),
     )
     turn = sample.y * AZIMUTH_CELLS
     step = dr.minimum(mi.UInt32(turn), AZIMUTH_CELLS - 1)
-    begin = (base * POLAR_CELLS + cell) * (AZIMUTH_CELLS + 1) + step
-    p0 = dr.gather(mi.Float, table.azimuth, begin, tabulated)
-    p1 = dr.gather(mi.Float, table.azimuth, begin + 1, tabulated)
-    phi = dr.two_pi * dr.select(tabulated, dr.lerp(p0, p1, turn - mi.Float(step)), sample.y)
+    around = _place(table.azimuth, ring * AZIMUTH_CELLS + step, turn - mi.Float(step), tabulated)
+    phi = dr.two_pi * dr.select(tabulated, around, sample.y)
     sine = dr.safe_sqrt(1 - cosine * cosine)
     sin_phi, cos_phi = dr.sincos(phi)
     return mi.Vector3f(sine * cos_phi, sine * sin_phi, cosine)
+
+
+def _place(table: mi.Float, cell: mi.UInt32, share: mi.Float, active: mi.Bool) -> mi.Float:
+    """Return the places (n,) of shares of the power within cells of `_inverse`."""
+    start, before, after, end, split = (
+        dr.gather(mi.Float, table, cell * FLOATS_PER_CELL + k, active)
+        for k in range(FLOATS_PER_CELL)
+    )
+    return dr.select(
+        share <= split,
+        dr.lerp(start, before, share / split),
+        dr.lerp(after, end, (share - split) / (1 - split)),
+    )
 
 
 def emit(
