@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from optisense.errors import RenderError
 from optisense.optics._skin_view import VIEW_ACROSS
 from optisense.optics.backend.arrays import indices
+from optisense.optics.scene.assembly import Assembly
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surface_cells import build_cells, cells_near
 from optisense.optics.scene.surfaces import Region, SurfaceKind
@@ -196,7 +197,7 @@ def light_ledger(
         emitted[name] = float(group.flux * len(group.lights))
         flux = group.channel_flux()
         lines: dict[tuple[str, LightEnd], NDArray[np.float64]] = {}
-        for place in places_of(pieces):
+        for place in places_of(model.scenes.assembly):
             power = bookings.power[:, number, :, place.surface, place.fate] @ flux
             line = (place.where, place.kind)
             lines[line] = lines.get(line, 0.0) + power
@@ -275,20 +276,30 @@ class LedgerPlace:
     kind: LightEnd
 
 
-def places_of(pieces: list[Piece]) -> Iterator[LedgerPlace]:
-    """Yield the places of all rows of the sums; several rows may belong to the same place."""
-    for number, piece in enumerate(pieces):
+def places_of(assembly: Assembly) -> Iterator[LedgerPlace]:
+    """Yield the places of all rows of the sums; several rows may belong to the same place.
+
+    Touching solids of equal media are one medium, as light meets no surface between them.
+    """
+    media = {name: _together(names) for names in assembly.media.joined for name in names}
+    for number, piece in enumerate(assembly.pieces):
         solid, around, (name, kind) = _names(piece)
         yield LedgerPlace(number, Fate.SEEN, SEEN, LightEnd.SEEN)
         yield LedgerPlace(number, Fate.ABSORBED, name, kind)
-        yield LedgerPlace(number, Fate.BEHIND, f"absorbed in {solid}", LightEnd.MEDIUM)
-        yield LedgerPlace(number, Fate.BEFORE, f"absorbed in {around}", LightEnd.MEDIUM)
+        for fate, side in ((Fate.BEHIND, solid), (Fate.BEFORE, around)):
+            medium = f"absorbed in {media.get(side, side)}"
+            yield LedgerPlace(number, fate, medium, LightEnd.MEDIUM)
         yield LedgerPlace(number, Fate.ESCAPED, f"escaped from {solid}", LightEnd.ESCAPED)
-    last = len(pieces)
+    last = len(assembly.pieces)
     for fate in (Fate.SEEN, Fate.ABSORBED, Fate.BEHIND):
         yield LedgerPlace(last, fate, GIVEN_UP, LightEnd.LOST)
     yield LedgerPlace(last, Fate.BEFORE, "absorbed around the lights", LightEnd.MEDIUM)
     yield LedgerPlace(last, Fate.ESCAPED, "escaped at once", LightEnd.ESCAPED)
+
+
+def _together(names: list[str]) -> str:
+    """Return two names or more as text."""
+    return f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _names(piece: Piece) -> tuple[str, str, tuple[str, LightEnd]]:

@@ -71,7 +71,7 @@ def photon_paths(
         CANDIDATES * math.ceil(per_group / fewest),
         seed,
     )
-    words = {(p.surface, int(p.fate)): p.where for p in places_of(model.scenes.pieces)}
+    words = {(p.surface, int(p.fate)): p.where for p in places_of(model.scenes.assembly)}
     rng = np.random.default_rng(seed)
     found = {}
     for number, name in enumerate(lights):

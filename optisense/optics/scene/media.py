@@ -28,6 +28,7 @@ from optisense.errors import DesignError, MeshError
 from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
 from optisense.geometry.common_space import as_manifold, of_manifold, thick_place
+from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import TriangleMesh
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 
@@ -168,6 +169,22 @@ class Media:
         self._lying = [sheet for sheet, lies in zip(sheets, lying, strict=True) if lies]
         self._loose = [sheet for sheet, lies in zip(sheets, lying, strict=True) if not lies]
         return interfaces
+
+    @property
+    def joined(self) -> list[list[str]]:
+        """The names of touching solids of equal media, which light passes between without noticing;
+        sorted within each group of solids.
+        """
+        names = [solid.name for solid in self._solids]
+        pairs = [
+            [names.index(name) for name in face.names]
+            for face in self._faces
+            if len(face.names) == 2 and len(face.mesh.faces) > 0 and not _refracts(face)
+        ]
+        one, other = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
+        groups = connected_components(len(names), one, other)
+        members = [np.flatnonzero(groups == group) for group in np.unique(groups[one])]
+        return [sorted(names[solid] for solid in each) for each in members]
 
     def holds_for(self, solids: Sequence[Solid], sheets: Sequence[Sheet]) -> bool:
         """Return whether other solids and sheets certainly have the same interfaces.
