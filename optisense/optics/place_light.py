@@ -17,8 +17,6 @@ from optisense.optics.ledger import cells_in_view
 from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photons import TargetCells
 from optisense.optics.transport.place_light import (
-    TILT_BINS,
-    TURN_BINS,
     Disc,
     LightWay,
     trace_to_place,
@@ -60,6 +58,9 @@ class GroupLight:
         sky: (9, 12) shares of the irradiance by the direction of incidence: the angle to the normal
             of the skin in steps of 10 degrees, and the azimuth in steps of 30 degrees,
             anticlockwise from the picture's right.
+        mean_angle: mean angle (degrees) between the light and the normal of the skin.
+        main_azimuth: azimuth (degrees) of the mean direction from which the light comes,
+            anticlockwise from the picture's right, -180 to 180.
     """
 
     irradiance: float
@@ -67,21 +68,8 @@ class GroupLight:
     of_mean: float
     ways: dict[str, float]
     sky: NDArray[np.float64]
-
-    @property
-    def mean_angle(self) -> float:
-        """Mean angle (degrees) between the light and the normal of the skin."""
-        middles = (np.arange(TILT_BINS) + 0.5) * 90.0 / TILT_BINS
-        return float(self.sky.sum(axis=1) @ middles)
-
-    @property
-    def main_azimuth(self) -> float:
-        """Azimuth (degrees) from which most light comes, anticlockwise from the picture's right,
-        -180 to 180.
-        """
-        turns = (np.arange(TURN_BINS) + 0.5) * 2 * np.pi / TURN_BINS
-        by_turn = self.sky.sum(axis=0)
-        return float(np.degrees(np.arctan2(by_turn @ np.sin(turns), by_turn @ np.cos(turns))))
+    mean_angle: float
+    main_azimuth: float
 
 
 @dataclass(frozen=True)
@@ -155,7 +143,7 @@ def light_at(
     up *= np.sign(up @ model.surface.v_axis)
     disc = Disc(place.point, place.inward, right, up, PLACE_RADIUS)
     seen = cells_in_view(model) if seen is None else seen
-    landed, in_view = trace_to_place(
+    landed, moments, in_view = trace_to_place(
         model.scene, model.scenes.emitter_table, disc, seen, photons, seed
     )
     area = _area_within(model.sensing.triangles, disc)
@@ -167,16 +155,19 @@ def light_at(
         total = power.mean(axis=0).sum()
         mean = float((in_view[:, number] @ flux).mean()) / max(view_area, 1e-12)
         if mean > 0.0 or total > 0.0:
-            groups[name] = _group_light(power, area, mean)
+            groups[name] = _group_light(power, moments[number] @ flux, area, mean)
     return PlaceLight(at, place.point, groups, photons)
 
 
-def _group_light(power: NDArray[np.float64], area: float, mean: float) -> GroupLight:
+def _group_light(
+    power: NDArray[np.float64], moments: NDArray[np.float64], area: float, mean: float
+) -> GroupLight:
     """Return the light of a group from the power (n, ways, tilts, turns), mW, of n batches in a
     disc.
 
-    ``area`` is the area of the disc's skin (mm^2), and ``mean`` the mean irradiance in view
-    (mW/mm^2).
+    ``moments`` holds the sums (3,) of the power times its angle to the normal (degrees), and times
+    the components of its direction to the right and to the top of the picture; ``area`` is the area
+    of the disc's skin (mm^2), and ``mean`` the mean irradiance in view (mW/mm^2).
     """
     shares = power.mean(axis=0)
     total = float(shares.sum())
@@ -189,6 +180,8 @@ def _group_light(power: NDArray[np.float64], area: float, mean: float) -> GroupL
         of_mean=total / area / mean if mean > 0.0 else 0.0,
         ways={words: float(shares[way].sum()) for way, words in WAY_WORDS.items()},
         sky=shares.sum(axis=0),
+        mean_angle=float(moments[0] / total) if total > 0.0 else 0.0,
+        main_azimuth=float(np.degrees(np.arctan2(moments[2], moments[1]))),
     )
 
 

@@ -54,6 +54,20 @@ def test_a_white_sphere_lights_its_port_as_the_formula_says() -> None:
     assert found.sky.sum() == pytest.approx(1.0)
 
 
+def test_angle_and_azimuth_of_a_single_lamp_are_those_of_its_direction() -> None:
+    """The camera looks along +z with +y up, so that -x is the right of the picture."""
+    design = sphere(None)
+    place = np.array([4.0, 1.0, -3.0])
+    towards = np.array([0.0, 0.0, RADIUS]) - place
+    light = design.lights["white"].lights[0]
+    pose = {"position": tuple(place), "direction": tuple(towards)}
+    design.lights["white"].lights = [light.model_copy(update=pose)]
+    found = light_at(OpticalModel(design), (0.0, 0.0), PHOTONS).groups["white"]
+    angle = np.degrees(np.arccos(towards[2] / np.linalg.norm(towards)))
+    assert found.mean_angle == pytest.approx(angle, abs=0.3)
+    assert found.main_azimuth == pytest.approx(np.degrees(np.arctan2(1.0, -4.0)), abs=0.5)
+
+
 def test_the_groups_of_a_mini_come_from_their_sides_of_the_picture(
     plain_mini: OpticalModel,
 ) -> None:

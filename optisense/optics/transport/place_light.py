@@ -72,6 +72,9 @@ class _Tally:
     Attributes:
         middle, inward, right, up, radius: as in `Disc`.
         sums: power in the disc, (lines, ways, tilts, turns, 3), mW.
+        moments: sums of that power times the angle to the normal (degrees), and times the
+            components along ``right`` and ``up`` of the unit direction that it comes from,
+            (lines, 3, 3).
         seen: the cells of the sensing surface, with flags for those that the camera sees.
         view: power in the camera's view, (lines, 3), mW.
     """
@@ -82,6 +85,7 @@ class _Tally:
     up: mi.Vector3f
     radius: mi.Float
     sums: mi.Float64
+    moments: mi.Float64
     seen: TargetCells
     view: mi.Float64
 
@@ -110,15 +114,18 @@ def _count(
         if lands:
             towards = -ray.direction
             cosine = dr.clip(dr.dot(towards, tally.inward), 0, 1)
-            tilt = mi.UInt32(dr.minimum(dr.acos(cosine) * (2 / dr.pi) * TILT_BINS, TILT_BINS - 0.5))
-            angle = dr.atan2(dr.dot(towards, tally.up), dr.dot(towards, tally.right)) * (
-                1 / dr.two_pi
-            )
+            incidence = dr.acos(cosine)
+            x, y = dr.dot(towards, tally.right), dr.dot(towards, tally.up)
+            tilt = mi.UInt32(dr.minimum(incidence * (2 / dr.pi) * TILT_BINS, TILT_BINS - 0.5))
+            angle = dr.atan2(y, x) * (1 / dr.two_pi)
             angle -= dr.floor(angle)
             turn = mi.UInt32(dr.minimum(angle * TURN_BINS, TURN_BINS - 0.5))
             row = ((line * WAYS + way) * TILT_BINS + tilt) * TURN_BINS + turn
             for k in range(3):
                 dr.scatter_add(tally.sums, mi.Float64(power[k]), row * 3 + k)
+                for number, value in enumerate((dr.rad2deg(incidence), x, y)):
+                    moment = (line * 3 + number) * 3 + k
+                    dr.scatter_add(tally.moments, mi.Float64(power[k] * value), moment)
         mirrored = step.scattered & ~step.opaque
         met = dr.select(step.turned, mi.UInt32(int(LightWay.REFLECTED)), 0)
         met = dr.select(mirrored, mi.UInt32(int(LightWay.MIRRORED)), met)
@@ -141,7 +148,7 @@ def trace_to_place(
     seen: TargetCells,
     photons: int,
     seed: int,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Sum the power of the photons that land at a place.
 
     Args:
@@ -150,8 +157,10 @@ def trace_to_place(
         photons: number of photons of all lights together.
 
     Returns:
-        The power (mW) that lands in the disc, (batches, groups, ways, tilts, turns, 3), and in the
-        camera's view, (batches, groups, 3), for lights of 1 mW in each channel.
+        The power (mW) that lands in the disc, (batches, groups, ways, tilts, turns, 3); sums of
+        that power times the angle to the normal (degrees), and times the components along ``right``
+        and ``up`` of the unit direction that it comes from, (groups, 3, 3); and the power (mW) in
+        the camera's view, (batches, groups, 3). All are for lights of 1 mW in each channel.
     """
     groups = table.groups
 
@@ -165,6 +174,7 @@ def trace_to_place(
         up=vector(disc.up),
         radius=dr.opaque(mi.Float, disc.radius),
         sums=dr.zeros(mi.Float64, BATCHES * groups * WAYS * TILT_BINS * TURN_BINS * 3),
+        moments=dr.zeros(mi.Float64, BATCHES * groups * 3 * 3),
         seen=seen,
         view=dr.zeros(mi.Float64, BATCHES * groups * 3),
     )
@@ -176,9 +186,10 @@ def trace_to_place(
         flight, _ = launch(scene, emission, lights)
         line = (flight.group & GROUP_MASK) + dr.opaque(mi.UInt32, batch * groups)
         _count(scene, tally, flight, line, dr.opaque(mi.UInt32, seed_of(seed, 7, batch)))
-        dr.eval(tally.sums, tally.view)
+        dr.eval(tally.sums, tally.moments, tally.view)
     found = np.asarray(tally.sums, dtype=np.float64)
     return (
         found.reshape(BATCHES, groups, WAYS, TILT_BINS, TURN_BINS, 3),
+        np.asarray(tally.moments, dtype=np.float64).reshape(BATCHES, groups, 3, 3).mean(axis=0),
         np.asarray(tally.view, dtype=np.float64).reshape(BATCHES, groups, 3),
     )
