@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.design import SensorDesign
-from optisense.errors import DesignError, OutputError
+from optisense.errors import DesignError, OutputError, OwnCodeError
 from optisense.folders import refuse_to_replace
 from optisense.registry import Registry, must_be
 from optisense.robots._body import SensorBody, sensor_body
@@ -76,6 +76,7 @@ def export_robot(
         DesignError: see `sensor_body`; or two parts differ in upper and lower case only.
         OutputError: there is no such format, the folder can't be written, or it holds a design or
             files of the user with such names.
+        OwnCodeError: the function of a format returned something other than text.
     """
     wanted = [formats] if isinstance(formats, str) else formats
     kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(wanted)]
@@ -89,7 +90,7 @@ def export_robot(
             where=f"parts.{twice}",
             hint="Rename the part: their files would overwrite each other",
         )
-    files = {f"{body.name}{kind.suffix}": kind.text(body, MESHES).encode() for kind in kinds}
+    files = {f"{body.name}{kind.suffix}": _text_of(kind, body).encode() for kind in kinds}
     files |= {
         f"{MESHES}/{each.name}.stl": stl_bytes_of(f"{each.name}, metres", each.mesh)
         for each in meshes
@@ -104,3 +105,16 @@ def export_robot(
     if notes is not None:
         notes += body.notes
     return finals
+
+
+def _text_of(kind: RobotFormat, body: SensorBody) -> str:
+    text = kind.text(body, MESHES)
+    if not isinstance(text, str):
+        name = getattr(kind.text, "__qualname__", str(kind.text))
+        raise OwnCodeError(
+            f"the function '{name}' of the format '{kind.suffix}' returned "
+            f"{type(text).__name__} instead of text",
+            where=getattr(kind.text, "__module__", None),
+            hint="Let it return the content of the file as one string",
+        )
+    return text

@@ -11,9 +11,9 @@ import pytest
 from optisense import sensors
 from optisense.design import SensorDesign
 from optisense.design.projection import picture_places
-from optisense.errors import DesignError
+from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry.common_space import as_manifold
-from optisense.robots import SensorBody, export_robot, sensor_body
+from optisense.robots import RobotFormat, SensorBody, export_robot, sensor_body
 from optisense.robots._body import KILOGRAMS, mass_properties
 from optisense.workshop.shapes import shapes
 
@@ -115,6 +115,17 @@ def test_a_format_can_be_given_alone(tmp_path: Path) -> None:
     # The boards of this sensor are a part, which has a mass.
     assert "boards" in notes[0].split("), without")[0]
     assert "boards" not in notes[0].split("), without")[1]
+
+
+def test_a_format_without_text_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_text(body: SensorBody, meshes: str) -> str:
+        return None  # type: ignore[return-value]
+
+    silent = RobotFormat(".sdf", no_text)
+    monkeypatch.setattr("optisense.robots.formats.ROBOT_FORMATS.find", lambda name: silent)
+    with pytest.raises(OwnCodeError, match=r"no_text' of the format '\.sdf' returned NoneType"):
+        export_robot(sensors.build("gelsight-mini"), tmp_path, "silent")
+    assert not list(tmp_path.iterdir())
 
 
 def test_a_weighed_sensor() -> None:
