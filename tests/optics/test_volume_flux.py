@@ -50,6 +50,8 @@ OBLIQUE = RayCamera(
 """A camera on the side of the lamp. If points read the light where their lines of sight, continued
 behind the ball, meet the skin, the flank is 8 % too dark, as the skin there is farther from the
 lamp."""
+WALL = 0.9
+"""Reflectance of the wall."""
 BELOW_CEILING = RayCamera((0.0, 0.0, 7.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0), 40.0, 64, 48)
 
 
@@ -76,6 +78,12 @@ def ceiling() -> Piece:
     return quad("ceiling", corners, coating(Region.OTHER, 0.0))
 
 
+def wall() -> Piece:
+    """A white wall behind the ball, which the lamp lights."""
+    corners = [(-5, -8, 0), (-5, 8, 0), (-5, 8, 3), (-5, -8, 3)]
+    return quad("wall", corners, coating(Region.OTHER, WALL))
+
+
 def store(pieces: list[Piece], lamp: Emitter, seen: NDArray[np.floating]) -> CacheStore:
     return CacheStore(LitScene(RayScene(pieces), pieces, emitter_table([lamp], 1), False), seen)
 
@@ -92,6 +100,18 @@ def irradiance(points: NDArray[np.floating], normals: NDArray[np.floating]) -> N
             cosines = np.maximum((way * normals).sum(axis=1), 0) * np.maximum(-way @ towards, 0)
             total += cosines / squared**2
     return np.asarray(total / len(steps) ** 2 / np.pi)
+
+
+def from_wall(points: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.float64]:
+    """(n,) of the light that the wall reflects, at points above the skin, by the sum over it."""
+    u, v = (np.indices((64, 24)).reshape(2, -1) + 0.5) / [[64], [24]]
+    spots = np.stack([np.full(len(u), -5.0), 16 * u - 8, 3 * v], axis=1)
+    facing = np.tile([1.0, 0.0, 0.0], (len(spots), 1))
+    radiance = WALL / np.pi * irradiance(spots, facing)
+    way = spots[None] - points[:, None]
+    squared = (way**2).sum(axis=2)
+    cosines = np.maximum((way * normals[:, None]).sum(axis=2), 0) * np.maximum(-way[..., 0], 0)
+    return np.asarray((radiance * cosines / squared**2).sum(axis=1) * 16 * 3 / len(spots))
 
 
 def picture(
@@ -129,6 +149,17 @@ def test_raised_flank_in_grazing_light_is_lit_as_in_the_open(camera: RayCamera) 
     flank &= (np.abs(normals[..., 1]) < normals[..., 0]) & (points[..., 2] > ABOVE_RIM)
     assert flank.sum() > 50
     wanted = REFLECTANCE / np.pi * irradiance(points[flank], normals[flank]).mean()
+    assert image[flank].mean() == pytest.approx(wanted, rel=AGREEMENT)
+
+
+def test_a_flank_is_lit_by_the_foot_of_a_white_wall() -> None:
+    """Light that rises from the foot of the wall to the flank lands nowhere on the skin."""
+    image, rays = picture([skin(), wall()], ball(), CAMERA, PHOTONS, guided_by=CAMERA)
+    normals, points = rays.normals.astype(float), rays.points.astype(float)
+    flank = (rays.region == Region.INDENTER) & (normals[..., 0] < -0.3)
+    flank &= (np.abs(normals[..., 1]) < -normals[..., 0]) & (points[..., 2] > ABOVE_RIM)
+    assert flank.sum() > 50
+    wanted = REFLECTANCE / np.pi * from_wall(points[flank], normals[flank]).mean()
     assert image[flank].mean() == pytest.approx(wanted, rel=AGREEMENT)
 
 

@@ -163,7 +163,7 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
     ray = flight.ray
     throughput = mi.Color3f(flight.throughput)
     landed = mi.Bool(False)
-    scattered = mi.Bool(False)  # by an opaque surface, at the ray's start
+    scattered = mi.Bool(False)  # by the sensing surface, at the ray's start
     # The stream depends on the photon's number alone. With `size` it would also depend on the lane,
     # and one photon that ended earlier would change the paths of all photons after it. A small
     # change of the design therefore changes few paths.
@@ -174,8 +174,8 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
         hit = step.hit
         if dr.hint(recording.flux_layer is not None, mode="scalar"):
             assert recording.flux_layer is not None
-            # Light that leaves an opaque surface and meets no other is handled by
-            # interreflection.py.
+            # Light that leaves the sensing surface and meets no other is handled by
+            # interreflection.py. Light from walls, also from their foot, is recorded.
             passes = ray.active & (step.opaque | ~scattered)
             bits = mi.UInt32(seed) ^ (flight.number * 747796405) ^ (ray.depth * 0x9E3779B9)
             # The bits are hashed, as neighbouring photons have neighbouring bits.
@@ -199,7 +199,7 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
                     crossing = Landing(spot, ray.direction, share, power, flight.group)
                     recording.crossings.write(crossing, crosses)
                 piece += 1
-            scattered = step.opaque
+            scattered = step.sensed
         throughput *= step.transmittance
         if dr.hint(step.opaque, exclude=[scene, ray, flight, step, hit, throughput]):
             cosine = dr.abs(dr.dot(ray.direction, hit.normal))

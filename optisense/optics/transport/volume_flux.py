@@ -90,8 +90,8 @@ def sample_segment(
         chance: uniform random number from 0 to 1, the same for all pieces of a segment.
         piece: the number of the piece.
         landing: whether the segment ends on an opaque surface.
-        scattered: whether it begins on an opaque surface. Near its start, such light is not in the
-            layer: indenters get it by interreflection, as it does not vary with height there.
+        scattered: whether it begins on the sensing surface. Near its start, such light is not in
+            the layer: indenters get it by interreflection, as it does not vary with height there.
 
     Returns:
         The place (mm); the layer's height over the length of the piece, which replaces the cosine
