@@ -17,6 +17,7 @@ from optisense.optics.scene.assembly import Assembly
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surface_cells import build_cells, cells_near
 from optisense.optics.scene.surfaces import Region, SurfaceKind
+from optisense.optics.transport.interact import PHOTON_DEPTH
 from optisense.optics.transport.light_ledger import SIDES, Fate, trace_ledger
 from optisense.optics.transport.photons import TargetCells
 from optisense.quality import PICTURE_PHOTONS
@@ -46,7 +47,7 @@ class LightEnd(StrEnum):
 
 Line = TypeVar("Line")
 
-GIVEN_UP = "given up after 64 surfaces"
+GIVEN_UP = f"given up after {PHOTON_DEPTH} surfaces"
 SEEN, UNSEEN = LightEnd.SEEN.value, LightEnd.UNSEEN.value
 FACETS = "lost between the facets of rough faces"
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.optics.ledger import GIVEN_UP, cells_in_view, places_of
+from optisense.optics.ledger import cells_in_view, places_of
+from optisense.optics.transport.interact import MAX_DEPTH
 from optisense.optics.transport.photon_paths import TracedPhotons, trace_photon_paths
 
 if TYPE_CHECKING:
@@ -25,6 +26,8 @@ CANDIDATES = 4
 channels, a photon carries light of one channel, and only photons of the channels that a group emits
 are drawn."""
 
+CUT_OFF = f"not followed beyond {MAX_DEPTH} surfaces"
+
 
 @dataclass(frozen=True)
 class PhotonPath:
@@ -32,7 +35,7 @@ class PhotonPath:
 
     Attributes:
         group: the light group.
-        where: the place where it ends, named as in the light ledger.
+        where: the place where it ends, named as in the light ledger, or `CUT_OFF`.
         points: (n, 3) float32, points (mm) on the light and on the surfaces that the photon meets,
             and its end. The end of a photon that escapes lies a little outside the sensor.
     """
@@ -86,7 +89,7 @@ def photon_paths(
 def _path(
     traced: TracedPhotons, index: int, group: str, words: dict[tuple[int, int], str]
 ) -> PhotonPath:
-    where = words.get((int(traced.surface[index]), int(traced.fate[index])), GIVEN_UP)
+    where = words.get((int(traced.surface[index]), int(traced.fate[index])), CUT_OFF)
     return PhotonPath(group, where, traced.points[index, : traced.counts[index]])
 
 

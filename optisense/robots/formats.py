@@ -108,7 +108,7 @@ def export_robot(
 
 
 def _text_of(kind: RobotFormat, body: SensorBody) -> str:
-    text = kind.text(body, MESHES)
+    text: object = kind.text(body, MESHES)
     if not isinstance(text, str):
         name = getattr(kind.text, "__qualname__", str(kind.text))
         raise OwnCodeError(

@@ -25,8 +25,12 @@ from optisense.optics.scene.surface_table import (
 from optisense.optics.scene.surfaces import Region, SurfaceKind
 
 MAX_DEPTH = 64
-"""Largest number of surfaces that any ray meets. In GelSight-like sensors less than 0.1 % of the
-photons' light remains after so many."""
+"""Largest number of surfaces that any ray but a photon meets. In GelSight-like sensors, less than
+0.1 % of the photons' light remains after so many."""
+PHOTON_DEPTH = 1024
+"""Largest number of surfaces that a photon meets. Between white walls, light is scattered many
+times: in a closed box of reflectance 0.99, half of the light is left after 64 surfaces, and 0.003 %
+after 1,024."""
 LEAST_COMPONENT = 1e-12
 """Magnitude below which a component of a camera ray's direction becomes 0. Refraction in a plane of
 symmetry leaves components of 1e-16 and less, with which Embree misses triangles: in DIGIT, six rays
@@ -105,7 +109,7 @@ class Interaction:
         transmittance: the share of the light that the medium leaves on the way to the surface, per
             channel. No weight of a lobe includes it.
         ray: the ray that continues. Where none does, it is unchanged but inactive; it is also
-            inactive after `MAX_DEPTH` surfaces.
+            inactive after `MAX_DEPTH` surfaces, and photons after `PHOTON_DEPTH`.
     """
 
     hit: SurfaceHit
@@ -241,7 +245,7 @@ def interact(
     onward = Ray(
         origin=dr.select(goes_on, leave(hit.point, hit.normal, direction), ray.origin),
         direction=dr.select(goes_on, direction, ray.direction),
-        active=goes_on & (depth < MAX_DEPTH),
+        active=goes_on & (depth < (PHOTON_DEPTH if ray_kind is RayKind.PHOTON else MAX_DEPTH)),
         depth=depth,
         absorption=absorption,
         channel=ray.channel,

@@ -135,7 +135,7 @@ def _follow(
         course.write(photon, count, end, mi.Bool(True))
         count += 1
         ray = step.ray
-        ray.active &= ~(stopped | absorbed)
+        ray.active &= ~(stopped | absorbed) & (ray.depth < MAX_DEPTH)
     return count, ending, fate
 
 

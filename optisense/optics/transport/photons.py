@@ -20,7 +20,13 @@ from optisense.optics.scene.emitters import EmitterTable, emit
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at
 from optisense.optics.transport.emission_guide import GUIDE_CELLS, EmissionGuide, warp
-from optisense.optics.transport.interact import LobeSample, RayKind, interact
+from optisense.optics.transport.interact import (
+    MAX_DEPTH,
+    Interaction,
+    LobeSample,
+    RayKind,
+    interact,
+)
 from optisense.optics.transport.photon_map import (
     HALF_SHIFT,
     SURFACE_SHIFT,
@@ -35,8 +41,8 @@ LANDINGS_PER_PHOTON = 1.5
 GelSight Svelte and GelSight360 have 0.3 to 1.3; a pass with more landings is traced again with more
 memory."""
 MAX_SURVIVAL = 0.95
-"""Upper bound on the probability that a photon survives its reflection (Russian roulette), so that
-no path between white surfaces is endless: less than 4 % of them meet all `MAX_DEPTH` surfaces."""
+"""Probability with which a photon goes on from an interface after `MAX_DEPTH` surfaces (Russian
+roulette). Total reflection would otherwise lead it through a clear part for ever."""
 
 
 @dataclass(frozen=True)
@@ -213,11 +219,23 @@ def _fly(scene: RayScene, flight: Flight, recording: _Recording, seed: mi.UInt64
             landed |= found & (dr.gather(mi.UInt32, target.flags, cell, found) != 0)
         throughput *= step.lobe.weight
         ray = step.ray
-        if dr.hint(step.scattered, exclude=[step]):
-            survival = dr.minimum(dr.max(step.lobe.weight), MAX_SURVIVAL)
+        far = ray.depth >= MAX_DEPTH
+        if dr.hint(step.scattered | far, exclude=[step, far]):
+            survival = survival_probability(step)
             ray.active &= rng.next_float32() < survival
             throughput /= dr.maximum(survival, 1e-6)
     return landed
+
+
+def survival_probability(step: Interaction) -> mi.Float:
+    """Return the probability (n,) with which photons go on from a surface (Russian roulette).
+
+    Where light is scattered, it is the reflectance in the brightest channel, so that the power of
+    photons remains about the same: with a lower one, a few photons between white walls would gain
+    much power.
+    """
+    scattered = dr.minimum(dr.max(step.lobe.weight), 1.0)
+    return dr.select(step.scattered, scattered, MAX_SURVIVAL)
 
 
 def trace_pilot(

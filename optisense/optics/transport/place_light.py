@@ -21,10 +21,16 @@ from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.surface_cells import cell_at
 from optisense.optics.transport.emission_guide import uniform_guide
-from optisense.optics.transport.interact import LobeSample, RayKind, interact
+from optisense.optics.transport.interact import MAX_DEPTH, LobeSample, RayKind, interact
 from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photon_map import GROUP_MASK
-from optisense.optics.transport.photons import MAX_SURVIVAL, Emission, Flight, TargetCells, launch
+from optisense.optics.transport.photons import (
+    Emission,
+    Flight,
+    TargetCells,
+    launch,
+    survival_probability,
+)
 
 TILT_BINS, TURN_BINS = 9, 12
 """Numbers of bins of the angle of incidence (10 degrees each) and of azimuth (30 degrees each), as
@@ -134,8 +140,8 @@ def _count(
         way = dr.maximum(way, met)
         power *= step.lobe.weight
         ray = step.ray
-        if step.scattered:
-            survival = dr.minimum(dr.max(step.lobe.weight), MAX_SURVIVAL)
+        if step.scattered | (ray.depth >= MAX_DEPTH):
+            survival = survival_probability(step)
             ray.active &= rng.next_float32() < survival
             power /= dr.maximum(survival, 1e-6)
 
