@@ -35,8 +35,9 @@ def ray_hits(mesh: TriangleMesh, origins: ArrayLike, directions: ArrayLike) -> R
     """Return every intersection, from either side, of rays with a mesh.
 
     Pairs of rays and faces are first tested with the faces' bounding spheres. Those that remain are
-    tested by the method of Moeller and Trumbore, "Fast, minimum storage ray-triangle intersection",
-    J. Graphics Tools 2 (1997).
+    tested by the method of Woop, Benthin and Wald, "Watertight ray/triangle intersection", J.
+    Computer Graphics Techniques 2 (2013). A ray through an edge or a corner that faces share meets
+    at least one of them, and all of them if it meets the edge exactly.
 
     Args:
         mesh: any mesh, mm.
@@ -81,18 +82,23 @@ def _hits(
     square += np.einsum("ti,ti->t", middle, middle) - reach
     scale = max(np.abs(start).max(initial=0.0), np.abs(middle).max(initial=0.0))
     ray, face = np.nonzero(square - along**2 <= _NEAR * scale**2)
-    o, d, a = start[ray], way[ray], corners[face, 0]
-    edge_1, edge_2 = corners[face, 1] - a, corners[face, 2] - a
-    p = np.cross(d, edge_2)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inverse = 1.0 / np.einsum("ki,ki->k", p, edge_1)
-        t = o - a
-        u = np.einsum("ki,ki->k", t, p) * inverse
-        q = np.cross(t, edge_1)
-        v = np.einsum("ki,ki->k", q, d) * inverse
-        distance = np.einsum("ki,ki->k", q, edge_2) * inverse
-        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (distance > 0) & np.isfinite(inverse)
-    return RayHits(ray[hit] + first, distance[hit], face[hit])
+    # Coordinates across each ray and along the axis nearest to it; those of a corner are the same
+    # in all its faces.
+    axes = (np.argmax(np.abs(way), axis=1)[:, None] + np.array([1, 2, 0])) % 3
+    turned = np.take_along_axis(way, axes, axis=1)
+    slope = turned[:, :2] / turned[:, 2:]
+    away = np.take_along_axis(corners[face] - start[ray][:, None], axes[ray][:, None], axis=2)
+    height = away[:, :, 2]
+    x, y = np.moveaxis(away[:, :, :2] - slope[ray][:, None] * away[:, :, 2:], 2, 0)
+    # The sign of an edge is exact or 0, and opposite for the face on its other side.
+    pairs = (1, 2), (2, 0), (0, 1)
+    edges = np.stack([x[:, i] * y[:, j] - y[:, i] * x[:, j] for i, j in pairs], axis=1)
+    area = edges.sum(axis=1)
+    hit = ((edges >= 0.0).all(axis=1) | (edges <= 0.0).all(axis=1)) & (area != 0.0)
+    ray, face = ray[hit], face[hit]
+    distance = (edges[hit] / area[hit, None] * height[hit]).sum(axis=1) / turned[ray, 2]
+    ahead = distance > 0.0
+    return RayHits(ray[ahead] + first, distance[ahead], face[ahead])
 
 
 def _products(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

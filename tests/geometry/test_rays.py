@@ -30,3 +30,20 @@ def test_rays_meet_every_small_face_of_a_wide_mesh():
     assert np.unique(hits.ray).tolist() == list(range(500))
     assert hits.distance == pytest.approx(3.5)
     assert len(ray_hits(sheet, np.zeros((0, 3)), np.zeros((0, 3))).ray) == 0
+
+
+def test_rays_through_edges_and_corners_meet_a_face_that_has_them():
+    rng = np.random.default_rng(2)
+    sheet = TriangleMesh.grid((25.25, 20.75), (17, 13))
+    share = rng.uniform(size=(20_000, 1))
+    ends = sheet.vertices[sheet.faces[rng.integers(len(sheet.faces), size=20_000), :2]]
+    met = np.concatenate([share * ends[:, 0] + (1.0 - share) * ends[:, 1], sheet.vertices])
+    met = met[(np.abs(met[:, :2]) < (12.6, 10.3)).all(axis=1)]
+    ways = rng.normal(size=met.shape) + (0.0, 0.0, 2.0)
+    ways[::3] = 0.0, 0.0, 1.0
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    for axes in (np.eye(3), turn):
+        turned = TriangleMesh(sheet.vertices @ axes, sheet.faces)
+        hits = ray_hits(turned, (met - 5.0 * ways) @ axes, ways @ axes)
+        assert np.unique(hits.ray).tolist() == list(range(len(met)))
+        assert hits.distance == pytest.approx(5.0)
