@@ -23,6 +23,15 @@ LEAST_FORCE, MOST_FORCE = 1e-6, 1e6
 """Smallest and largest force (N) that can be given. The lower is the weight of a grain of sand, the
 upper that of a hundred tons; a gel takes some ten."""
 
+BESIDE = 1e-6
+"""Distance (mm) beside a point, to four sides, at which the thickness of the gel is looked for if
+there is none behind the point itself, as in the plane of a side of the gel: far above the rounding
+of double precision, and far below any distance that matters."""
+
+GRAZING = 1e-6
+"""Cosine between a line and the normal of a face up to which the face is parallel to the line, as
+the side of a gel below a point of its border: far above the rounding of double precision."""
+
 ON_SURFACE = 0.5
 """Largest distance (mm) from the sensing surface of a contact point given as x, y, z: points picked
 on another tessellation of a curved surface are nearer, and a mistyped number is farther."""
@@ -208,8 +217,10 @@ def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> f
         ContactError: there is no gel behind the point.
     """
     way = np.asarray(inward, dtype=np.float64)
-    hits = ray_hits(gel, np.asarray(point, dtype=np.float64), way)
-    leaving = (gel.face_normals[hits.face] @ way > 0.0) & (hits.distance > 1e-3)
+    sides = np.cross(way, np.eye(3)[np.argsort(np.abs(way))[:2]])
+    starts = np.asarray(point) + BESIDE * np.concatenate([np.zeros((1, 3)), sides, -sides])
+    hits = ray_hits(gel, starts, np.tile(way, (len(starts), 1)))
+    leaving = (gel.face_normals[hits.face] @ way > GRAZING) & (hits.distance > 1e-3)
     if not leaving.any():
         raise ContactError(
             "there is no gel under a contact",

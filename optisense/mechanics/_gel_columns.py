@@ -52,6 +52,10 @@ them."""
 NEAREST_EXIT = 1e-3
 """Distance (mm) behind the skin below which a face counts as the skin itself: half of the distance
 below which faces touch."""
+ASIDE = 1e-6
+"""Distance by which the lines of columns at the border of the gel start inside of it, over the
+thickness: far above the rounding of double precision, which puts lines in the plane of a side on
+either side of it, and far below any distance that matters."""
 THINNEST, THICKEST = 0.15, 3.0
 """Smallest and largest length of a column, over the thickness under the contact; columns of other
 lengths miss the base, as at the side of a gel."""
@@ -127,7 +131,8 @@ def gel_columns(
     there &= np.isfinite(at)
     length = np.full(there.shape, np.inf)
     steep = there & (-inward[:, :, 2] < LEAST_UPRIGHT)
-    starts = place.origin + top[there] @ place.axes.T
+    inside = top + ASIDE * thickness * _away_from_the_border(there)
+    starts = place.origin + inside[there] @ place.axes.T
     ways = inward[there] @ place.axes.T
     length[there] = _lengths(starts, ways, elastomers, THICKEST * thickness)
     fits = there & (length > THINNEST * thickness) & np.isfinite(length)
@@ -218,6 +223,14 @@ def _to_the_border(
                 steps[:, beside[0], beside[1]] = steps[:, row, column]
                 steps[axis, beside[0], beside[1]] = way * (room - gap)
     return there, steps, inward
+
+
+def _away_from_the_border(there: BoolArray) -> FloatArray:
+    """Return steps (rows, columns, 3) of -1, 0 or 1 along x and y from each grid point to the side
+    with more columns; the third is 0.
+    """
+    steps = [np.sign(ndimage.sobel(np.where(there, 1.0, 0.0), k, mode="constant")) for k in (1, 0)]
+    return np.stack([*steps, np.zeros(there.shape)], axis=2)
 
 
 def _inward(fine: FloatArray, at_x: IntArray, at_y: IntArray, pitch: float) -> FloatArray:

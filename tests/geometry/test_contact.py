@@ -31,6 +31,9 @@ def surface_of(gel: TriangleMesh) -> SensingSurface:
 
 FLAT = surface_of(GEL)
 
+TURN, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
+TURN = TURN * np.sign(np.linalg.det(TURN))
+
 
 @pytest.mark.parametrize(
     ("text", "contact"),
@@ -158,6 +161,17 @@ def test_gel_thickness_along_slanted_normals() -> None:
     assert available_depth((1, 1, 0), slanted, GEL) == pytest.approx(4.25 / 0.8)
     with pytest.raises(ContactError, match="no gel"):
         available_depth((0, 0, 0), (0, 0, 1), GEL)
+
+
+def test_gel_is_as_thick_on_edges_of_its_mesh_and_at_its_border_as_elsewhere() -> None:
+    tilted = GEL.transformed(np.vstack([np.hstack([TURN, [[3.0], [1.0], [7.0]]]), [0, 0, 0, 1]]))
+    (x, y, _), height = GEL.bounds[1], GEL.bounds[1][2]
+    inner = [(x * k / 10, y * k * sign / 10, height) for k in range(-9, 10) for sign in (1, -1)]
+    border = [(x * sign, y * k / 10, height) for k in range(-9, 10) for sign in (1, -1)]
+    for point in inner + border:
+        for gel, turn, middle in ((GEL, np.eye(3), (0, 0, 0)), (tilted, TURN, (3.0, 1.0, 7.0))):
+            found = available_depth(turn @ point + middle, turn @ (0, 0, -1), gel)
+            assert found == pytest.approx(4.25, abs=1e-5), point
 
 
 def test_a_missing_mesh_file_is_named(tmp_path: Path) -> None:

@@ -182,6 +182,15 @@ def test_free_sides_make_a_pad_softer(monkeypatch):
     assert 0.75 < forces[-1] < 0.9
 
 
+def test_mirrored_places_whose_columns_stand_on_the_sides_of_a_pad_take_equal_forces():
+    # Half a thickness from both sides, so that a column of the grid stands on each of them.
+    pad = layer(25.25, 20.75, 4.25)
+    signs = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
+    forces = [pressed(*pad, at=(10.5 * a, 8.25 * b), depth=0.5).force for a, b in signs]
+    inside = pressed(*pad, at=(10.49, 8.24), depth=0.5).force
+    assert forces == pytest.approx([inside] * 4, rel=1e-3)
+
+
 def pad_under_a_plate(half, thickness, counts):
     """The force (N per MPa of shear modulus) that moves the whole top of a pad by 1 mm without
     friction, by elements of equal size in a quarter of the pad."""
