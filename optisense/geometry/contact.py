@@ -47,7 +47,8 @@ class Contact:
             `point` is given.
         point: (x, y, z) in the design's frame (mm), instead of `at`; the nearest point of the
             surface is used.
-        depth: distance (mm) from the undeformed surface to the indenter's lowest point.
+        depth: distance (mm) from the undeformed surface to the indenter's lowest point. With a
+            `force`, it keeps its default; another value is an error.
         rotation: rotation (degrees) about the outward normal, counter-clockwise seen from outside;
             at 0 the indenter's x axis is parallel to u.
         along: (3,) direction in the design's frame whose projection on the surface replaces u as
