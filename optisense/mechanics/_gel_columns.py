@@ -182,8 +182,8 @@ def _to_the_border(
 ) -> tuple[BoolArray, IntArray, FloatArray]:
     """Move the outermost columns to the border of the skin.
 
-    A column that is less than half a pitch from the border moves there; elsewhere a column is
-    added.
+    A column that is less than half a pitch from the border moves there, unless it is in the middle,
+    under the loads; elsewhere a column is added.
 
     Args:
         there: (rows, columns) mask of the grid points that have skin.
@@ -214,7 +214,7 @@ def _to_the_border(
                 line = fine[spot[0], :] if axis == 0 else fine[:, spot[1]]
                 ahead = line[along : along + gap + 1] if way > 0 else line[along::-1][: gap + 1]
                 room = int(np.argmin(ahead)) - 1 if not ahead.all() else gap
-                if room <= gap // 2:
+                if room <= (0 if here == len(places[axis]) // 2 else gap // 2):
                     steps[axis, row, column] = way * max(room, 0)
                     continue
                 beside = (row, column + way) if axis == 0 else (row + way, column)

@@ -191,6 +191,14 @@ def test_mirrored_places_whose_columns_stand_on_the_sides_of_a_pad_take_equal_fo
     assert forces == pytest.approx([inside] * 4, rel=1e-3)
 
 
+def test_forces_fall_evenly_towards_the_side_of_a_pad():
+    pad = layer(25.25, 20.75, 4.25)
+    forces = [pressed(*pad, at=(x, 0.3), depth=0.5).force for x in np.arange(11.1, 12.5, 0.18)]
+    falls = -np.diff(forces) / forces[0]
+    assert (falls > 0.0).all()
+    assert falls.max() < 0.13
+
+
 def pad_under_a_plate(half, thickness, counts):
     """The force (N per MPa of shear modulus) that moves the whole top of a pad by 1 mm without
     friction, by elements of equal size in a quarter of the pad."""
