@@ -136,6 +136,25 @@ def test_a_file_that_is_no_picture_is_told_without_its_inner_names(tmp_path: Pat
     assert "BytesIO" not in str(raised.value)
 
 
+def test_grey_of_16_bits_is_that_of_8_bits(tmp_path: Path) -> None:
+    folder = own_folder(tmp_path / "f")
+    grey = picture(1)[..., 0]
+    Image.fromarray(257 * grey.astype(np.uint16)).save(folder / "a.png")
+    found = read_photographs(folder).presses[0].picture
+    assert (found == grey[..., None]).all()
+
+
+def test_pictures_that_are_stored_turned_are_turned_upright(tmp_path: Path) -> None:
+    folder = own_folder(tmp_path / "f")
+    upright = Image.fromarray(picture(1))
+    exif = upright.getexif()
+    exif[0x112] = 6  # the first row is the right side
+    upright.transpose(Image.Transpose.ROTATE_90).save(folder / "a.png", exif=exif)
+    assert (read_photographs(folder).presses[0].picture == picture(1)).all()
+    upright.save(folder / "a.png", exif=b"Exif\0\0II*\0\x08\0\0\0\xff\xff")  # damaged
+    assert (read_photographs(folder).presses[0].picture == picture(1)).all()
+
+
 def test_pictures_that_occur_twice_are_told() -> None:
     one, two = (PhotographedPress(name, picture(1), 6.0) for name in ("one", "two"))
     words = Photographs(picture(0), (one, two, one)).warnings()
