@@ -47,7 +47,8 @@ class Tuning:
     """Values of a camera's tuning file.
 
     Attributes:
-        values: fields of `ImagingModel` as plain values, as far as the file has them.
+        values: fields of `ImagingModel` as plain values, as far as the file has them. White
+            balance, colour matrix and crosstalk are all present, or none of them is.
         derived: derivation from the file of the values that are computed, by field.
     """
 
@@ -103,7 +104,7 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
         )
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            _add_crosstalk(values, derived)
+            _complete_colours(values, derived)
     except (ArithmeticError, np.linalg.LinAlgError) as error:
         message = f"the processor's change of colours can't be inverted ({error})"
         raise LibraryError(message, where=f"{path}: rpi.ccm", hint=NO_TUNING) from None
@@ -214,17 +215,23 @@ def _tone_curve(section: dict[str, Any], temperature: float) -> dict[str, Any]:
     return {"tone_curve": {"kind": "points", "points": scaled.tolist()}}
 
 
-def _add_crosstalk(values: dict[str, Any], derived: dict[str, str]) -> None:
-    """Add the crosstalk of the sensor that its processor's matrix undoes."""
-    if "colour_matrix" not in values:
+def _complete_colours(values: dict[str, Any], derived: dict[str, str]) -> None:
+    """Complete white balance and colour matrix if the file has one of them, and add the crosstalk
+    of the sensor that both undo.
+    """
+    neutral = {"white_balance": [1.0, 1.0, 1.0], "colour_matrix": np.eye(3).tolist()}
+    if not neutral.keys() & values.keys():
         return
+    for field in neutral.keys() - values.keys():
+        values[field] = neutral[field]
+        derived[field] = "neutral, as the tuning file has none"
     matrix = np.array(values["colour_matrix"])
     if abs(np.linalg.det(matrix)) < LEAST_DETERMINANT:
         raise LibraryError(
             "the colour matrix can't be inverted, as it maps different colours to the same one",
             hint=NO_TUNING,
         )
-    undone = np.linalg.inv(matrix * np.array(values.get("white_balance", (1.0, 1.0, 1.0))))
+    undone = np.linalg.inv(matrix * np.array(values["white_balance"]))
     values["crosstalk"] = np.round(undone, ROUNDING).tolist()
     derived["crosstalk"] = (
         "the inverse of white balance and colour matrix: the maker chose these so that the "

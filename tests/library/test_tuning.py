@@ -73,6 +73,19 @@ def test_a_tuning_file_is_read(tmp_path: Path, version: int) -> None:
     assert mixed == pytest.approx(np.eye(3), abs=1e-4)
 
 
+@pytest.mark.parametrize("missing", ["rpi.awb", "rpi.ccm"])
+def test_colours_agree_if_a_file_has_only_some(own: Path, tmp_path: Path, missing: str) -> None:
+    content = sections()
+    del content[missing]
+    entry = library.add_tuning(write(tmp_path, content), like="pi-v2", name="ours").entry
+    value: Any = entry.value
+    mixed = np.array(value.colour_matrix) * value.white_balance @ value.crosstalk
+    assert mixed == pytest.approx(np.eye(3), abs=1e-4)
+    neutral = {"rpi.awb": "white_balance", "rpi.ccm": "colour_matrix"}[missing]
+    source = entry.source(neutral)
+    assert source is not None and source.source == "neutral, as the tuning file has none"
+
+
 def test_colours_are_those_of_the_temperature(tmp_path: Path) -> None:
     file = write(tmp_path, sections())
     warm = read_tuning(file, 3000.0).values
