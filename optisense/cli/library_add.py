@@ -60,7 +60,10 @@ def add_entry(
 
     if tuning is not None:
         _refuse(ies, "it can't be combined with --tuning")
-        _print_added(_from_tuning(file, tuning, camera, name, description))
+        added = _from_tuning(file, tuning, camera, name, description)
+        fields = ", ".join(field.replace("_", " ") for field in added.taken)
+        output.print(f"as {camera.like}: {fields}")
+        _print_added(added)
         return
     if str(file) == "camera" and not file.exists():
         raise typer.BadParameter(

@@ -103,8 +103,8 @@ class TuningOptions(CommandOptions):
 
     like: Annotated[str, OptionNotation("NAME")] | None = Field(
         None,
-        description="With --tuning: the camera of the library whose field of view and pixels the "
-        "new entry takes.",
+        description="With --tuning: the camera of the library whose lens and pixels the new entry "
+        "has; all else is from the file.",
     )
     temperature: Annotated[float, AfterValidator(_kelvin), OptionNotation("K")] | None = Field(
         None, description="With --tuning: colour temperature in K; 5000 if left out."

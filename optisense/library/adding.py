@@ -16,7 +16,13 @@ from optisense.design.sensor_design import Status
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.folders import held
-from optisense.library._entries import AnyEntry, LightEntry, Source, TypicalLight
+from optisense.library._entries import (
+    AnyEntry,
+    LensFacts,
+    LightEntry,
+    Source,
+    TypicalLight,
+)
 from optisense.library.loader import entry, is_own, kind_named, names
 from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
 from optisense.library.reading import KINDS, Kind, files_of, kind_of, make_entry, read_entry
@@ -25,6 +31,9 @@ from optisense.near import suggestion
 from optisense.untrusted_files import MOST_DATA, read_bytes
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
+
+OF_THE_LENS = (*LensFacts.model_fields, "distortion", "blur")
+"""Fields of a camera that depend on its lens and the pixels of its picture alone."""
 
 
 @dataclass(frozen=True)
@@ -36,12 +45,14 @@ class Added:
         name: name for designs.
         entry: entry of the part.
         file: its file in the user's folder.
+        taken: fields that were taken from another entry.
     """
 
     kind: Kind
     name: str
     entry: AnyEntry
     file: Path
+    taken: tuple[str, ...] = ()
 
 
 def add_file(file: str | Path, kind: str | None = None, name: str | None = None) -> Added:
@@ -153,7 +164,8 @@ def add_tuning(
 
     Args:
         file: JSON file.
-        like: camera of the library whose projection, field of view and size it has.
+        like: camera of the library whose lens and pixels it has: projection, field of view,
+            resolution, pixel size, focal length, f-number, distortion and blur.
         name: name for designs; None takes the name of the file.
         description: description in one line.
         temperature: colour temperature of the light for which its colours are taken, K.
@@ -167,15 +179,12 @@ def add_tuning(
     name = file.stem if name is None else name
     check_new_name(name)
     known, tuning = entry("camera", like), read_tuning(file, temperature)
-    kept = set(type(known.value).model_fields) - set(tuning.values)
+    own = known.value.model_dump(mode="json", exclude_none=True, include=set(OF_THE_LENS))
     given = Source(status=Status.SOURCED, source=f"tuning file {file.name} at {temperature:g} K")
-    sources = {
-        field: source for field, source in known.sources.items() if field in {*kept, "maker"}
-    }
+    sources = {field: source for field, source in known.sources.items() if field in own}
     sources |= dict.fromkeys(tuning.values, given)
     for field, why in tuning.derived.items():
         sources[field] = Source(status=Status.DERIVED, source=why)
-    own = known.value.model_dump(mode="json", exclude_none=True, include=kept)
     made = make_entry(
         "camera",
         name,
@@ -187,7 +196,7 @@ def add_tuning(
         {(): 1},
         str(file),
     )
-    return Added("camera", name, made, _stored("camera", name, made, {}))
+    return Added("camera", name, made, _stored("camera", name, made, {}), tuple(own))
 
 
 def check_new_name(name: str) -> None:

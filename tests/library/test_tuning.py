@@ -8,9 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import optisense as ots
 from optisense import library
+from optisense.cli import app
 from optisense.design import Status, load_design, save_design
 from optisense.design.lenses.film import film_places
 from optisense.errors import LibraryError
@@ -154,6 +156,21 @@ def test_a_camera_of_ones_own_is_added_and_used(own: Path, tmp_path: Path) -> No
     save_design(design, tmp_path / "design")
     assert load_design(tmp_path / "design").camera == design.camera
     assert not [each for each in ots.check(design) if "provenance" in each.message]
+
+
+def test_only_the_lens_and_the_pixels_are_those_of_another_camera(
+    own: Path, tmp_path: Path
+) -> None:
+    file = write(tmp_path, {"rpi.black_level": {"black_level": 4096}})
+    command = ["library", "add", "camera", "--tuning", str(file), "--like", "pi-v2"]
+    run = CliRunner().invoke(app, command)
+    assert run.exit_code == 0, run.output
+    taken = "projection, fov, resolution, pixel size, focal length, f number"
+    assert f"as pi-v2: {taken}\n" in run.output
+    camera = library.camera("our-camera")
+    assert list(camera.imaging()) == ["black_level"]
+    assert (camera.fov, camera.f_number) == (62.2, 2.0)
+    assert library.entry("camera", "our-camera").unsourced() == []
 
 
 @pytest.mark.parametrize("name", ["pi-v1", "pi-v2", "pi-v3", "pi-hq-6mm"])
