@@ -24,7 +24,13 @@ from optisense.array_types import FloatArray
 from optisense.calibration._far_field import without_drift
 from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.realism import CrossReading, Realism, distances, realism
+from optisense.calibration.realism import (
+    FLATTEST,
+    CrossReading,
+    Realism,
+    distances,
+    realism,
+)
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.geometry import Sphere
 from optisense.reading.lookup import Pixels, tilts_to_normals
@@ -38,10 +44,6 @@ INSIDE = 0.9
 """Radius up to which pixels of a contact are read, in radii of the contact: at the edge, hand
 labels and detected positions are off by a tenth.
 """
-
-FLATTEST = 100.0
-"""Largest ratio of a read radius to the true one, which stands for a flat contact: a reader that
-sees no curvature reads it."""
 
 FEWEST = 3
 """Smallest number of presses to calibrate a reader from; fewer do not represent other places."""

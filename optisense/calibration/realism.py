@@ -50,6 +50,10 @@ NOISE_SEED = 0
 """Seed of the noise with which the similarity of a model without errors is computed, so that the
 same photographs give the same figures."""
 
+FLATTEST = 100.0
+"""Largest ratio of a read radius to the true one, which stands for a flat contact: a reader that
+sees no curvature reads it. Readers that see a ball are off by some tenths."""
+
 
 @dataclass(frozen=True)
 class NoiseFigures:
@@ -112,7 +116,7 @@ class CrossReading:
     Attributes:
         name: name of the photograph.
         radius: ratio of the ball's radius that a reader calibrated on the model reads in the
-            photograph to the true one.
+            photograph to the true one; 100 (`FLATTEST`) if it sees no curvature.
         degrees: mean angle between the normals that it reads and the ball's, degrees.
         radius_back, degrees_back: the same of a reader that is calibrated on the photographs, in
             the model's picture.
@@ -180,6 +184,14 @@ class Realism:
     def as_data(self) -> dict[str, Any]:
         """Return all figures, ready for JSON."""
         return asdict(self)
+
+
+def sees_no_curvature(radius: float) -> bool:
+    """Return whether a ratio of radii, or the median of ratios, stands for a flat contact.
+
+    The median of an even number, of which half stand for it, is half of `FLATTEST` or more.
+    """
+    return radius >= 0.5 * FLATTEST
 
 
 def realism(

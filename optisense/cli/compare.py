@@ -92,17 +92,24 @@ def reading_lines(found: Realism) -> list[str]:
     """
     if not found.readings:
         return []
-    return [
-        f"a reader calibrated on {one} reads the balls of {other} "
-        f"{found.median_reading(radius):.2f} times as large as they are, and normals with an error "
-        f"of {found.median_reading(degrees):.1f} degrees"
-        for one, other, radius, degrees in (
-            ("the model", "the photographs", "radius", "degrees"),
-            ("the photographs", "the model", "radius_back", "degrees_back"),
-            ("the photographs", "other photographs", "radius_alone", "degrees_alone"),
+    from optisense.calibration.realism import sees_no_curvature
+
+    lines = []
+    for one, other, of_radius, of_degrees in (
+        ("the model", "the photographs", "radius", "degrees"),
+        ("the photographs", "the model", "radius_back", "degrees_back"),
+        ("the photographs", "other photographs", "radius_alone", "degrees_alone"),
+    ):
+        radius, degrees = found.median_reading(of_radius), found.median_reading(of_degrees)
+        if math.isnan(radius):
+            continue
+        reads = f"reads the balls of {other} {radius:.2f} times as large as they are, and"
+        if sees_no_curvature(radius):
+            reads = f"sees no curvature in the balls of {other}, and reads"
+        lines.append(
+            f"a reader calibrated on {one} {reads} normals with an error of {degrees:.1f} degrees"
         )
-        if not math.isnan(found.median_reading(radius))
-    ]
+    return lines
 
 
 def print_comparison(found: Comparison) -> None:

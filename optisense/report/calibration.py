@@ -14,6 +14,7 @@ from optisense.report.comparison import (
     noise_row,
     press_row,
     press_section,
+    radius_cell,
 )
 
 FIGURES = {
@@ -116,7 +117,8 @@ def summary_rows(found: Calibration) -> list[tuple[str, ...]]:
     for name, words in READINGS.items():
         values = [math.nan if each is None else each.median_reading(name) for each in columns]
         if not all(map(math.isnan, values)):  # else there are too few presses for these readers
-            cells = ("" if math.isnan(value) else f"{value:.2f}" for value in values)
+            text = radius_cell if name.startswith("radius") else "{:.2f}".format
+            cells = ("" if math.isnan(value) else text(value) for value in values)
             rows.append((words, *cells, ""))
     ratios = [side.realism.background.ratio for side in (found.before, found.after)]
     rows.append(("background, dB", *(f"{ratio:.1f}" for ratio in ratios), "", "", ""))

@@ -10,7 +10,13 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.calibration.comparing import Comparison
-from optisense.calibration.realism import PATCH, PressRealism, Realism, distances
+from optisense.calibration.realism import (
+    PATCH,
+    PressRealism,
+    Realism,
+    distances,
+    sees_no_curvature,
+)
 from optisense.design import SensorDesign
 from optisense.figures import new_figure
 from optisense.report._drawing import figure_uri
@@ -139,9 +145,14 @@ def reading_rows(found: Realism) -> list[tuple[str, ...]]:
         pairs = [(each.radius, each.degrees), (each.radius_back, each.degrees_back)]
         if each.radius_alone is not None and each.degrees_alone is not None:
             pairs.append((each.radius_alone, each.degrees_alone))
-        cells = [text for one, other in pairs for text in (f"{one:.2f}", f"{other:.1f}")]
+        cells = [text for one, other in pairs for text in (radius_cell(one), f"{other:.1f}")]
         rows.append((each.name, *cells))
     return rows
+
+
+def radius_cell(radius: float) -> str:
+    """Return the ratio of a read radius to the true one as text."""
+    return "no curvature" if sees_no_curvature(radius) else f"{radius:.2f}"
 
 
 def press_section(found: Comparison, index: int) -> dict[str, Any]:

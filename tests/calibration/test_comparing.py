@@ -28,8 +28,10 @@ from optisense.calibration.model_pictures import ModelPictures
 from optisense.calibration.realism import realism, similarity
 from optisense.calibration.seen_contacts import ContactFinder, SeenContact, contact_of
 from optisense.cli import app
+from optisense.cli.compare import reading_lines
 from optisense.design import set_value
 from optisense.errors import CalibrationError
+from optisense.report.comparison import reading_rows
 
 from .conftest import PHOTONS, PLACES, SIZE, SMALL
 
@@ -317,6 +319,25 @@ def test_readers_of_pictures_that_are_alike_read_each_others_balls(
     assert np.median([each.radius for each in read]) < 0.93
     assert np.median([each.radius_back for each in read]) > 1.07
     assert cross_readings(photographs.subset([0, 1]), found.seen[:2], half, rays, axes, 2.0) == ()
+
+
+def test_readers_that_see_no_curvature_are_told_in_words(
+    mini: OpticalModel, photographs: Photographs, likeness: Comparison
+) -> None:
+    """The responses are reversed, so that balls look like hollows."""
+    ground = likeness.pictures.background
+    hollow = replace(
+        likeness.pictures, presses=tuple(2.0 * ground - each for each in likeness.pictures.presses)
+    )
+    rays, axes = mini.chief_rays(SIZE), mini.design.camera.axes()
+    read = cross_readings(photographs, likeness.seen, hollow, rays, axes, 2.0)
+    found = replace(likeness.realism, readings=read)
+    start = (
+        "a reader calibrated on the model sees no curvature in the balls of the photographs, and"
+    )
+    assert reading_lines(found)[0].startswith(start)
+    assert reading_rows(found)[0][1] == "no curvature"
+    assert "times as large as they are" in reading_lines(likeness.realism)[0]
 
 
 def test_seven_presses_tell_what_readers_of_the_photographs_alone_achieve(
