@@ -66,6 +66,10 @@ LARGEST_INTEGER = 2**63 - 1
 _SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 """A surrogate as JSON escapes it; a high and a low one after another are one character."""
 
+SEPARATORS = ",", ";", "\t"
+"""Characters that separate values of tables: spreadsheet programs write semicolons in countries
+with decimal commas, and tabs into text files."""
+
 COPY_AGAIN = "Check that this is the right file, and copy or make it again"
 
 Error = type[OptiSenseError]
@@ -190,19 +194,23 @@ def parse_json(text: str, source: str, error: Error, what: str = "the file") -> 
     return found
 
 
-def read_table(path: Path, error: Error, padded: bool = False) -> list[dict[str, str]]:
+def read_table(path: Path, error: Error, by_hand: bool = False) -> list[dict[str, str]]:
     """Return the rows of a CSV file as text, by column.
 
     Args:
         error: class of the exception to raise.
-        padded: whether a row may have fewer values than there are columns, as in tables that are
-            written by hand; the others are empty.
+        by_hand: whether the table may be written by hand or by a spreadsheet program: its values
+            may be separated by semicolons or tabs, whichever is most frequent in its first line,
+            and a row may have fewer values than there are columns; the others are empty.
 
     Raises:
         error: the file can't be read, as in `read_text`, or is no such table; it names the line.
     """
     text = read_text(path, MOST_TABLE, error, "the table")
-    reader = csv.DictReader(io.StringIO(text, newline=""), restval="" if padded else None)
+    separator = max(SEPARATORS, key=text.partition("\n")[0].count) if by_hand else ","
+    reader = csv.DictReader(
+        io.StringIO(text, newline=""), restval="" if by_hand else None, delimiter=separator
+    )
     rows = []
     try:
         for row in reader:

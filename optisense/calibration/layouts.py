@@ -188,7 +188,7 @@ def _picture(folder: Path, name: str, where: str) -> tuple[ByteArray, str]:
 
 
 def _rows(path: Path) -> list[dict[str, str]]:
-    rows = read_table(path, CalibrationError, padded=True)
+    rows = read_table(path, CalibrationError, by_hand=True)
     if not rows:
         raise CalibrationError(
             "the table has no presses", where=str(path), hint="Add a row for each photograph"
@@ -221,11 +221,24 @@ def _number(row: Mapping[str, Any], column: str, where: str) -> float | None:
     try:
         return _length(float(value), where, column)
     except ValueError:
+        if _is_number(pointed := value.strip().replace(",", ".")):
+            raise CalibrationError(
+                f"'{brief(value)}' under '{column}' has a decimal comma",
+                where=where,
+                hint=f"Write it with a point: {pointed}",
+            ) from None
         raise CalibrationError(
             f"'{brief(value)}' under '{column}' is no number",
             where=where,
             hint="Correct the table",
         ) from None
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _centre(row: Mapping[str, Any], where: str) -> tuple[float, float] | None:

@@ -55,6 +55,13 @@ def test_a_ball_is_given_as_diameter_or_indenter_or_for_all(tmp_path: Path) -> N
     assert read_photographs(nothing, 4.0).presses[0].diameter == 4.0
 
 
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_tables_of_spreadsheet_programs_are_read(tmp_path: Path, separator: str) -> None:
+    table = "file,diameter,column,row\na.png,6.31,3,4\n".replace(",", separator)
+    press = read_photographs(own_folder(tmp_path / "f", table)).presses[0]
+    assert (press.diameter, press.centre) == (6.31, (3.0, 4.0))
+
+
 def test_a_folder_of_gs_sdk(tmp_path: Path) -> None:
     Image.fromarray(picture(0)).save(tmp_path / "background.png")
     place = tmp_path / "6.000mm" / "0"
@@ -100,6 +107,7 @@ def test_taxims_data_pack_is_stored_blue_first(tmp_path: Path) -> None:
         ("file,diameter\n", "no presses"),
         ("file,indenter\na.png,cylinder:3\n", "no ball"),
         ("file,diameter,column\na.png,6,3\n", "but not both"),
+        ("file;diameter\na.png;6,31\n", "'6,31' under 'diameter' has a decimal comma"),
     ],
 )
 def test_a_table_that_makes_no_sense_is_refused(tmp_path: Path, table: str, words: str) -> None:
