@@ -44,6 +44,10 @@ MOST_PRESSES = 1000
 MIDDLE = 0.5
 """Offset from other tools' indices of pixels to positions from the picture's edge."""
 
+SAME_BALL = 1e-3
+"""Largest relative difference between two statements of one ball's diameter: that of rounding to
+three digits. Contacts are found to some hundredths of their radius."""
+
 Reader = Callable[[Path, float | None], Photographs]
 
 
@@ -256,23 +260,29 @@ def _ball(row: Mapping[str, Any], where: str, usual: float | None) -> float:
     """Return the diameter of the ball of a row, mm."""
     given = _number(row, "diameter", where)
     text = (row.get("indenter") or "").strip()
-    if given is not None:
-        return given
-    if text:
-        try:
-            indenter = parse_indenter(text)
-        except ContactError as error:
-            raise CalibrationError(error.message, where=where, hint=error.hint) from None
-        if not isinstance(indenter, Sphere):
-            raise CalibrationError(
-                f"'{brief(text)}' is no ball, and only balls are compared",
-                where=where,
-                hint="Leave this photograph out, or write sphere:RADIUS",
-            )
-        return 2.0 * indenter.radius
-    if usual is None:
-        raise _no_diameter(where)
-    return usual
+    if not text:
+        found = usual if given is None else given
+        if found is None:
+            raise _no_diameter(where)
+        return found
+    try:
+        indenter = parse_indenter(text)
+    except ContactError as error:
+        raise CalibrationError(error.message, where=where, hint=error.hint) from None
+    if not isinstance(indenter, Sphere):
+        raise CalibrationError(
+            f"'{brief(text)}' is no ball, and only balls are compared",
+            where=where,
+            hint="Leave this photograph out, or write sphere:RADIUS",
+        )
+    found = 2.0 * indenter.radius
+    if given is not None and not math.isclose(given, found, rel_tol=SAME_BALL):
+        raise CalibrationError(
+            f"the diameter is {given:g} mm, but '{brief(text)}' has one of {found:g} mm",
+            where=where,
+            hint="Correct one of them; the number after 'sphere:' is the radius",
+        )
+    return found
 
 
 def _no_diameter(where: str) -> CalibrationError:

@@ -51,6 +51,8 @@ def test_what_is_saved_is_read_again(tmp_path: Path) -> None:
 def test_a_ball_is_given_as_diameter_or_indenter_or_for_all(tmp_path: Path) -> None:
     indenter = own_folder(tmp_path / "i", "file,indenter\na.png,sphere:3\n")
     assert read_photographs(indenter).presses[0].diameter == 6.0
+    both = own_folder(tmp_path / "b", "file,diameter,indenter\na.png,6,sphere:3\n")
+    assert read_photographs(both).presses[0].diameter == 6.0
     nothing = own_folder(tmp_path / "n", "file\na.png\n")
     assert read_photographs(nothing, 4.0).presses[0].diameter == 4.0
 
@@ -106,6 +108,7 @@ def test_taxims_data_pack_is_stored_blue_first(tmp_path: Path) -> None:
         ("name,diameter\na.png,6\n", "column 'file' is missing"),
         ("file,diameter\n", "no presses"),
         ("file,indenter\na.png,cylinder:3\n", "no ball"),
+        ("file,diameter,indenter\na.png,6,sphere:5\n", "is 6 mm, but 'sphere:5' has one of 10 mm"),
         ("file,diameter,column\na.png,6,3\n", "but not both"),
         ("file;diameter\na.png;6,31\n", "'6,31' under 'diameter' has a decimal comma"),
     ],
