@@ -14,6 +14,7 @@ from optisense.calibration._fitted_numbers import (
     fitted_numbers,
     with_known_total,
 )
+from optisense.calibration._orientation import orientation_notes
 from optisense.calibration.comparing import Comparison, usable
 from optisense.calibration.families import LEDS
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
@@ -96,6 +97,7 @@ def calibrate(
         )
         figures = realism_and_readings(model, full, places, shown)
         comparisons.append(Comparison(full, tuple(places), shown, figures, ()))
+    notes += orientation_notes(full, places, comparisons[0].pictures)
     return Calibration(
         design=fitted,
         exposure=exposure,

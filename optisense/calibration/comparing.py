@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from optisense.calibration._contact_placing import FIT_WIDTH, placed, scaled_contact
 from optisense.calibration._cross_readings import realism_and_readings
+from optisense.calibration._orientation import orientation_notes
 from optisense.calibration.model_pictures import ModelPictures, model_pictures
 from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import Realism
@@ -101,4 +102,5 @@ def compare(
         seen = [scaled_contact(place, 1.0 / factor) for place in found]
     pictures = model_pictures(model, kept, seen, photons=photons, seed=seed, progress=progress)
     figures = realism_and_readings(model, kept, seen, pictures)
+    notes += orientation_notes(kept, seen, pictures)
     return Comparison(kept, tuple(seen), pictures, figures, tuple(notes))

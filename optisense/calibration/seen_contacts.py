@@ -199,12 +199,18 @@ def check_shape(photographs: Photographs, model: OpticalModel) -> None:
     """Raise CalibrationError if photographs are wider or narrower than the model's pictures."""
     width, height = photographs.size
     own_width, own_height = model.design.camera.resolution
-    if abs(width * own_height / (height * own_width) - 1.0) > 1.5 / min(width, height):
+    rounding = 1.5 / min(width, height)
+    if abs(width * own_height / (height * own_width) - 1.0) > rounding:
+        hint = (
+            "Crop the photographs as the camera of the design is cropped, or set "
+            "camera.resolution to their shape"
+        )
+        if abs(height * own_height / (width * own_width) - 1.0) <= rounding:
+            hint = "Turn the photographs by 90 degrees"
         raise CalibrationError(
             f"the photographs have {width} x {height} pixels, and the design's camera "
             f"{own_width} x {own_height}, another shape",
-            hint="Crop the photographs as the camera of the design is cropped, or set "
-            "camera.resolution to their shape",
+            hint=hint,
         )
 
 

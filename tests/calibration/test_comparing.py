@@ -23,10 +23,16 @@ from optisense.calibration import (
 )
 from optisense.calibration._cross_readings import cross_readings
 from optisense.calibration._far_field import without_noise
+from optisense.calibration._orientation import orientation_notes
 from optisense.calibration.contact_finding import find_contact
-from optisense.calibration.model_pictures import ModelPictures
+from optisense.calibration.model_pictures import ModelPictures, model_pictures
 from optisense.calibration.realism import realism, similarity
-from optisense.calibration.seen_contacts import ContactFinder, SeenContact, contact_of
+from optisense.calibration.seen_contacts import (
+    ContactFinder,
+    SeenContact,
+    check_shape,
+    contact_of,
+)
 from optisense.cli import app
 from optisense.cli.compare import reading_lines
 from optisense.design import set_value
@@ -172,6 +178,44 @@ def test_a_turned_sensor_is_told(mini: OpticalModel, small_photographs: Photogra
     assert found.realism.median("unexplained") > 0.5
     turns = [abs(press.turn[0]) for press in found.realism.presses]
     assert min(turns) > 120.0
+
+
+def changed(photographs: Photographs, *steps: int) -> Photographs:
+    """Photographs with their rows, columns and channels taken in steps."""
+    change = tuple(slice(None, None, step) for step in steps)
+
+    def of(picture: np.ndarray) -> np.ndarray:
+        return np.ascontiguousarray(picture[change])
+
+    presses = [replace(each, picture=of(each.picture)) for each in photographs.presses]
+    return replace(photographs, background=of(photographs.background), presses=tuple(presses))
+
+
+def test_exchanged_colours_are_told(photographs: Photographs, likeness: Comparison) -> None:
+    blue_first = changed(photographs, 1, 1, -1)
+    (note,) = orientation_notes(blue_first, likeness.seen, likeness.pictures)
+    assert "stored with red and blue exchanged" in note
+    assert orientation_notes(photographs, likeness.seen, likeness.pictures) == []
+
+
+def test_mirrored_photographs_are_told(mini: OpticalModel, small_photographs: Photographs) -> None:
+    mirrored = changed(small_photographs.subset([0]), 1, -1, 1)
+    (seen,) = ContactFinder(mirrored).contacts()
+    assert seen is not None
+    pictures = model_pictures(mini, mirrored, [seen], photons=PHOTONS, seed=5)
+    (note,) = orientation_notes(mirrored, [seen], pictures)
+    assert note.startswith("the photographs seem to be mirrored left to right")
+
+
+def test_photographs_of_the_transposed_shape_are_to_be_turned(
+    mini: OpticalModel, small_photographs: Photographs
+) -> None:
+    first = small_photographs.presses[0]
+    upright = replace(first, picture=first.picture.transpose(1, 0, 2))
+    background = small_photographs.background.transpose(1, 0, 2)
+    with pytest.raises(CalibrationError, match="another shape") as raised:
+        check_shape(Photographs(background, (upright,)), mini)
+    assert raised.value.hint == "Turn the photographs by 90 degrees"
 
 
 def test_the_similarity_is_one_of_equals_and_less_of_opposites() -> None:
