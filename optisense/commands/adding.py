@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from optisense.commands.options import CommandOptions, OptionNotation
 from optisense.design import Status
+from optisense.design.colour import WAVELENGTHS
 
 LONGEST_SIDE = 1000.0
 """Largest length of a light's window or body, mm; a larger one is an error of the unit."""
@@ -24,6 +25,13 @@ def above_0(value: float) -> float:
     """
     if not 0.0 < value < float("inf"):
         raise ValueError(f"{value:g} is not above 0")
+    return value
+
+
+def _wavelength(value: float) -> float:
+    low, high = WAVELENGTHS
+    if not low <= value <= high:
+        raise ValueError(f"{value:g} is no wavelength of a light in nm, from {low:g} to {high:g}")
     return value
 
 
@@ -74,7 +82,7 @@ class IesOptions(CommandOptions):
     flux: Annotated[Above0, OptionNotation("MW")] | None = Field(
         None, description="With an .ies: radiant flux in mW."
     )
-    wavelength: Annotated[Above0, OptionNotation("NM")] | None = Field(
+    wavelength: Annotated[float, AfterValidator(_wavelength), OptionNotation("NM")] | None = Field(
         None, description="With an .ies: dominant wavelength in nm."
     )
     current: Annotated[Above0, OptionNotation("MA")] | None = Field(

@@ -13,6 +13,10 @@ NAMED_COLOURS = {
 }
 """R, G and B of the named colours."""
 
+WAVELENGTHS = 200.0, 2000.0
+"""Range of dominant wavelengths of lights, nm: from the shortest of LEDs to beyond what sensors of
+silicon see. A value outside is an error of the unit, such as 0.625 for 625 nm."""
+
 
 def srgb_curve(linear: NDArray[np.floating]) -> NDArray[np.float64]:
     """Return the sRGB encoding (...), 0 to 1 before rounding, of linear values (...), 0 to 1."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Any, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from optisense.design.camera import ImagingModel, Pixels
+from optisense.design.colour import WAVELENGTHS
 from optisense.design.emitters import LightModel
 from optisense.design.fields import Colour, InconsistentValueError, Model, Name, Number, Positive
 from optisense.design.materials import CoatingModel, Material
@@ -23,12 +25,24 @@ NOT_NUMBERS = frozenset({"kind", "shape", "library", "colour", "part", "maker"})
 """Fields of an entry that need no source: words, and the names of colours."""
 
 
+def _date(value: Any) -> Any:
+    """Return a date as text; YAML files may have a year as a number.
+
+    Raises:
+        ValueError: it is no date.
+    """
+    text = str(value) if type(value) is int else value
+    if isinstance(text, str) and re.fullmatch(r"\d{4}(-\d{2}(-\d{2})?)?", text) is None:
+        raise ValueError("should be a year, year-month or day, such as 2026-03")
+    return text
+
+
 class Source(Model):
     """Source of one or several numbers."""
 
     status: Status
     source: Text
-    date: Annotated[str, Field(pattern=r"^\d{4}(-\d{2}(-\d{2})?)?$")] | None = None
+    date: Annotated[str, BeforeValidator(_date)] | None = None
     """Date when the source was published, or else read (year, year-month or full)."""
 
 
@@ -81,7 +95,7 @@ class TypicalLight(Model):
     """Output of one colour of a light at its nominal current.
 
     Attributes:
-        colour: R, G, B for a design's light group.
+        colour: R, G, B for a design's light group, not all 0.
         part: order number at the maker.
         wavelength: dominant wavelength, nm.
         current: nominal current, mA.
@@ -90,9 +104,15 @@ class TypicalLight(Model):
 
     colour: Colour
     part: Text | None = None
-    wavelength: Positive | None = None
+    wavelength: Annotated[Number, Field(ge=WAVELENGTHS[0], le=WAVELENGTHS[1])] | None = None
     current: Positive | None = None
     flux: Positive | None = None
+
+    @model_validator(mode="after")
+    def _check_colour(self) -> TypicalLight:
+        if max(self.colour) <= 0.0:
+            raise InconsistentValueError("the light has no colour", ("colour",), "Give one above 0")
+        return self
 
 
 class LightEntry(Entry[LightModel]):

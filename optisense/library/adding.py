@@ -122,7 +122,7 @@ def add_ies(
 
     Raises:
         LibraryError: the file can't be read or is damaged (the message names the line), there is
-            no flux or no colour, or the name is taken.
+            no flux, or the name is taken.
         OutputError: the user's folder can't be written.
     """
     file = Path(file)
@@ -136,11 +136,8 @@ def add_ies(
     given |= {name: getattr(light, name) for name in ("wavelength", "current", "flux")}
     about = Source(status=Status.SOURCED, source=_about(data) or file.name, date=source.date)
     sources = {field: source for field, value in given.items() if value is not None}
-    if not light.flux or max(light.colour) <= 0.0:
-        raise LibraryError(
-            "a light needs a flux above 0, and a colour with a value above 0",
-            hint="Give its radiant flux in mW, and its colour as R,G,B from 0 to 1",
-        )
+    if not light.flux:
+        raise LibraryError("the light has no flux", hint="Give its radiant flux in mW")
     entry = LightEntry(
         description=description or f"Light with the IES file {file.name}",
         value=IesEmitter(file=f"{name}.ies"),

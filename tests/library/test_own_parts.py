@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 
 from optisense import library, sensors
 from optisense.design import IesEmitter, LightGroup, SensorDesign, load_design
+from optisense.design.yaml_writer import to_yaml
 from optisense.errors import DesignError, LibraryError, OutputError
 from optisense.library.loader import FOLDER
+from optisense.library.own_parts import HEADS
 
 GEL = """\
 description: Our gel
@@ -123,6 +126,32 @@ class TestAdding:
 
 
 class TestRefusals:
+    @pytest.mark.parametrize(
+        ("old", "new", "message"),
+        [
+            ("wavelength: 625.0", "wavelength: 0.625", "'typical.red.wavelength' = 0.625"),
+            ("colour: [1.0, 0.0, 0.0]", "colour: [0, 0, 0]", "the light has no colour"),
+            ('date: "2026"', "date: 3.2026", "valid string"),
+            ('date: "2026"', 'date: "3.2026"', "a year, year-month or day, such as 2026-03"),
+        ],
+    )
+    def test_slips_in_data_of_an_led_are_told(
+        self, own: Path, tmp_path: Path, old: str, new: str, message: str
+    ) -> None:
+        text = to_yaml(library.entry("light", "smd-3528"), HEADS["light"])
+        assert old in text
+        file = tmp_path / "my-led.yaml"
+        file.write_text(text.replace(old, new, 1))
+        with pytest.raises(LibraryError, match=re.escape(message)) as caught:
+            library.add_file(file)
+        assert str(caught.value.where).startswith(f"{file}:")
+
+    def test_a_year_may_be_written_as_a_number(self, own: Path, tmp_path: Path) -> None:
+        text = to_yaml(library.entry("light", "smd-3528"), HEADS["light"])
+        file = tmp_path / "my-led.yaml"
+        file.write_text(text.replace('date: "2026"', "date: 2026"))
+        assert library.add_file(file).entry.sources["size"].date == "2026"
+
     @pytest.mark.parametrize(
         ("old", "new", "line", "message"),
         [
