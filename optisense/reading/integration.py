@@ -12,6 +12,7 @@ from scipy.ndimage import binary_erosion
 from scipy.sparse.linalg import factorized
 
 from optisense.array_types import FloatArray
+from optisense.errors import TaskError
 from optisense.reading.tilts import STEEPEST
 from optisense.reading.untouched import UntouchedSurface
 
@@ -103,9 +104,22 @@ class NormalIntegrator:
 
         The integration constant is set so that the median along the border of the view is 0, as a
         contact should leave most of the border untouched.
+
+        Raises:
+            TaskError: there is not one normal for each pixel, or one of a seen pixel is not finite.
         """
         untouched = self._untouched
         normal = np.asarray(normals, dtype=np.float64)
+        if normal.shape != untouched.points.shape:
+            raise TaskError(
+                f"normals of shape {normal.shape} do not fit the rays of {untouched.points.shape}",
+                hint="Give the normals of a picture at the resolution of the rays",
+            )
+        if not np.isfinite(normal[untouched.seen]).all():
+            raise TaskError(
+                "normals of pixels that see the sensing surface are not finite",
+                hint="Give these pixels the untouched normal, or leave them out of the seen ones",
+            )
         steps = [_Steps.between(untouched, normal, axis) for axis in (1, 0)]
         back = np.zeros(untouched.seen.shape)
         for _ in range(ROUNDS):

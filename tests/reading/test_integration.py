@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from optisense.errors import TaskError
 from optisense.reading.integration import GridIntegrator, NormalIntegrator
 from optisense.reading.untouched import UntouchedSurface
 
@@ -119,3 +120,15 @@ def test_depth_on_a_cylinder_is_the_distance_from_it() -> None:
         np.broadcast_to(depth, SHAPE)[5:-5, 5:-5], abs=1e-4
     )
     assert np.isnan(untouched.depth(np.full((2, 3), np.nan))).all()
+
+
+def test_normals_that_give_no_depth_are_refused() -> None:
+    """One NaN would spread over all pixels."""
+    untouched = rays(8.0, np.inf)
+    normals = untouched.normals.copy()
+    normals[40, 50] = np.nan
+    integrator = NormalIntegrator(untouched)
+    with pytest.raises(TaskError, match="not finite"):
+        integrator.depths(normals)
+    with pytest.raises(TaskError, match="do not fit the rays"):
+        integrator.depths(normals[:-1])
