@@ -203,6 +203,13 @@ class CalibratedSensor:
             if image.contact_mask.sum() >= LEAST_PIXELS:
                 break
         else:
+            if image is not None:
+                width, height = self.resolution
+                raise TaskError(
+                    f"a ball of {settings.radius:g} mm covers {image.contact_mask.sum()} pixels of "
+                    f"a picture of {width}x{height}, and a reader needs {LEAST_PIXELS}",
+                    hint="Use larger pictures, press deeper, or check the camera's direction",
+                )
             raise TaskError(
                 f"no ball of {settings.radius:g} mm could be pressed within the camera's view",
                 hint="Press less deep, or check the camera's direction",

@@ -130,6 +130,13 @@ def test_what_cannot_work_is_told_before_any_picture(lambertian: Any) -> None:
         reconstruct(lambertian, ReconstructionSettings(**(LAMBERTIAN | {"presses": 2})), aside)
 
 
+def test_pictures_too_small_for_a_ball_are_told(lambertian: Any) -> None:
+    small = ReconstructionSettings(**(LAMBERTIAN | {"resolution": (8, 6), "skin": "conforming"}))
+    ball = {"ball": Contact(Sphere(1.5), at=(0, 0), depth=0.5)}
+    with pytest.raises(TaskError, match="pixels of a picture of 8x6, and a reader needs 20"):
+        reconstruct(lambertian, small, ball)
+
+
 @pytest.mark.slow
 def test_a_real_sensor_gives_a_ball_back(mini: OpticalModel) -> None:
     settings = ReconstructionSettings(presses=8, resolution=(96, 72), photons=60_000)
