@@ -13,11 +13,13 @@ from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import PATCH
 from optisense.calibration.seen_contacts import SeenContact
 
+HALF_TURN = "turned by 180 degrees"
+
 PLACINGS = {
     "": (1, 1),
     "mirrored left to right": (1, -1),
     "mirrored top to bottom": (-1, 1),
-    "turned by 180 degrees": (-1, -1),
+    HALF_TURN: (-1, -1),
 }
 """Steps along rows and columns by which a picture is mirrored or turned, by the words for it."""
 
@@ -53,10 +55,10 @@ def orientation_notes(
     if best < max(LEAST_LIKENESS, found[""] + CLEARLY):
         return []
     ways = " or ".join(words for words, value in found.items() if value >= best - ABOUT_EQUAL)
+    instead = ", or reverse camera.up of the design" if ways == HALF_TURN else ""
     return [
         f"the photographs seem to be {ways}: so changed, they have a likeness of {best:.2f} with "
-        f"the model, and {found['']:.2f} as they are; correct the files and their labels (for a "
-        "turn by 180 degrees, camera.up of the design can be reversed instead)"
+        f"the model, and {found['']:.2f} as they are; correct the files and their labels{instead}"
     ]
 
 
