@@ -8,6 +8,16 @@ import pytest
 
 import optisense as ots
 from optisense.calibration import Photographs, photograph_model
+from optisense.calibration._fit_rounds import FitRounds
+from optisense.calibration._fitted_numbers import FittedNumber, fitted_numbers, with_known_total
+from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
+from optisense.calibration.comparing import usable
+from optisense.calibration.kept_renderings import KEPT_NOWHERE
+from optisense.calibration.quantities import designed
+from optisense.calibration.quantity import FitQuantity
+from optisense.calibration.seen_contacts import ContactFinder, SeenContact
+from optisense.calibration.settings import CalibrationSettings
+from optisense.design import SensorDesign
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -46,3 +56,37 @@ def small_photographs(mini: OpticalModel) -> Photographs:
     """The same presses in small photographs, which are compared and fitted in less time."""
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES]
     return photograph_model(mini, balls, resolution=SMALL, photons=PHOTONS, seed=5)
+
+
+@pytest.fixture(scope="session")
+def seen(photographs: Photographs) -> list[SeenContact]:
+    found = [place for place in ContactFinder(photographs).contacts() if place is not None]
+    assert len(found) == len(photographs.presses)
+    return found
+
+
+@pytest.fixture(scope="session")
+def layers(
+    mini: OpticalModel, photographs: Photographs, seen: list[SeenContact]
+) -> LayeredPictures:
+    """The layers of the photographs; tests don't change them."""
+    return layered_pictures(mini, photographs, seen, PHOTONS, 5)
+
+
+def numbers_of_fit(
+    design: SensorDesign,
+    photographs: Photographs,
+    chosen: list[FitQuantity],
+    settings: CalibrationSettings,
+) -> list[FittedNumber]:
+    """Return the numbers that `calibrate` finds, without its comparisons of the photographs with
+    the designs before and after the fit, for which it renders both.
+    """
+    full, seen, _ = usable(photographs, refine=settings.refine)
+    rounds = FitRounds(
+        design, ots.OpticalModel(design), full, seen, chosen, settings, KEPT_NOWHERE,
+        lambda what, done, count: None,
+    )  # fmt: skip
+    solution = rounds.run()
+    fitted = designed(design, chosen, solution.steps)
+    return fitted_numbers(chosen, with_known_total(chosen, solution, fitted), fitted)

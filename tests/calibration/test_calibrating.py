@@ -23,13 +23,13 @@ from optisense.calibration.families import chosen_families
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import distances
-from optisense.calibration.seen_contacts import ContactFinder, SeenContact
+from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.cli import app
 from optisense.design import Status, get_value, set_value
 from optisense.errors import CalibrationError
 
-from .conftest import PHOTONS, PLACES, SMALLER
+from .conftest import PHOTONS, PLACES, SMALLER, numbers_of_fit
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -52,20 +52,6 @@ HIDDEN = {
 
 LOWER_AND_POWERS = "lights.blue.along", "lights.red.flux", "lights.green.flux", "lights.blue.flux"
 """Numbers of a fit that finds the height of a row of lights."""
-
-
-@pytest.fixture(scope="module")
-def seen(photographs: Photographs) -> list[SeenContact]:
-    found = [place for place in ContactFinder(photographs).contacts() if place is not None]
-    assert len(found) == len(photographs.presses)
-    return found
-
-
-@pytest.fixture(scope="module")
-def layers(
-    mini: OpticalModel, photographs: Photographs, seen: list[SeenContact]
-) -> LayeredPictures:
-    return layered_pictures(mini, photographs, seen, PHOTONS, 5)
 
 
 def hidden_steps(chosen: list) -> np.ndarray:  # type: ignore[type-arg]
@@ -305,21 +291,17 @@ def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
     assert list(found.design.lights) == list(design.lights)
 
 
-def test_a_row_of_lights_that_lies_lower_is_found(
-    mini: OpticalModel, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_row_of_lights_that_lies_lower_is_found(mini: OpticalModel) -> None:
     lower = -0.8  # mm; more than twice the step of the difference quotients
     real = ots.OpticalModel(with_lights_moved(mini.design, "blue", lower))
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES[:2]]
     shown = photograph_model(real, balls, resolution=SMALLER, photons=200_000, seed=5)
-    monkeypatch.setattr(  # one number of a body is enough
-        "optisense.calibration.calibrating.quantities_of",
-        lambda *of: [q for q in quantities_of(*of) if q.path in LOWER_AND_POWERS],
-    )
     settings = CalibrationSettings(
         families=chosen_families([], ["lights"]), rounds=3, photons=200_000, held_out=()
     )
-    found = calibrate(mini.design, shown, settings)
-    moved = next(each for each in found.numbers if each.path == "lights.blue.along")
+    every = quantities_of(mini.design, settings.families)
+    chosen = [each for each in every if each.path in LOWER_AND_POWERS]  # one of a body is enough
+    found = numbers_of_fit(mini.design, shown, chosen, settings)
+    moved = next(each for each in found if each.path == "lights.blue.along")
     assert moved.after == pytest.approx(lower, abs=0.2)
     assert moved.determined

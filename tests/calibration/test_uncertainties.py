@@ -11,15 +11,10 @@ from scipy.ndimage import gaussian_filter
 import optisense as ots
 from optisense.calibration import Photographs
 from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._layered_pictures import (
-    LayeredPictures,
-    averaged,
-    layered_pictures,
-)
+from optisense.calibration._layered_pictures import LayeredPictures, averaged
 from optisense.calibration._solution import jackknife_covariance
 from optisense.calibration.quantities import quantities_of
-from optisense.calibration.seen_contacts import ContactFinder
-from optisense.optics import OpticalModel
+from optisense.calibration.seen_contacts import SeenContact
 
 CLUSTERS, ROWS, UNKNOWNS = 12, 200, 5
 """Size of a linear fit: as many clusters as there are blocks in a picture of 4 to 3."""
@@ -56,11 +51,9 @@ def test_the_priors_are_the_uncertainty_without_information() -> None:
 
 
 def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
-    mini: OpticalModel, photographs: Photographs
+    photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
 ) -> None:
     """The tone curve is steep in the dark, and makes errors of the light large there."""
-    seen = [place for place in ContactFinder(photographs).contacts() if place is not None]
-    layers = layered_pictures(mini, photographs, seen, 100_000, 5)
     rng = np.random.default_rng(4)
 
     def noisy() -> LayeredPictures:
