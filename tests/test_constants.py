@@ -7,9 +7,8 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 
-from syntax_trees import syntax_tree
+from syntax_trees import FOLDERS, ROOT, statements, syntax_tree
 
-ROOT = Path(__file__).parents[1]
 LEAST_WORDS = 5
 """A docstring of fewer words names no meaning, unit and reason."""
 
@@ -30,9 +29,6 @@ HEADLESS = (
 )
 """First words of docstrings that do not name the number."""
 
-
-FOLDERS = ("optisense", "paper", "studio", "benchmarks", "scripts", "examples")
-"""Folders of the repository whose constants are checked."""
 
 CODES = {"Enum", "IntEnum", "IntFlag", "Flag"}
 """Base classes whose members are codes: their numbers have no unit and no reason."""
@@ -108,7 +104,7 @@ def constants(root: Path, *folders: str) -> list[tuple[str, str]]:
 def bodies(module: ast.Module) -> Iterator[list[ast.stmt]]:
     """The statements of a module, and of each class that does not define codes."""
     yield module.body
-    for node in ast.walk(module):
+    for node in statements(module):
         match node:
             case ast.ClassDef(bases=bases) if not CODES & {ast.unparse(base) for base in bases}:
                 yield node.body

@@ -8,9 +8,7 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
-from syntax_trees import syntax_tree
-
-ROOT = Path(__file__).parents[1]
+from syntax_trees import ROOT, inner, syntax_tree
 
 
 def modules(package: str) -> dict[str, Path]:
@@ -24,7 +22,7 @@ def modules(package: str) -> dict[str, Path]:
 
 def imports(node: ast.AST) -> Iterator[ast.Import | ast.ImportFrom]:
     """Imports anywhere in a file, but for those that only type checkers read."""
-    for child in ast.iter_child_nodes(node):
+    for child in inner(node):
         if isinstance(child, ast.Import | ast.ImportFrom):
             yield child
         elif not (isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test)):

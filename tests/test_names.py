@@ -5,12 +5,9 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
-from syntax_trees import syntax_tree
-
-ROOT = Path(__file__).parents[1]
+from syntax_trees import ROOT, statements, syntax_tree
 
 
 def modules(*folders: str) -> Iterator[tuple[str, ast.Module]]:
@@ -35,7 +32,7 @@ def test_no_module_imports_a_private_name_of_another() -> None:
     found = []
     for path, tree in modules("optisense", "paper", "studio"):
         own = path.rsplit("/", 1)[0]
-        for node in ast.walk(tree):
+        for node in statements(tree):
             if not isinstance(node, ast.ImportFrom):
                 continue
             folder = (node.module or "").replace(".", "/")
