@@ -11,6 +11,7 @@ import re
 import shlex
 import shutil
 import sys
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -64,6 +65,10 @@ COMMAND = re.compile(r"^(\$ )?(optisense|make|python3?|pip|conda|docker|\.|expor
 """A line of a block that begins as a command of the shell does."""
 NAMES_AN_OPTION = re.compile(r"\.\.\.| --\S+$")
 """Code that names an option or several commands and is no whole command: `optisense task ...`."""
+
+
+WITH_SUBCOMMANDS = ("cage", "library", "task")
+"""Commands of `optisense` whose next word is a command, too."""
 
 
 def typed(page: Path) -> list[Block]:
@@ -138,10 +143,18 @@ def test_commands_that_are_not_typed_exist_with_their_options() -> None:
     for start, program, least in (("optisense ", app, 20), ("python -m paper ", paper_app, 5)):
         checked = [each for each in commands if each[1].startswith(start)]
         assert len(checked) > least
+        # The arguments of all mentions of a command are given at once: --help prints it only if it
+        # exists and has all the options, whatever their values, and takes time to print.
+        mentions: dict[tuple[str, ...], list[str]] = defaultdict(list)
+        places: dict[tuple[str, ...], list[str]] = defaultdict(list)
         for place, command in checked:
             words = shlex.split(command.removeprefix(start), comments=True)
-            result = CliRunner().invoke(program, [*words, "--help"])
-            assert result.exit_code == 0, f"{place}: {command}\n{result.output}"
+            named = tuple(words[: 2 if words[0] in WITH_SUBCOMMANDS else 1])
+            mentions[named] += words[len(named) :]
+            places[named].append(place)
+        for named, words in mentions.items():
+            result = CliRunner().invoke(program, [*named, *words, "--help"])
+            assert result.exit_code == 0, f"{places[named]}: {result.output}"
 
 
 def type_page(page: Path, shown: list[Block], work: Path, programs: Path) -> None:
