@@ -1,7 +1,8 @@
 """Everything that README and docs show to type works, typed page by page and block by block.
 
-`python` and `optisense` are forks of one process, except on the pages that activate an environment
-themselves. `make docs-as-typed` types with the real ones, also the blocks that take minutes.
+`python` and `optisense` are forks of one process. On the pages that activate an environment
+themselves, they are the real ones until it is seen that the activated ones start. `make
+docs-as-typed` types with the real ones, also the blocks that take minutes.
 """
 
 from __future__ import annotations
@@ -41,6 +42,15 @@ IN_THE_CLONE = (
 """Pages that say that their commands are typed in the folder of the clone."""
 ACTIVATING = ("README.md",)
 """Pages that activate the virtual environment themselves."""
+ACTIVATE = ". .venv/bin/activate"
+"""How they do."""
+ACTIVATED = """\
+set -e
+for each in optisense python; do [ "$(command -v $each)" -ef .venv/bin/$each ]; done
+optisense --version
+python -c 'import optisense'
+"""
+"""Commands that fail unless the programs of the activated environment are found and start."""
 CLONED = (
     "Makefile",
     "README.md",
@@ -179,6 +189,10 @@ def type_page(page: Path, shown: list[Block], work: Path, programs: Path) -> Non
                     f"{block.place}: {command}\nexit code {outcome.exit_code}, "
                     f"not {block.exit_code}\n{outcome.output[-4000:]}"
                 )
+                if command == ACTIVATE:
+                    started = terminal.type(ACTIVATED, limit=LIMIT)
+                    assert started.exit_code == 0, started.output
+                    terminal.type(f'PATH="{programs}:$PATH"', limit=LIMIT)
 
 
 def clone(folder: Path) -> None:
