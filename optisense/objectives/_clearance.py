@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import combinations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -57,11 +58,11 @@ def clearance(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
     0 if others intersect. `of_parts` names the two that are nearest.
     """
     design = evaluation.design
-    bent = design.deformed_meshes()
+    bent = _places(design.deformed_meshes())
     least, nearest = MOST_CLEARANCE, ""
     for one, other in _apart(design):
-        found = distance(bent[one], bent[other])
-        if found < least:
+        here, there = bent[one], bent[other]
+        if here.gap(there) < least and (found := here.distance(there)) < least:
             least, nearest = found, f"{one} and {other}"
     if not nearest:
         raise ObjectiveError("the design has no two parts that are apart")
@@ -71,29 +72,21 @@ def clearance(evaluation: Evaluation) -> tuple[float, dict[str, Any]]:
 def _apart(design: SensorDesign) -> list[tuple[str, str]]:
     """Return the pairs of parts that do not touch before they are bent."""
     names = [name for name, part in design.parts.items() if part.role is not Role.INDENTER]
-    meshes = design.meshes
+    at = _places(design.meshes)
     return [
         (one, other)
         for one, other in combinations(names, 2)
-        if distance(meshes[one], meshes[other]) > APART
+        if at[one].gap(at[other]) > APART or at[one].distance(at[other]) > APART
     ]
+
+
+def _places(meshes: Mapping[str, TriangleMesh]) -> dict[str, _Places]:
+    return {name: _Places.of(mesh) for name, mesh in meshes.items()}
 
 
 def distance(one: TriangleMesh, other: TriangleMesh) -> float:
     """Return the distance (mm) between the surfaces of two meshes; about 0 if they intersect."""
-    here, there = _Places.of(one), _Places.of(other)
-    few = [each.points[:: 1 + len(each.points) // SAMPLED] for each in (here, there)]
-    gaps = cdist(*few)
-    partners = gaps.argmin(axis=1)
-    nearest = gaps[np.arange(len(gaps)), partners]
-    found = float(nearest.min())
-    for start in np.argsort(nearest)[:BEGINNINGS]:
-        point = few[1][partners[start]]
-        for _ in range(STEPS):
-            on_one = here.nearest(point)
-            point = there.nearest(on_one)
-            found = min(found, float(np.linalg.norm(point - on_one)))
-    return found
+    return _Places.of(one).distance(_Places.of(other))
 
 
 class _Places(NamedTuple):
@@ -111,6 +104,28 @@ class _Places(NamedTuple):
         places = np.concatenate([corners, edges, corners.mean(axis=1, keepdims=True)], axis=1)
         points = np.asarray(places.reshape(-1, 3), dtype=np.float64)
         return _Places(mesh, points, cKDTree(points))
+
+    def gap(self, other: _Places) -> float:
+        """Return the distance (mm) between the bounding boxes, which that of the meshes is not
+        below.
+        """
+        (low, high), (other_low, other_high) = self.mesh.bounds, other.mesh.bounds
+        return float(np.linalg.norm(np.maximum(np.maximum(low - other_high, other_low - high), 0)))
+
+    def distance(self, other: _Places) -> float:
+        """Return the distance (mm) between the surfaces of two meshes, as `distance` does."""
+        few = [each.points[:: 1 + len(each.points) // SAMPLED] for each in (self, other)]
+        gaps = cdist(*few)
+        partners = gaps.argmin(axis=1)
+        nearest = gaps[np.arange(len(gaps)), partners]
+        found = float(nearest.min())
+        for start in np.argsort(nearest)[:BEGINNINGS]:
+            point = few[1][partners[start]]
+            for _ in range(STEPS):
+                on_one = self.nearest(point)
+                point = other.nearest(on_one)
+                found = min(found, float(np.linalg.norm(point - on_one)))
+        return found
 
     def nearest(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the point (3,), mm, of the mesh that is nearest to a point; on a fine mesh, only
