@@ -45,12 +45,13 @@ def test_a_note_names_a_size_of_the_cameras_shape(
         (["evaluate", DESIGN, "--objective", "aoap", *FLAT], "scores.json"),
         (["dataset", DESIGN, "--count", "1", *FLAT, *FEW], "dataset.json"),
         (
-            ["task", "reconstruction", DESIGN, "--presses", "1", "--method", "table", *FLAT, *FEW],
+            ["task", "reconstruction", DESIGN, "--object", "sphere:3@0,0:0.5", "--presses", "1"]
+            + ["--method", "table", "--skin", "conforming", *FLAT, *FEW],
             "result.json",
         ),
         (
             ["verify", DESIGN, DESIGN, "--object", "nut", "--places", "1", "--presses", "1"]
-            + ["--method", "table", *FLAT, *FEW],
+            + ["--method", "table", "--skin", "conforming", *FLAT, *FEW],
             "verify.json",
         ),
     ],

@@ -65,6 +65,7 @@ def test_snr_runs_both_tasks(tmp_path: Path) -> None:
 def test_reconstruction_of_given_objects(tmp_path: Path) -> None:
     ball = "sphere:3@0,0:0.5"
     options = ("--presses", "4", "--resolution", "64x48", "--photons", "20000", "--method", "table")
+    options += ("--skin", "conforming")
     arguments = ("--object", ball, *options, "--out", str(tmp_path))
     code, text = run("reconstruction", "gelsight-mini-ideal", *arguments)
     assert code == 0, text

@@ -262,14 +262,13 @@ class TestStep:
             text = text.replace(f"file: {name}.stl,", f"file: out/{file.name}, solid: {name},")
         return design, text
 
-    def test_bodies_are_named(self, cad: Any) -> None:
+    def test_bodies_are_named_and_one_that_is_not_there_is_told(self, cad: Any) -> None:
         expected, text = self.step(cad)
         assert_same(design_from_meshes(cad.write(text)).design, expected)
         guess = guess_recipe(next((cad.folder / "out").glob("*.step")))
         assert guess.parts["gel"].role is Role.ELASTOMER and guess.parts["gel"].solid == "gel"
 
-    def test_a_body_that_is_not_there(self, cad: Any) -> None:
-        _, text = self.step(cad)
+        # A recipe that names no body, or one that is not there.
         with pytest.raises(DesignError, match="no body 'jelly'") as caught:
             design_from_meshes(cad.write(text.replace("solid: gel", "solid: jelly")))
         assert "gel, " in str(caught.value.hint) and "part gel" in str(caught.value.where)
