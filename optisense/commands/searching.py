@@ -11,12 +11,19 @@ from optisense.commands.options import (
     MOST_ITEMS,
     NamedValues,
     OptionNotation,
+    Photons,
+    Resolution,
     Seed,
 )
 from optisense.commands.scoring import ScoreOptions
+from optisense.quality import LEVELS
 
 if TYPE_CHECKING:
     from optisense.search import Plan
+
+TrialPhotons = Annotated[
+    Photons, OptionNotation(f"N|{LEVELS}", usual="normal, 1 million", is_text=True)
+]
 
 
 class SearchOptions(ScoreOptions):
@@ -80,6 +87,16 @@ class SearchOptions(ScoreOptions):
     )
     samples: Annotated[int, Ge(2), Le(MOST_ITEMS), OptionNotation("N", usual="8")] | None = Field(
         None, description="With --error: number of manufactured sensors simulated for each trial."
+    )
+    resolution: Resolution | None = Field(
+        None,
+        description="Width and height of the grid of pixels and rays; if left out, pictures are "
+        "640 wide and rays 320 across, in the camera's aspect ratio.",
+    )
+    photons: TrialPhotons | None = Field(
+        None,
+        description="Photons to trace for a trial; --method light-colours, which renders once, "
+        "takes fine if left out.",
     )
 
     def plan(self) -> Plan:

@@ -108,6 +108,19 @@ def test_help_tells_forms_bounds_and_defaults_own_options_first() -> None:
 
 
 @pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("evaluate", ("if left out, 640 wide", "default: (fine, 5 million)")),
+        ("search", ("640 wide and rays 320 across", "default: (normal, 1 million)")),
+    ],
+)
+def test_each_command_tells_its_own_defaults(command: str, words: tuple[str, ...]) -> None:
+    text = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "400"}).output
+    for each in words:
+        assert each in text
+
+
+@pytest.mark.parametrize(
     ("command", "request_name", "model"),
     [("render", "simulate", RenderOptions), ("search", "search", SearchOptions)],
 )
