@@ -12,12 +12,10 @@ from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.output_folder import take_folder
 from optisense.errors import DesignError, OptiSenseError, OutputError
 from optisense.folders import is_empty
+from optisense.length_units import MM_PER, Units
 
 if TYPE_CHECKING:
     from optisense.sensors.from_meshes import Recipe
-    from optisense.sensors.from_meshes.recipe_parts import Units
-
-UNITS = ("mm", "cm", "m", "inch", "um")
 
 
 @handles_errors
@@ -49,7 +47,7 @@ def new(
     units: Annotated[
         str | None,
         typer.Option(
-            metavar="|".join(UNITS),
+            metavar="|".join(MM_PER),
             help="With --from-meshes: unit of the files that do not contain one (STL, OBJ, "
             "PLY); mm if left out.",
         ),
@@ -98,8 +96,8 @@ def new(
         raise typer.BadParameter(
             "with --from-meshes, name only the folder to write", param_hint="DIR"
         )
-    if units is not None and units not in UNITS:
-        raise typer.BadParameter(f"'{units}' is none of {', '.join(UNITS)}", param_hint="--units")
+    if units is not None and units not in MM_PER:
+        raise typer.BadParameter(f"'{units}' is none of {', '.join(MM_PER)}", param_hint="--units")
     is_new = _take_folder(Path(name), overwrite)
     if not is_new and not discard_changes:
         _refuse_changed(Path(name))

@@ -29,6 +29,7 @@ from optisense.design.materials import kinds_for
 from optisense.design.sensor_design import MATERIAL_REQUIRED
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.length_units import MM_PER, Units
 from optisense.sensors.from_meshes import guessing
 from optisense.sensors.from_meshes.building import USUAL_MATERIAL
 from optisense.sensors.from_meshes.directions import SIDES
@@ -37,7 +38,7 @@ from optisense.sensors.from_meshes.fingertips import is_round
 from optisense.sensors.from_meshes.guessing import CadBody, Use
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
 from optisense.sensors.from_meshes.recipe_lights import LightChoice
-from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
+from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
 from optisense.sensors.from_meshes.surfaces import chosen as chosen_faces
 
 Parts = dict[str, PartChoice]

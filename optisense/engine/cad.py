@@ -13,10 +13,10 @@ from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
+from optisense.length_units import Units
 from optisense.near import suggestion
 from optisense.sensors.registry import save_design
 
-AnyUnits = Literal["mm", "cm", "m", "inch", "um", "mil"]
 AnyUse = Literal[
     "sensing_surface", "elastomer", "support", "mirror", "blocker", "interface", "indenter",
     "lights", "camera", "nothing",
@@ -30,7 +30,7 @@ class Cad(Fields):
     """Fields of the request "cad"; see docs/engine.md."""
 
     files: list[str] = Field(min_length=1)
-    units: AnyUnits | None = None
+    units: Units | None = None
 
 
 class FromCad(Cad):

@@ -265,6 +265,11 @@ class TestRefused:
         assert code == 2 and "32 m large if its files are in m" in text
         assert not (tmp_path / "pad").exists()
 
+    def test_mils_are_taken_as_in_a_recipe(self, tmp_path: Path) -> None:
+        """The camera, 22 mils from the skin, is then too near to the parts."""
+        _, text = new("--from-meshes", CAD / "sensor.yaml", tmp_path / "pad", "--units", "mil")
+        assert f"at (0, 0, {-22 * 0.0254:.4f})" in text
+
     @pytest.mark.parametrize(
         ("words", "told"),
         [

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.errors import DesignError
-from optisense.sensors.from_meshes.recipe_parts import MM_PER, Units
+from optisense.length_units import MM_PER, Units
 from optisense.text import brief
 from optisense.untrusted_files import MOST_BOARD, read_bytes
 

@@ -13,8 +13,9 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.mesh_files import FORMATS
 from optisense.geometry.step import SUFFIXES as STEP_FORMATS
 from optisense.geometry.step import read_step
+from optisense.length_units import MM_PER
 from optisense.near import near_match
-from optisense.sensors.from_meshes.recipe_parts import MM_PER, ShapeReference
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.text import brief
 from optisense.untrusted_files import is_file, is_folder
 

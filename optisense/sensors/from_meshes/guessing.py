@@ -19,6 +19,7 @@ from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.joining import touching_area
 from optisense.geometry.patches import faces_towards
+from optisense.length_units import MM_PER, Units
 from optisense.sensors._led_flux import balanced_flux
 from optisense.sensors.from_meshes.directions import SIDES, nearest_side, vector
 from optisense.sensors.from_meshes.files import (
@@ -36,7 +37,7 @@ from optisense.sensors.from_meshes.recipe_lights import (
     LightRow,
     LightsOver,
 )
-from optisense.sensors.from_meshes.recipe_parts import MM_PER, PartChoice, ShapeReference, Units
+from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
 from optisense.sensors.from_meshes.surfaces import WITHIN
 
 Use = Role | Literal["lights", "camera", "nothing"]

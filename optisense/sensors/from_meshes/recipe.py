@@ -24,10 +24,11 @@ from optisense.design.fields import (
 from optisense.design.problems import design_error
 from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.errors import DesignError
+from optisense.length_units import Units
 from optisense.near import suggestion
 from optisense.sensors.from_meshes.directions import Way
 from optisense.sensors.from_meshes.recipe_lights import LightChoice
-from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference, Units
+from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
 
 Pixels = Annotated[Count, Field(le=65_536)]
 

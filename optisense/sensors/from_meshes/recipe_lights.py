@@ -10,9 +10,10 @@ from optisense.design import Light
 from optisense.design.colour import NAMED_COLOURS
 from optisense.design.fields import Count, Model, Name, NonNegative, Number, Positive, Vector
 from optisense.design.lights import MOST_LIGHTS
+from optisense.length_units import Units
 from optisense.near import suggestion
 from optisense.sensors.from_meshes.directions import Direction, Side, Way, or_words
-from optisense.sensors.from_meshes.recipe_parts import ShapeReference, Turn, Units
+from optisense.sensors.from_meshes.recipe_parts import ShapeReference, Turn
 
 USUAL_FLUX = 10.0
 """Flux of each light if neither the recipe nor the library states one, mW; a bright LED of a few

@@ -8,19 +8,8 @@ from pydantic import Field, model_validator
 
 from optisense.design import Role
 from optisense.design.fields import Model, Name, Number, Positive, Vector
+from optisense.length_units import Units
 from optisense.sensors.from_meshes.directions import Side, Way
-
-Units = Literal["mm", "cm", "m", "inch", "um", "mil"]
-MM_PER: dict[str, float] = {
-    "mm": 1.0,
-    "cm": 10.0,
-    "m": 1000.0,
-    "inch": 25.4,
-    "um": 0.001,
-    "mil": 0.0254,
-}
-"""Millimetres in each unit that CAD tools export."""
-
 
 Angle = Annotated[Number, Field(ge=0.0, le=180.0)]
 
