@@ -68,7 +68,8 @@ def depth(
                 "pixels": int(inside.sum()),
             }
         )
-        maps.append({"read": _along_middle(read, inside), "true": _along_middle(true, inside)})
+        profiles = {"read": _along_middle(read, inside), "true": _along_middle(true, inside)}
+        maps.append(profiles | {"middle": each.press.middle})
     value, parts = summarise_places(places)
     return value, parts, {"profiles": maps}
 

@@ -9,6 +9,8 @@ import numpy as np
 from optisense.figures import BLUE, RED, new_figure
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
@@ -31,6 +33,19 @@ def _square_grid(
     for axes in grid.ravel()[count:]:
         axes.set_axis_off()
     return figure, grid
+
+
+def _as_in_the_picture(middles: Sequence[tuple[float, float]], across: int) -> list[int]:
+    """Return the order in which drawings of contacts fill the rows of a grid, so that they lie as
+    the contacts do in the picture.
+
+    Args:
+        middles: row and column of the middle of each contact in the picture, pixels.
+        across: number of drawings in a row of the grid.
+    """
+    down = sorted(range(len(middles)), key=lambda number: middles[number][0])
+    rows = [down[start : start + across] for start in range(0, len(down), across)]
+    return [number for row in rows for number in sorted(row, key=lambda each: middles[each][1])]
 
 
 def draw_failure(score: Score) -> Figure:
@@ -164,15 +179,17 @@ def draw_shadow(score: Score) -> Figure:
 
 
 def draw_depth(score: Score) -> Figure:
-    """Draw the true and the read depth along a row of each contact."""
+    """Draw the true and the read depth along a row of each contact, at its place in the picture."""
     profiles, places = score.arrays["profiles"], score.parts["places"]
     figure, grid = _square_grid(len(profiles), 2.6, 1.9, sharey=True)
-    for number, (axes, each) in enumerate(zip(grid.ravel(), profiles, strict=False)):
+    order = _as_in_the_picture([each["middle"] for each in profiles], grid.shape[1])
+    for cell, (axes, number) in enumerate(zip(grid.ravel(), order, strict=False)):
+        each = profiles[number]
         axes.plot(each["true"], color="#888888", lw=2.5, label="true")
         axes.plot(each["read"], color=RED, lw=1.2, label="read")
         axes.set_title(f"{number + 1}: {places[number]['error']:.3f} mm", fontsize=10)
         axes.set_xticks([])
-        if number % grid.shape[1] == 0:
+        if cell % grid.shape[1] == 0:
             axes.set_ylabel("depth (mm)")
     grid[0, 0].invert_yaxis()
     grid[0, 0].legend(fontsize=8, frameon=False)
@@ -245,14 +262,15 @@ def _map_and_histogram(
 
 
 def draw_reading(score: Score) -> Figure:
-    """Draw the error of the reading in each contact."""
+    """Draw the error of the reading in each contact, at its place in the picture."""
     maps, places = score.arrays["maps"], score.parts["places"]
     figure, grid = _square_grid(len(maps), 2.2, 2.3, beside=0.8)
     seen = np.concatenate([each["errors"][np.isfinite(each["errors"])] for each in maps])
     most = max(1.0, float(np.percentile(seen, 98)))
-    for number, (axes, each) in enumerate(zip(grid.ravel(), maps, strict=False)):
+    order = _as_in_the_picture([each["middle"] for each in maps], grid.shape[1])
+    for axes, number in zip(grid.ravel(), order, strict=False):
         axes.set_facecolor("#888888")
-        shown = axes.imshow(each["errors"], cmap="magma", vmin=0.0, vmax=most)
+        shown = axes.imshow(maps[number]["errors"], cmap="magma", vmin=0.0, vmax=most)
         axes.set_title(f"{number + 1}: {places[number]['error']:.1f}°", fontsize=10)
         axes.set_xticks([])
         axes.set_yticks([])

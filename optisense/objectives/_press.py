@@ -117,6 +117,16 @@ class Press:
         rows, columns = (np.flatnonzero(self.mask.any(axis=axis)) for axis in (1, 0))
         return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Row and column of the middle of the contact in the whole picture."""
+        corner = (0, 0) if self.window is None else [each.start for each in self.window.box]
+        row, column = (
+            start + (each.start + each.stop) / 2
+            for start, each in zip(corner, self.box, strict=True)
+        )
+        return row, column
+
     def colours(self, where: NDArray[np.bool_], kind: str = "picture") -> FloatArray:
         """Return the colours (n, 3), 0 to 1, of the pixels of a mask (h, w).
 

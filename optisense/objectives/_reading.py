@@ -67,7 +67,7 @@ def reading(
                 "pixels": int(each.mask.sum()),
             }
         )
-        maps.append({"errors": np.where(each.mask, angles, np.nan)})
+        maps.append({"errors": np.where(each.mask, angles, np.nan), "middle": each.press.middle})
     value, parts = summarise_places(places)
     parts["level_skin"] = float(np.mean([place["level_skin"] for place in places]))
     return value, parts, {"maps": maps}

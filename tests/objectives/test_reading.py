@@ -16,6 +16,7 @@ from optisense.design.lenses.film import PictureWindow
 from optisense.errors import ObjectiveError
 from optisense.objectives import Evaluation, Press, Settings, evaluate
 from optisense.objectives._depth import depth
+from optisense.objectives._figures import draw_depth, draw_reading
 from optisense.objectives._reader import LEAST_PIXELS, grid_of, pixels_to_read
 from optisense.objectives._reading import reading
 from optisense.objectives.relighting import Relighting
@@ -197,6 +198,20 @@ def test_where_no_tilt_is_read_there_is_no_depth(nine: Callable[..., Presses]) -
     grey = on_the_plane(nine(lambda n: np.full((len(n), 3), 0.3)))
     value, parts, _ = depth(grey)
     assert value == pytest.approx(parts["reading_nothing"], rel=0.05)
+
+
+@pytest.mark.parametrize(("score", "draw"), [(reading, draw_reading), (depth, draw_depth)])
+def test_drawings_lie_as_the_contacts_do_in_the_picture(
+    nine: Callable[..., Presses], score: Any, draw: Any
+) -> None:
+    """Also if places are counted along columns, from the right one on."""
+    presses = nine(lambertian)
+    in_rows = presses.calibration_presses
+    presses.calibration_presses = [in_rows[3 * (k % 3) + 2 - k // 3] for k in range(9)]
+    _, parts, arrays = score(on_the_plane(presses), camera_noise=0.0)
+    figure = draw(SimpleNamespace(parts=parts, arrays=arrays))
+    titles = [axes.get_title().split(":")[0] for axes in figure.axes[:9]]
+    assert titles == ["7", "4", "1", "8", "5", "2", "9", "6", "3"]
 
 
 @pytest.fixture(scope="module")
