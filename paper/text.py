@@ -117,6 +117,8 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
     beside = page.with_suffix("")
     beside.mkdir(parents=True, exist_ok=True)
     chapters, rows, counts = [], [], dict.fromkeys((AGREES, DISAGREES, OPEN), 0)
+    repeating = [f"*{each.title}*" for each in experiments if each.repeats_claims]
+    without = f" (without {', '.join(repeating)}, which repeats statements)" if repeating else ""
     spent: dict[str, list[float]] = {}
     for experiment in experiments:
         result = read_result(results / experiment.name)
@@ -137,7 +139,8 @@ def write_page(page: Path, results: Path, experiments: list[Experiment]) -> None
         "The command `python -m paper all --page FILE` writes this page; do not edit it.",
         INTRODUCTION,
         "\n".join(["| experiment | statements of the paper |", "| --- | --- |", *rows]),
-        f"In total: {', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
+        f"In total{without}: "
+        f"{', '.join(_counted(count, verdict) for verdict, count in counts.items())}.",
         f"The {len(spent)} evaluations take {processor / 60:.0f} processor minutes.",
     ]
     write_text(page, "\n\n".join([*head, *(text.rstrip() for text in chapters)]) + "\n")

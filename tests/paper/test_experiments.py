@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -209,7 +210,8 @@ def test_a_slow_image_on_a_busy_machine_tells_nothing(answered: Answered) -> Non
 
 
 def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path) -> None:
-    several = list(EXPERIMENTS.values())[:2]
+    first, second = list(EXPERIMENTS.values())[:2]
+    several = [first, replace(second, repeats_claims=True)]
     for each in several:
         finding, _ = answered(each, each.settings(True))
         result = result_of(each, finding.numbers, True)
@@ -218,6 +220,7 @@ def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path)
     page.parent.mkdir()
     write_page(page, tmp_path / "out", several)
     text = page.read_text()
+    assert f"In total (without *{second.title}*, which repeats statements): " in text
     assert "The 3 evaluations take 3 processor minutes." in text  # 55 s + 2 x 59 s
     for target in re.findall(r"!\[[^]]*\]\(([^)]+)\)", text):
         assert (page.parent / target).is_file()
