@@ -61,6 +61,7 @@ def dataset(model: ots.OpticalModel) -> None:
                 axes.set_yticks([])
                 if column[0] is figure.axes[0]:
                     axes.set_ylabel(title)
+        figure.suptitle(model.design.name, fontsize=11)
         _save(figure, "dataset")
 
 
