@@ -57,7 +57,8 @@ def render(
     """Render what the sensor's camera sees, with or without contacts.
 
     Writes image.png, radiance.exr, normals.npy, contact_mask.npy, layers/*.exr, run.json and
-    report.html into the folder. Ctrl-C stops early and writes the result so far.
+    report.html into the folder, pressure.npy for contacts on an elastic skin, and markers.csv for a
+    design with markers. Ctrl-C stops early and writes the result so far.
     """
     size = options.resolution
     if options.noise is not None and options.seconds is not None:

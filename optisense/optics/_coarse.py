@@ -23,7 +23,7 @@ class CoarseCacheStore(CacheStore):
 
 
 class CoarseModel(OpticalModel):
-    """An `OpticalModel` for coarse images, which take about a fifth of the time."""
+    """An `OpticalModel` for coarse images, which take about a sixth of the time."""
 
     is_draft = True
     view_type = DraftView

@@ -93,8 +93,8 @@ class OpticalModel(RayModel):
     """A sensor prepared for rendering many images.
 
     The scene of the sensor, the emission guide and the radiance cache are computed once. A contact
-    adds only its own surface, a light's flux or colour only scales its layer, and a coating's
-    specularity only changes its row of the surface table.
+    adds only its own surface, and a light's flux or colour only scales its layer. A coating's
+    specularity changes only its row of the surface table in the scene, but photons are traced anew.
     """
 
     is_draft = False
