@@ -25,7 +25,7 @@ exp(-(pi s / w)^2 / 2) of their contrast (the Gaussian's Fourier transform at th
 
 
 USUAL = (0.27, 0.059)
-"""Line widths (mm) of the poorest and the best built-in sensor: GelSight360, GelSight Mini."""
+"""Line widths (mm) of the poorest and the best built-in sensor: GelSight360, ideal Mini."""
 
 
 @objective(

@@ -50,7 +50,7 @@ by at most 4 degrees, whatever their azimuths.
 
 CELL = 3.0
 """Angle (degrees) between neighbouring normals of the grid on which the confusion is evaluated, far
-below the confusion of the built-in sensors (34 degrees and more)."""
+below the confusion of the built-in sensors (31 degrees and more)."""
 
 RING = 10_000
 """Multiplier of a ring's number in a normal's number, above the number of normals on a ring."""
@@ -102,9 +102,9 @@ def bounds(*, theta_weight: float, phi_weight: float, **others: object) -> tuple
     return -180.0 * (theta_weight + phi_weight), 0.0
 
 
-USUAL = (-76.0, -34.0)
-"""Values of the poorest and the best built-in sensor: the first and third of GelBelt's
-designs in docs/experiments.md."""
+USUAL = (-74.0, -31.6)
+"""Values of the poorest and the best built-in sensor by `optisense evaluate`: the cylindrical
+GelSight Mini, and GelBelt."""
 
 
 @objective(
