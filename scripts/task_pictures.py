@@ -46,7 +46,7 @@ def dataset(model: ots.OpticalModel) -> None:
             ContactDraw(("sphere:2", "cylinder:1.5,6", f"mesh:{nut}"), (0.4, 0.8), tilt=8),
             resolution=(240, 180),
             photons=PHOTONS,
-            seed=4,
+            seed=5,
         )
         made = generate(model, Path(folder) / "touches", 4, settings)
         figure = Figure(figsize=(10, 6), layout="constrained")
