@@ -75,6 +75,15 @@ def test_a_gel_that_absorbs_all_light_is_a_warning(
         assert "4.25 mm" in said[0].message and "'silicone-xp565'" in said[0].message
 
 
+@pytest.mark.parametrize(("most", "told"), [(0.2, False), (0.3, True)])
+def test_a_gel_that_absorbs_more_than_images_allow_is_a_warning(
+    mini: SensorDesign, most: float, told: bool
+) -> None:
+    tinted = set_value(mini, "materials.silicone-xp565.absorption", (0.05, most, 0.1))
+    said = [one for one in check_design(tinted) if "too bright" in one.message]
+    assert [one.severity for one in said] == ["warning"] * told
+
+
 def test_one_number_for_three_is_refused_in_words() -> None:
     with pytest.raises(DesignError, match="should be a list of values"):
         set_value(sensors.gelsight_mini_ideal(), "materials.acrylic.absorption", -1)
