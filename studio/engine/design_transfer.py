@@ -18,6 +18,7 @@ from ..scene.contacts import contact_list
 from ..scene.gather import caged_parts, gather_document, part_names
 from ..scene.meshes import REST, corners_of, part_mesh, shown_vertices
 from ..scene.paths import absolute
+from ..scene.world import world_matrix
 from . import catalogue, session
 
 _written: dict[str, bytes] = {}
@@ -34,9 +35,17 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
     folder = Path(session.folder()) / "design"
     try:
         document = gather_document(scene)
+        _write_meshes(scene, document, folder)
     except SceneError as error:
         row = {"kind": "DesignError", "message": str(error), "path": error.path}
         raise EngineError(row) from error
+    catalogue.learn_kinds()
+    _copy_lamp_files(document, Path(scene.optisense.folder), folder)
+    return {"data": document, "folder": str(folder)}
+
+
+def _write_meshes(scene: bpy.types.Scene, document: dict[str, Any], folder: Path) -> None:
+    """Write the meshes of the parts that have changed."""
     caged = caged_parts(document)
     present = {str(folder / part["mesh"]) for part in document["parts"].values()}
     for gone in _written.keys() - present:
@@ -47,9 +56,6 @@ def design(scene: bpy.types.Scene) -> dict[str, Any]:
         if _written.get(str(path)) != digest or not path.is_file():
             mesh_file.write(part_mesh(part, caged=name in caged), path)
             _written[str(path)] = digest
-    catalogue.learn_kinds()
-    _copy_lamp_files(document, Path(scene.optisense.folder), folder)
-    return {"data": document, "folder": str(folder)}
 
 
 def contents(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, str]]:
@@ -100,7 +106,7 @@ def _digest(part: bpy.types.Object, *, caged: bool) -> bytes:
     else:
         text.update(shown_vertices(mesh).tobytes())
     text.update(corners_of(mesh).tobytes())
-    text.update(np.array(part.matrix_world, dtype=np.float64).tobytes())
+    text.update(np.array(world_matrix(part), dtype=np.float64).tobytes())
     return text.digest()
 
 

@@ -27,6 +27,7 @@ from ..scene.cameras import add_camera, imaging
 from ..scene.collections import objects_of, select_only
 from ..scene.gather import free_name
 from ..scene.lamps import add_light, lamp_colour, redraw, window
+from ..scene.world import world_matrix
 from .windows import ask_for_windows
 
 
@@ -192,7 +193,7 @@ class OPTISENSE_OT_add_light(polls.Arranging, ChoosingProperties, bpy.types.Oper
         references = _references(context, "light")
         poses = []
         for reference in references:
-            corners = np.array([reference.matrix_world @ v.co for v in reference.data.vertices])
+            corners = np.array([world_matrix(reference) @ v.co for v in reference.data.vertices])
             if not len(corners):
                 continue
             normal = _normal(reference, corners, middle)
@@ -224,7 +225,7 @@ def _middle(scene: bpy.types.Scene) -> Vector:
     surface = sensing_surface(scene)
     if surface is None:
         return Vector()
-    return surface.matrix_world @ (sum((Vector(c) for c in surface.bound_box), Vector()) / 8.0)
+    return world_matrix(surface) @ (sum((Vector(c) for c in surface.bound_box), Vector()) / 8.0)
 
 
 def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) -> np.ndarray:
@@ -232,7 +233,7 @@ def _normal(reference: bpy.types.Object, corners: np.ndarray, target: Vector) ->
     faces = reference.data.polygons
     total = sum((face.normal * face.area for face in faces), Vector())
     if total.length > SOLID * sum(face.area for face in faces):
-        return np.array(reference.matrix_world.to_3x3() @ total)
+        return np.array(world_matrix(reference).to_3x3() @ total)
     way = np.array(target) - (corners.min(axis=0) + corners.max(axis=0)) / 2.0
     return way if np.linalg.norm(way) > 1e-9 else np.array((0.0, 0.0, 1.0))
 
@@ -265,7 +266,7 @@ class OPTISENSE_OT_add_camera(polls.Arranging, ChoosingProperties, bpy.types.Ope
         place = scene.cursor.location.copy()
         if references:
             box = (Vector(corner) for corner in references[0].bound_box)
-            place = references[0].matrix_world @ (sum(box, Vector()) / 8.0)
+            place = world_matrix(references[0]) @ (sum(box, Vector()) / 8.0)
         way = _middle(scene) - place
         if way.length < 1e-6:
             way = Vector((0.0, 0.0, 1.0))

@@ -13,6 +13,7 @@ from ..engine.operators import refuse
 from ..looks.drawing import outline
 from ..scene.collections import objects_of
 from ..scene.lamps import light_pose
+from ..scene.world import world_matrix
 from .rows import of_one_group
 
 CAUGHT = {"EDGE", "EDGE_MIDPOINT", "VERTEX"}
@@ -81,5 +82,5 @@ class OPTISENSE_OT_snap_row(polls.Checked, bpy.types.Operator):
         target = place + shine.normalized() * self.away
         moved = Matrix.Translation(target) @ moved @ Matrix.Translation(-Vector(row.middle))
         for each in lights:
-            each.matrix_world = moved @ each.matrix_world
+            each.matrix_world = moved @ world_matrix(each)
         return {"FINISHED"}

@@ -14,6 +14,7 @@ from ..core import outlines
 from ..scene.collections import objects_of
 from ..scene.lamps import lamp_colour, window
 from ..scene.meshes import shown_vertices
+from ..scene.world import world_matrix
 from .section import plane
 
 LINE = (0.62, 0.68, 0.75)
@@ -56,7 +57,7 @@ def outline(part: bpy.types.Object) -> NDArray[np.float32]:
     ends = np.empty(2 * size[1], dtype=np.int32)
     mesh.edges.foreach_get("vertices", ends)
     chosen = shown_vertices(mesh)[ends.reshape(-1, 2)[kept[1]].ravel()]
-    return in_world(chosen, part.matrix_world)
+    return in_world(chosen, world_matrix(part))
 
 
 def _feature_edges(mesh: bpy.types.Mesh) -> NDArray[np.int64]:
@@ -110,7 +111,7 @@ def _draw_lamps(scene: bpy.types.Scene) -> None:
             for each in objects_of(scene, "LIGHT")
             if each.optisense.group == group.name
             and each.visible_get()
-            and (cut is None or cut[0].dot(each.matrix_world.translation) + cut[1] > 0.0)
+            and (cut is None or cut[0].dot(world_matrix(each).translation) + cut[1] > 0.0)
         ]
         if not lamps or group.flux <= 0.0:
             continue
@@ -119,13 +120,13 @@ def _draw_lamps(scene: bpy.types.Scene) -> None:
         face = outlines.window(shape, size)
         red, green, blue, _ = lamp_colour(group)
         gpu.state.depth_test_set("NONE")  # lamps stand in housings
-        places = np.concatenate([in_world(face, each.matrix_world) for each in lamps])
+        places = np.concatenate([in_world(face, world_matrix(each)) for each in lamps])
         lit = np.array(
             [(red, green, blue), (red, green, blue), np.array((red, green, blue)) * 0.4 + 0.6]
         )
         colours = np.column_stack([lit, [WINDOW_OPACITY] * 3])
         draw_faces(places, np.tile(colours, (len(places) // 3, 1)))
-        places = np.concatenate([in_world(sides, each.matrix_world) for each in lamps])
+        places = np.concatenate([in_world(sides, world_matrix(each)) for each in lamps])
         colours = np.empty((len(places), 4), dtype=np.float32)
         colours[:] = (red, green, blue, BEAM_OPACITY)
         colours[:, 3] *= np.tile(left, len(lamps))

@@ -16,6 +16,7 @@ from ..engine.latest_request import LatestRequest
 from ..scene.collections import is_edited
 from ..scene.contacts import sensing_surface
 from ..scene.meshes import shown_vertices
+from ..scene.world import world_matrix
 from . import drawing, section
 
 KINDS = ("PART", "CAMERA", "CAGE")
@@ -153,7 +154,7 @@ def skin_triangles(surface: bpy.types.Object) -> NDArray[np.float32]:
     mesh.calc_loop_triangles()
     corners = np.empty(3 * len(mesh.loop_triangles), dtype=np.int32)
     mesh.loop_triangles.foreach_get("vertices", corners)
-    return drawing.in_world(shown_vertices(mesh)[corners], surface.matrix_world)
+    return drawing.in_world(shown_vertices(mesh)[corners], world_matrix(surface))
 
 
 def _leave() -> None:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..scene import kinds
 from ..scene.collections import objects_of
 from ..scene.meshes import shown_vertices
+from ..scene.world import world_matrix
 from . import drawing, section
 from .drawing import MOST_FACES, in_world
 
@@ -151,14 +152,14 @@ def _batch(part: bpy.types.Object) -> Any:
         return None
     places = shown_vertices(mesh).ravel()
     weights = np.arange(1, len(places) + 1, dtype=np.float32)
-    state = (part.matrix_world.copy().freeze(), len(mesh.polygons), float(places @ weights))
+    state = (world_matrix(part).freeze(), len(mesh.polygons), float(places @ weights))
     kept = _batches.get(part.name)
     if kept is None or kept[0] != state:
         from gpu_extras.batch import batch_for_shader
 
         corners, normals = triangles(mesh)
-        turn = np.array(part.matrix_world.to_3x3().inverted_safe().transposed(), dtype=np.float32)
-        content = {"pos": in_world(corners, part.matrix_world), "normal": normals @ turn.T}
+        turn = np.array(world_matrix(part).to_3x3().inverted_safe().transposed(), dtype=np.float32)
+        content = {"pos": in_world(corners, world_matrix(part)), "normal": normals @ turn.T}
         for gone in [name for name in _batches if name not in bpy.data.objects]:
             del _batches[gone]
         kept = _batches[part.name] = (state, batch_for_shader(_made(), "TRIS", content))

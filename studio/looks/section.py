@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty
 from mathutils import Vector
 
 from ..scene.collections import objects_of
+from ..scene.world import world_matrix
 
 AXES = [
     ("X", "x", "Across x"),
@@ -75,7 +76,7 @@ class OPTISENSE_PG_looks(bpy.types.PropertyGroup):
 def bounds(scene: bpy.types.Scene) -> tuple[Vector, Vector] | None:
     """Return the lowest and highest x, y, z of all parts, mm; None if there are no parts."""
     corners = [
-        each.matrix_world @ Vector(corner)
+        world_matrix(each) @ Vector(corner)
         for each in objects_of(scene, "PART")
         for corner in each.bound_box
     ]

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.errors import SceneError
 from ..core.search_parameters import curve_picture
 from ..engine import session
 from ..scene.collections import collection, object_of, objects_of
@@ -103,7 +104,10 @@ def _moved(scene: bpy.types.Scene, name: str, vertices: NDArray[np.float64]) -> 
     part = object_of(scene, "PART", name)
     if part is None or len(part.data.vertices) != len(vertices):
         return np.ones(len(vertices), dtype=bool)
-    shown = part_mesh(part, caged=False).vertices
+    try:
+        shown = part_mesh(part, caged=False).vertices
+    except SceneError:  # the part was disabled during the search
+        return np.ones(len(vertices), dtype=bool)
     return np.abs(vertices - shown).max(axis=1) > SAME_PLACE
 
 

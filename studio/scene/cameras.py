@@ -14,6 +14,7 @@ from ..core.numbers import kept
 from ..core.pose import pose_of
 from .collections import OPTICAL_SYSTEM, collection, objects_of
 from .lamps import place
+from .world import world_matrix
 
 DRAWN_SIZE = 5.0
 """Drawn size of the camera's pyramid, mm."""
@@ -79,7 +80,7 @@ def camera_values(scene: bpy.types.Scene) -> dict[str, Any] | None:
     values = camera.optisense
     before = json.loads(values.data) if values.data else {}
     try:
-        pose = pose_of(np.array(camera.matrix_world), before, up=True)
+        pose = pose_of(np.array(world_matrix(camera)), before, up=True)
     except ValueError as error:
         raise SceneError(f"the camera {error}", "camera") from error
     return {

@@ -13,6 +13,7 @@ from mathutils import Matrix
 
 from ..core.pose import matrix_of, pose_of
 from .collections import OPTICAL_SYSTEM, collection, next_order, objects_of
+from .world import world_matrix
 
 MOST_POSES = 4096
 """Number of cached poses of lights; most lights stand still while one is moved."""
@@ -54,7 +55,7 @@ def place(item: bpy.types.Object, pose: dict[str, Any]) -> None:
 
 def light_pose(light: bpy.types.Object) -> dict[str, Any]:
     """Return the pose of a light as for the design file."""
-    matrix = tuple(tuple(row) for row in light.matrix_world)
+    matrix = tuple(tuple(row) for row in world_matrix(light))
     found = _pose(matrix, light.optisense.data)
     return {name: list(values) for name, values in found.items()}
 

@@ -8,8 +8,10 @@ import bpy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..core.errors import SceneError
 from ..core.mesh_file import Mesh
 from ..core.numbers import joined, kept_array, split
+from .world import is_evaluated, world_matrix
 
 SHARP = math.radians(30.0)
 """Smallest angle in radians between two faces for which their common edge is sharp; a cylinder of
@@ -94,10 +96,13 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
 
     Args:
         caged: whether a cage deforms the part, so that its drawn shape is not that at rest.
+
+    Raises:
+        SceneError: the part has modifiers that Blender does not evaluate.
     """
     if part.mode == "EDIT":
         part.update_from_editmode()
-    world = np.array(part.matrix_world, dtype=np.float64)
+    world = np.array(world_matrix(part), dtype=np.float64)
     if part.modifiers and not caged:
         return _placed(_modified(part), world)
     data = part.data
@@ -111,7 +116,17 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
 
 
 def _modified(part: bpy.types.Object) -> Mesh:
-    """Return a part as its modifiers shape it, in its own frame."""
+    """Return a part as its modifiers shape it, in its own frame.
+
+    Raises:
+        SceneError: the part has modifiers that Blender does not evaluate.
+    """
+    if not is_evaluated(part):
+        raise SceneError(
+            f"part '{part.name}' has modifiers, which Blender does not evaluate while the part is "
+            "disabled in viewports or its collection is excluded; enable it, or apply them",
+            "parts",
+        )
     shown = part.evaluated_get(bpy.context.evaluated_depsgraph_get())
     data = shown.to_mesh()
     mesh = Mesh(shown_vertices(data).astype(np.float64), _triangles(data))

@@ -6,6 +6,7 @@ import bpy
 from mathutils import Vector
 
 from ..core.fitting import fitted
+from .world import world_matrix
 
 SENSOR = 72.0
 """Width in mm of the larger side of the image plane that Blender assumes behind `space.lens`."""
@@ -58,7 +59,7 @@ def _fit(space: bpy.types.SpaceView3D, region: bpy.types.Region, free: tuple[flo
     """Fit a perspective view to the visible objects, between two places in pixels from its left."""
     view = space.region_3d
     corners = [
-        each.matrix_world @ Vector(corner)
+        world_matrix(each) @ Vector(corner)
         for each in bpy.context.view_layer.objects
         if each.visible_get()
         for corner in each.bound_box

@@ -18,6 +18,7 @@ from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
+from ..scene.world import world_matrix
 from ..sensor.cad import ChoosingFiles
 
 READING = "Reading the mesh"
@@ -173,7 +174,7 @@ def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types
         return
     found, point, normal, _ = surface.closest_point_on_mesh((0.0, 0.0, 0.0))
     if found:
-        contact = add_contact(scene, tuple(surface.matrix_world @ point), tuple(-normal))
+        contact = add_contact(scene, tuple(world_matrix(surface) @ point), tuple(-normal))
         contact.optisense.shape = new_mesh(item.name, part_mesh(item, caged=False))
         contact.optisense.indenter = "mesh"
 

@@ -17,6 +17,7 @@ from ..scene.collections import objects_of, select_only
 from ..scene.contacts import sensing_surface
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import part_mesh
+from ..scene.world import world_matrix
 
 ROLES = ("elastomer",)
 
@@ -46,7 +47,7 @@ def outward(scene: bpy.types.Scene, gel: bpy.types.Object) -> NDArray[np.float64
 
 def _middle(item: bpy.types.Object) -> Vector:
     corners = [Vector(corner) for corner in item.bound_box] if item.type == "MESH" else [Vector()]
-    return item.matrix_world @ (sum(corners, Vector()) / len(corners))
+    return world_matrix(item) @ (sum(corners, Vector()) / len(corners))
 
 
 def _chosen(gel: bpy.types.Object) -> NDArray[np.int64]:

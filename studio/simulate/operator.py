@@ -14,6 +14,7 @@ from ..engine import polls, session
 from ..engine.operators import Starting, fail, refuse, start, start_with_design
 from ..scene.collections import objects_of, select_only
 from ..scene.contacts import add_contact, sensing_surface
+from ..scene.world import world_matrix
 from . import editors, picture, requests, viewing
 
 SHAPE = (
@@ -132,7 +133,7 @@ def press_along(context: bpy.types.Context, start: Vector, way: Vector) -> bool:
     surface = sensing_surface(context.scene)
     if surface is None:
         return False
-    inverse = surface.matrix_world.inverted()
+    inverse = world_matrix(surface).inverted()
     hit, point, normal, _ = surface.ray_cast(inverse @ start, inverse.to_3x3() @ way)
     if hit:
         _add(context, surface, point, normal)
@@ -142,8 +143,8 @@ def press_along(context: bpy.types.Context, start: Vector, way: Vector) -> bool:
 def _add(
     context: bpy.types.Context, surface: bpy.types.Object, point: Vector, normal: Vector
 ) -> None:
-    outward = -(surface.matrix_world.to_3x3() @ normal)
-    contact = add_contact(context.scene, tuple(surface.matrix_world @ point), tuple(outward))
+    outward = -(world_matrix(surface).to_3x3() @ normal)
+    contact = add_contact(context.scene, tuple(world_matrix(surface) @ point), tuple(outward))
     select_only(contact)
 
 
@@ -166,10 +167,10 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
                 return
             for each in objects_of(scene, "CONTACT"):
                 bpy.data.objects.remove(each)
-            inverse = surface.matrix_world.inverted()
+            inverse = world_matrix(surface).inverted()
             for each in result["contacts"]:
                 near = surface.closest_point_on_mesh(inverse @ Vector(each["point"]))
-                outward = -(surface.matrix_world.to_3x3() @ near[2])
+                outward = -(world_matrix(surface).to_3x3() @ near[2])
                 contact = add_contact(scene, each["point"], tuple(outward))
                 for field, value in like.items():
                     setattr(contact.optisense, field, value)
