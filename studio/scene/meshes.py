@@ -6,6 +6,7 @@ import math
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 from numpy.typing import ArrayLike, NDArray
 
 from ..core.errors import SceneError
@@ -113,6 +114,33 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     if normals is not None and (rest is None or not np.array_equal(vertices, rest)):
         normals = None
     return _placed(Mesh(vertices, _triangles(data), normals), world)
+
+
+def settle(part: bpy.types.Object) -> Mesh:
+    """Make the present shape of a part in no cage, as it was edited, moved and modified, its shape
+    at rest; return it in the frame of the design, where its object then stays.
+
+    Modifiers, constraints and the parent are removed; children keep their places.
+
+    Raises:
+        SceneError: the part has modifiers that Blender does not evaluate.
+    """
+    mesh, world, before = part_mesh(part, caged=False), world_matrix(part), part.data
+    rest = remembered(before, REST)
+    if world == Matrix() and rest is not None and np.array_equal(mesh.vertices, rest):
+        return mesh
+    part.data = new_mesh(before.name, mesh)
+    part.modifiers.clear()
+    part.constraints.clear()
+    part.parent = None
+    part.matrix_world = Matrix()
+    for child in part.children:
+        child.matrix_parent_inverse = world @ child.matrix_parent_inverse
+    if before.users == 0:
+        name = before.name
+        bpy.data.meshes.remove(before)
+        part.data.name = name
+    return mesh
 
 
 def _modified(part: bpy.types.Object) -> Mesh:

@@ -28,7 +28,7 @@ from ..scene.cages import (
 )
 from ..scene.collections import object_of, objects_of, select_only
 from ..scene.gather import free_name, part_names
-from ..scene.meshes import REST, part_mesh, remembered, show_vertices
+from ..scene.meshes import REST, remembered, settle, show_vertices
 
 
 def _cage(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -101,7 +101,7 @@ class OPTISENSE_OT_new_cage(polls.Checked, bpy.types.Operator):
         corners = []
         for part in parts:
             part.optisense.key = named[part]
-            vertices = part_mesh(part, caged=False).vertices
+            vertices = settle(part).vertices
             corners += [vertices.min(axis=0), vertices.max(axis=0)]
         lower, upper = np.min(corners, axis=0), np.max(corners, axis=0)
         thin = upper - lower < 1e-3  # a flat sheet needs a box with some height

@@ -19,7 +19,7 @@ from studio.engine import design_transfer, session
 from studio.scene import cages
 from studio.scene.build import add_part
 from studio.scene.collections import object_of, objects_of
-from studio.scene.gather import gather_document
+from studio.scene.gather import gather, gather_document
 from studio.shapes.cage_warnings import warnings_of
 from studio.shapes.ui import OPTISENSE_PT_shapes
 
@@ -209,3 +209,53 @@ def test_a_lost_control_point_is_told(mini: Any) -> None:
     with pytest.raises(ValueError, match="26 control points instead of 27"):
         gather_document(mini)
     assert json.loads(cage.optisense.data)["resolution"] == [3, 3, 3]
+
+
+def edited(part: Any) -> None:
+    """Its lowest vertices lie 2 mm lower."""
+    lowest = min(vertex.co.z for vertex in part.data.vertices)
+    for vertex in part.data.vertices:
+        vertex.co.z -= 2.0 * (vertex.co.z < lowest + 1e-3)
+    part.data.update()
+
+
+def modified(part: Any) -> None:
+    part.modifiers.new("cut", "TRIANGULATE")
+    lower = part.modifiers.new("lower", "DISPLACE")
+    lower.direction, lower.strength, lower.mid_level = "Z", -1.0, 0.0
+
+
+def moved(part: Any) -> None:
+    rig = bpy.data.objects.new("rig", None)
+    bpy.context.scene.collection.objects.link(rig)
+    part.parent, part.location.z, part.scale.z, rig.location.x = rig, -3.0, 0.5, 1.0
+
+
+@pytest.mark.parametrize("change", [edited, modified, moved])
+def test_a_new_cage_keeps_the_present_shape_of_its_part(
+    change: Callable[[Any], None], mini: Any, select: Callable[..., None]
+) -> None:
+    guide, light = object_of(mini, "PART", "guide"), objects_of(mini, "LIGHT")[0]
+    change(guide)
+    light.parent = guide
+    before, meshes = gather(mini)
+    select(guide)
+    assert bpy.ops.optisense.new_cage() == {"FINISHED"}
+    after, found = gather(mini)
+    assert np.allclose(found["guide"].vertices, meshes["guide"].vertices, atol=1e-6)
+    assert np.allclose(
+        after["lights"]["red"]["lights"][0]["position"],
+        before["lights"]["red"]["lights"][0]["position"],
+        atol=1e-5,
+    )
+    cage = object_of(mini, "CAGE", "guide")
+    cage.data.vertices[0].co.z -= 4.0
+    cage.data.update()
+    bpy.context.view_layer.update()
+    answer = session.ask_and_wait("open", design=design_transfer.design(mini), name="bent")
+    engines = np.load(answer["shapes"]["guide"]["vertices"])
+    shown = [guide.matrix_world @ vertex.co for vertex in guide.data.vertices]
+    assert np.allclose(shown, engines, atol=2e-5)
+    select(cage)
+    bpy.ops.optisense.remove_cage()
+    assert np.allclose(gather(mini)[1]["guide"].vertices, meshes["guide"].vertices, atol=1e-6)
