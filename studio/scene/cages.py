@@ -19,6 +19,11 @@ from .meshes import REST, remembered, show_vertices, shown_vertices
 
 MOST_KEPT = 32
 """Number of cages whose weights are cached, so that bending one again needs no new ones."""
+SAME_SHAPE = 1e-3
+"""Largest distance in mm between a drawn vertex and its place in the cage that counts as equal: the
+rounding of positions and weights in single precision, for sensors of up to a metre.
+"""
+
 _weights: dict[tuple[bytes, bytes, tuple[int, int, int]], NDArray[np.float32]] = {}
 
 when_bent: list[Callable[[], None]] = []
@@ -192,6 +197,50 @@ def follow(scene: bpy.types.Scene, cage: bpy.types.Object) -> None:
         show_vertices(part.data, weights @ points)
     for each in when_bent:
         each()
+
+
+def ignored_edits(scene: bpy.types.Scene, cage: bpy.types.Object) -> list[dict[str, Any]]:
+    """Return a problem, in the form of the engine's, for each part of a cage that is drawn in
+    another shape than the cage gives it, by edits of its vertices or by modifiers.
+    """
+    values, points = cage_data(cage), shown_points(cage)
+    resolution = tuple(values["resolution"])
+    if len(points) != np.prod(resolution):
+        return []
+    found = []
+    for name in values["parts"]:
+        part = object_of(scene, "PART", name)
+        if part is None or part.mode == "EDIT":
+            continue
+        if part.modifiers or not _is_bent(part, np.array(values["box"]), resolution, points):
+            found.append(
+                {
+                    "severity": "warning",
+                    "message": f"part '{name}' was edited by hand, or has modifiers; its cage "
+                    "ignores that",
+                    "hint": "Remove the cage, edit the part, and create the cage again",
+                    "path": "",
+                    "part": name,
+                }
+            )
+    return found
+
+
+def _is_bent(
+    part: bpy.types.Object,
+    box: NDArray[np.float64],
+    resolution: tuple[int, int, int],
+    points: NDArray[np.float32],
+) -> bool:
+    """Return whether a part has the shape that its cage gives it, as far as that is known."""
+    rest = remembered(part.data, REST)
+    if rest is None or not len(rest):
+        return True
+    try:
+        weights = _kept_weights(rest, box, resolution)
+    except ValueError:  # The engine's check reports the error in words.
+        return True
+    return bool(np.abs(weights @ points - shown_vertices(part.data)).max() < SAME_SHAPE)
 
 
 def _kept_weights(

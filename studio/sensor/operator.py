@@ -11,6 +11,8 @@ from bpy.props import StringProperty
 from ..core.engine import EngineError
 from ..engine import catalogue, design_transfer, polls, session
 from ..engine.operators import ChoosingFile, Starting, fail, report_error, start
+from ..scene.cages import ignored_edits
+from ..scene.collections import objects_of
 from ..scene.paths import chosen, suggested
 from .opening import open_empty, open_source
 
@@ -171,8 +173,13 @@ class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
     bl_label = "Check"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        name = context.scene.name
+
         def checked(result: dict[str, Any]) -> None:
-            problems = result["problems"]
+            scene = bpy.data.scenes.get(name)
+            cages = [] if scene is None else objects_of(scene, "CAGE")
+            ignored = [each for cage in cages for each in ignored_edits(scene, cage)]
+            problems = [*result["problems"], *ignored]
             if not problems:
                 session.state().note = "The design is in order"
                 return

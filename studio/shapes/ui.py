@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..engine.layout import SidebarPanel, labelled, paragraph, show_job, show_outcome
+from ..scene.cages import ignored_edits
 from ..scene.collections import objects_of
 from ..scene.contacts import sensing_surface
 from .cage_operator import active_cage
@@ -49,7 +50,7 @@ class OPTISENSE_PT_shapes(SidebarPanel, bpy.types.Panel):
             ).cage = key  # fmt: skip
         found = active_cage(context)
         if found is not None:
-            _cage(box, *found)
+            _cage(box, context.scene, *found)
 
 
 def _part(layout: bpy.types.UILayout, part: bpy.types.Object) -> None:
@@ -62,12 +63,14 @@ def _part(layout: bpy.types.UILayout, part: bpy.types.Object) -> None:
     row.operator("optisense.remove_part", text="", icon="X")
 
 
-def _cage(layout: bpy.types.UILayout, cage: bpy.types.Object, values: dict) -> None:
+def _cage(
+    layout: bpy.types.UILayout, scene: bpy.types.Scene, cage: bpy.types.Object, values: dict
+) -> None:
     along = " x ".join(str(count) for count in values["resolution"])
     text = f"{cage.optisense.key}: {along}, bends {', '.join(values['parts'])}"
     paragraph(layout, text, boxed=True)
     problems = warnings_of(cage.optisense.key)
-    for problem in problems:
+    for problem in [*ignored_edits(scene, cage), *problems]:
         message = problem["message"]
         hint = f" {problem['hint']}." if problem["hint"] else ""
         text = f"{message[:1].upper()}{message[1:]}.{hint}"

@@ -259,3 +259,21 @@ def test_a_new_cage_keeps_the_present_shape_of_its_part(
     select(cage)
     bpy.ops.optisense.remove_cage()
     assert np.allclose(gather(mini)[1]["guide"].vertices, meshes["guide"].vertices, atol=1e-6)
+
+
+@pytest.mark.parametrize("change", [edited, modified])
+def test_edits_of_a_part_in_a_cage_are_told(
+    change: Callable[[Any], None], mini: Any, select: Callable[..., None]
+) -> None:
+    gel, cage = object_of(mini, "PART", "gel"), objects_of(mini, "CAGE")[0]
+    cage.data.vertices[14].co.z += 4.0
+    cage.data.update()
+    bpy.context.view_layer.update()
+    select(gel)
+    assert "ignores" not in " ".join(draw(OPTISENSE_PT_shapes).texts)
+    change(gel)
+    text = "art 'gel' was edited by hand, or has modifiers; its cage ignores that"
+    assert text in " ".join(draw(OPTISENSE_PT_shapes).texts)
+    assert bpy.ops.optisense.check() == {"FINISHED"}
+    assert text in session.state().problem
+    assert "Selected: gel" in session.state().hint
