@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import hashlib
 import os
 from pathlib import Path
 from typing import Any
@@ -19,8 +21,8 @@ from optisense.folders import begun, held
 from optisense.geometry import TriangleMesh
 from optisense.near import near_match
 from optisense.text import brief
+from optisense.untrusted_files import MOST_MESH, MOST_TEXT, is_file, is_folder, read_bytes
 from optisense.untrusted_files import inside as inside_folder
-from optisense.untrusted_files import is_file, is_folder
 from optisense.writing import inside, written_together
 
 DESIGN_FILE = "design.yaml"
@@ -108,6 +110,29 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
         for file, data in _named_files(design).items():
             stage(inside(folder, file)).write_bytes(data)
         stage(inside(folder, DESIGN_FILE)).write_text(to_yaml(saved, HEAD), encoding="utf-8")
+
+
+def digest_of(folder: str | Path) -> str:
+    """Return a digest of a folder's design.yaml and of the meshes that it names, by which a change
+    of them is noticed; empty if there is no design.yaml.
+
+    Files that can't be read count as absent, so that a damaged design has a digest, too.
+    """
+    folder = Path(folder)
+    file = folder / DESIGN_FILE
+    if not is_file(file):
+        return ""
+    found = hashlib.blake2b(digest_size=16)
+    with contextlib.suppress(DesignError):
+        found.update(read_bytes(file, MOST_TEXT, DesignError))
+        parts = read_yaml(file)[0].get("parts")
+        values = parts.values() if isinstance(parts, dict) else ()
+        names = (value.get("mesh") for value in values if isinstance(value, dict))
+        for name in sorted({name for name in names if isinstance(name, str)}):
+            path = inside_folder(folder, name)
+            if path is not None and is_file(path):
+                found.update(read_bytes(path, MOST_MESH, DesignError))
+    return found.hexdigest()
 
 
 def files_of(design: SensorDesign) -> list[str]:

@@ -19,6 +19,7 @@ from optisense.design import (
     settle_cage,
 )
 from optisense.design.parts import TRANSPARENT_SOLIDS
+from optisense.design.storage import digest_of
 from optisense.engine.designs import AnyMesh
 from optisense.engine.failures import ProtocolError, problem_row
 from optisense.engine.files import Files
@@ -28,7 +29,7 @@ from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, blender_pixels, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
-from optisense.errors import DesignError, MeshError
+from optisense.errors import DesignError, MeshError, OutputError
 from optisense.geometry import TriangleMesh, cage_weights
 from optisense.library import with_own_lights
 from optisense.near import suggestion
@@ -49,6 +50,7 @@ class Save(DesignFields):
 
     to: str
     only_new: bool = False
+    digest: str | None = None
 
 
 class Mesh(Fields):
@@ -127,9 +129,18 @@ def open_design(session: Session, fields: DesignFields, job: Job) -> dict[str, A
 def save(session: Session, fields: Save, job: Job) -> dict[str, Any]:
     """Write a design folder."""
     folder = Path(fields.to)
+    named = fields.design if isinstance(fields.design, str) else fields.design.source
+    # Before the files are read: a change meanwhile is noticed by the next save.
+    source = digest_of(named) if named is not None and Path(named).is_absolute() else None
     design = design_of(session, fields, job)
+    if fields.digest is not None and digest_of(folder) not in ("", fields.digest):
+        raise OutputError(
+            "the design was changed on disk since it was opened here",
+            where=str(folder),
+            hint="Open it again, or use Save As to write this one to another folder",
+        )
     save_design(with_own_lights(design), folder, new=fields.only_new)
-    return {"folder": str(folder)}
+    return {"folder": str(folder), "digest": digest_of(folder), "source_digest": source}
 
 
 @handles("mesh", Mesh, Lane.QUICK)

@@ -22,6 +22,10 @@ when_opened: list[Callable[[bpy.types.Scene, str | None], None]] = []
 """Callbacks for a sensor being opened (a built-in one, a folder of the user, or CAD files), and the
 file of the engine's draft of it, which only built-in sensors have."""
 
+digests: dict[str, str] = {}
+"""Digest of each design folder as it was last opened or saved in this Blender, by which the engine
+notices that another program has changed it. Undo does not bring older ones back."""
+
 
 def tell_opened(scene: bpy.types.Scene, draft: str | None) -> None:
     """Call these callbacks."""
@@ -53,9 +57,11 @@ def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool)
     """
     name, stage = scene.name, new_stage()
 
-    def written(_: dict[str, Any]) -> None:
+    def written(result: dict[str, Any]) -> None:
         scene = bpy.data.scenes.get(name)
         if scene is not None:
+            if folder and result.get("source_digest"):
+                digests[folder] = result["source_digest"]
             open_stage(scene, stage, wait=wait, folder=folder, then=tell_opened)
 
     # The engine reads all formats that users have, and writes the one that the extension reads.

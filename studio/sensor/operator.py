@@ -14,7 +14,7 @@ from ..engine.operators import ChoosingFile, Starting, fail, report_error, start
 from ..scene.cages import ignored_edits
 from ..scene.collections import objects_of
 from ..scene.paths import chosen, suggested
-from .opening import open_empty, open_source
+from .opening import digests, open_empty, open_source
 
 
 class _Opens:
@@ -116,7 +116,11 @@ class _Saves:
         name = scene.name
         own = scene.optisense.is_saved and Path(scene.optisense.folder) == Path(folder)
 
+        known = {"digest": digests[folder]} if own and folder in digests else {}
+
         def saved(result: dict[str, Any]) -> None:
+            if result.get("digest"):
+                digests[result["folder"]] = result["digest"]
             scene = bpy.data.scenes.get(name)
             if scene is not None:
                 scene.optisense.folder = result["folder"]
@@ -125,8 +129,9 @@ class _Saves:
 
         wait = bpy.app.background
         return start(
-            self, "Saving", "save", saved, wait=wait, design=design, to=folder, only_new=not own
-        )
+            self, "Saving", "save", saved, wait=wait, design=design, to=folder, only_new=not own,
+            **known,
+        )  # fmt: skip
 
 
 class OPTISENSE_OT_save(polls.Checked, _Saves, bpy.types.Operator):

@@ -167,6 +167,28 @@ def test_files_that_changed_are_read_again(engine: Any, tmp_path: Path) -> None:
     assert refused["kind"] == "OutputError"
 
 
+def test_a_design_that_was_changed_on_disk_is_not_overwritten(engine: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "design"
+    first = engine.ask("save", design="gelsight-mini-ideal", to=str(folder))
+    assert first["source_digest"] is None
+    copied = engine.ask("save", design=str(folder), to=str(tmp_path / "copy"))
+    assert copied["source_digest"] == first["digest"]
+
+    def save(**fields: Any) -> Any:
+        return {"design": "gelsight-mini-ideal", "to": str(folder), **fields}
+
+    assert engine.ask("save", **save(digest=first["digest"]))["digest"] == first["digest"]
+    for name in ("design.yaml", "meshes/gel.obj"):
+        file = folder / name
+        text = file.read_text()
+        file.write_text(text + "# another program was here\n")
+        refused = engine.refused("save", **save(digest=first["digest"]))
+        assert refused["kind"] == "OutputError" and "changed on disk" in refused["message"]
+        file.write_text(text)
+    (folder / "design.yaml").unlink()
+    assert engine.ask("save", **save(digest=first["digest"]))["digest"] == first["digest"]
+
+
 def test_the_library_is_listed_drawn_and_added_to(engine: Any) -> None:
     for kind in ("material", "coating", "light", "camera"):
         rows = engine.ask("library", kind=kind)["entries"]

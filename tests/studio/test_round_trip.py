@@ -111,6 +111,30 @@ def test_a_saved_folder_is_not_overwritten_by_another_sensor(mini: Any, tmp_path
     assert mini.optisense.title == "gelsight-mini-ideal"
 
 
+def test_a_design_that_another_program_changed_is_not_overwritten(
+    mini: Any, tmp_path: Path
+) -> None:
+    bpy.ops.optisense.save_as(filepath=str(tmp_path / "a"))
+    bpy.ops.ed.undo_push(message="Save")
+    mini.optisense.description = "mine"
+    bpy.ops.ed.undo_push(message="Describe")
+    assert bpy.ops.optisense.save() == {"FINISHED"}
+    bpy.ops.ed.undo()
+    assert bpy.ops.optisense.save() == {"FINISHED"}
+    file = tmp_path / "a" / "design.yaml"
+    changed = file.read_text().replace("flux: 2.1", "flux: 7.5")
+    file.write_text(changed)
+    with pytest.raises(RuntimeError, match="was changed on disk since it was opened here"):
+        bpy.ops.optisense.save()
+    assert file.read_text() == changed
+    assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "b")) == {"FINISHED"}
+    bpy.ops.optisense.open(filepath=str(file))
+    assert bpy.ops.optisense.save() == {"FINISHED"}
+    file.write_text(changed.replace("7.5", "8.5"))
+    with pytest.raises(RuntimeError, match="was changed on disk"):
+        bpy.ops.optisense.save()
+
+
 def test_what_is_edited_is_written_and_nothing_else(mini: Any) -> None:
     before = gather_document(mini)
     light = objects_of(mini, "LIGHT")[0]
