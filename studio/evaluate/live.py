@@ -41,7 +41,14 @@ def _ask() -> None:
         return
     scene, names = bpy.context.scene, objectives(bpy.context)
     if scene is not None and scene.optisense.is_open and names:
-        _request.send("evaluate", take_live, objectives=names, name="live")
+        name = scene.name
+
+        def taken(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                take_live(result, scene)
+
+        _request.send("evaluate", taken, objectives=names, name="live")
     else:
         _request.drop()
 

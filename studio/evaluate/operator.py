@@ -53,12 +53,19 @@ class OPTISENSE_OT_evaluate(polls.Checked, Starting, bpy.types.Operator):
     checks = (*polls.ASKING, polls.requires(lambda c: chosen(c), "Choose an objective first"))
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
+        name = context.scene.name
+
+        def taken(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                take(result, scene)
+
         return start_with_design(
             self,
             context,
             "Evaluating",
             "evaluate",
-            take,
+            taken,
             wait=wait,
             objectives=chosen(context),
             figures=True,
@@ -73,13 +80,13 @@ def chosen(context: bpy.types.Context) -> list[str]:
     return [*names, objective(values.own)] if values.own.strip() else names
 
 
-def take(result: dict[str, Any]) -> None:
-    """Replace the scores in the panel."""
+def take(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+    """Replace the scores in the panel by those of a scene's sensor."""
     values = bpy.context.window_manager.optisense_evaluation
-    before = _before()
+    before = _before(scene)
     opened = {score.name for score in values.scores if score.is_open}
     values.scores.clear()
-    values.is_before = False
+    values.is_before, values.scene = False, scene.session_uid
     for row in result["scores"]:
         score = values.scores.add()
         score.name = row["objective"]
@@ -88,23 +95,25 @@ def take(result: dict[str, Any]) -> None:
     session.redraw()
 
 
-def take_live(result: dict[str, Any]) -> None:
-    """Update the scores that are made while the sensor is edited, and keep the other scores."""
+def take_live(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+    """Update the scores that are made while a scene's sensor is edited, and keep its others."""
     values = bpy.context.window_manager.optisense_evaluation
-    before = _before()
+    before = _before(scene)
+    if not values.is_of(scene):
+        values.scores.clear()
     for row in result["scores"]:
         score = values.scores.get(row["objective"]) or values.scores.add()
         score.name = row["objective"]
         _fill(score, row, before.get(score.name))
         score.is_live = True
-    values.is_before = False
+    values.is_before, values.scene = False, scene.session_uid
     session.redraw()
 
 
-def _before() -> dict[str, float]:
-    """Return the present scores of this sensor by objective."""
+def _before(scene: bpy.types.Scene) -> dict[str, float]:
+    """Return the present scores of a scene's sensor by objective."""
     values = bpy.context.window_manager.optisense_evaluation
-    if values.is_before:
+    if values.other_sensor(scene):
         return {}
     return {score.name: score.number for score in values.scores if score.value}
 

@@ -14,6 +14,7 @@ from bpy.props import (
 )
 
 from ..engine import catalogue
+from ..scene.results import OfScene
 
 when_live_changed: list[Callable[[], None]] = []
 """Callbacks for live scoring being switched on or off."""
@@ -51,7 +52,7 @@ class OPTISENSE_PG_score(bpy.types.PropertyGroup):
     figure: StringProperty(description="File of the picture that explains the score")
 
 
-class OPTISENSE_PG_evaluation(bpy.types.PropertyGroup):
+class OPTISENSE_PG_evaluation(OfScene, bpy.types.PropertyGroup):
     """Last evaluation; never saved."""
 
     chosen: EnumProperty(

@@ -52,7 +52,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
             row.operator("optisense.evaluate", icon="CHECKMARK")
         show_outcome(layout, "Evaluating", "Tracing rays")
         if values.scores:
-            _strip(layout.box(), values)
+            _strip(layout.box(), context.scene, values)
         row = layout.row(align=True)
         if not show_job(row, "Tracing rays"):
             row.operator("optisense.show_rays", icon="CURVE_DATA")
@@ -62,10 +62,13 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
         ledger.draw(layout)
 
 
-def _strip(layout: bpy.types.UILayout, values: bpy.types.PropertyGroup) -> None:
+def _strip(
+    layout: bpy.types.UILayout, scene: bpy.types.Scene, values: bpy.types.PropertyGroup
+) -> None:
     """Draw all scores, one line each; the arrow unfolds the parts of a score."""
-    if values.is_before:
-        layout.label(text="Scores of the sensor that was open before", icon="INFO")
+    other = values.other_sensor(scene)
+    if other:
+        layout.label(text=f"Scores of the {other}", icon="INFO")
     column = layout.column(align=True)
     for score in values.scores:
         _line(column, score)

@@ -14,7 +14,12 @@ from ..scene.paths import chosen, suggested
 
 def _can_report(context: bpy.types.Context) -> bool:
     now = context.window_manager.optisense_picture
-    return bool(now.image) and not now.is_draft and session.running() is not None
+    return (
+        bool(now.image)
+        and now.is_of(context.scene)
+        and not now.is_draft
+        and session.running() is not None
+    )
 
 
 class OPTISENSE_OT_report(polls.Checked, ChoosingFile, bpy.types.Operator):

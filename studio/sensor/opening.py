@@ -99,7 +99,7 @@ def open_stage(
         document = design_transfer.without_nulls(result["data"])
         parts = document["parts"].items()
         clear_startup(scene)
-        picture_is_old()
+        picture_is_old(scene)
         meshes = {key: mesh_file.read(stage / part["mesh"]) for key, part in parts}
         before = looks_of(scene) if keep_others else None
         build(scene, document, meshes, keep_others=keep_others)
@@ -127,7 +127,7 @@ def open_stage(
 def open_empty(scene: bpy.types.Scene, document: dict[str, Any]) -> None:
     """Replace the sensor by one without parts; references stay."""
     clear_startup(scene)
-    picture_is_old()
+    picture_is_old(scene)
     build(scene, document, {}, keep_others=True)
     scene.optisense.folder = str(new_stage())
     scene.optisense.is_saved = False
@@ -135,14 +135,19 @@ def open_empty(scene: bpy.types.Scene, document: dict[str, Any]) -> None:
     session.redraw()
 
 
-def picture_is_old() -> None:
-    """Mark picture and scores as those of the sensor before; its picture can't be relit any more.
+def picture_is_old(scene: bpy.types.Scene | None) -> None:
+    """Mark picture and scores of a scene as those of the sensor before; its picture can't be relit
+    any more.
 
-    The scores are not of that sensor either.
+    Args:
+        scene: scene that gets another sensor; results of other scenes stay as they are. None if all
+            scenes are others now.
     """
     now = bpy.context.window_manager.optisense_picture
-    now.image = ""
-    now.is_before = now.shown
+    if scene is None or now.is_of(scene):
+        now.image = ""
+        now.is_before = now.shown
     evaluation = bpy.context.window_manager.optisense_evaluation
-    evaluation.is_before = True
+    if scene is None or evaluation.is_of(scene):
+        evaluation.is_before = True
     evaluation.rays = ""  # they go with the sensor that they were drawn in

@@ -47,7 +47,7 @@ def _start() -> None:
 @bpy.app.handlers.persistent
 def _loaded(*_: Any) -> None:
     """Mark the picture as outdated after a .blend file was opened, and warm the engine up."""
-    picture_is_old()
+    picture_is_old(None)
     scene = bpy.context.scene
     if not bpy.app.background and scene.optisense.is_open and session.running() is not None:
         warm_up(scene)

@@ -82,13 +82,14 @@ def _ask() -> None:
     if not scene.optisense.is_open:
         return
     warming.put_off()
+    asked = scene.session_uid
     try:
         design = design_transfer.design(scene)
         contacts = design_transfer.contacts(scene)
         _open.append(
             session.engine().send(
                 "simulate",
-                on_result=_take,
+                on_result=lambda result: _take(result, asked),
                 on_error=_ignored if first else _refused,
                 design=design,
                 contacts=contacts,
@@ -115,18 +116,24 @@ def _first(scene: bpy.types.Scene, draft: str | None) -> None:
         _opened = True
 
 
-def _take(result: dict[str, Any]) -> None:
-    """Show a draft, and schedule a complete one if it reused earlier results."""
+def _take(result: dict[str, Any], asked: int) -> None:
+    """Show a draft, and schedule a complete one if it reused earlier results.
+
+    Args:
+        asked: session id of the scene of the draft, which is dropped if the user left that scene.
+    """
     global _again, _began, _pace
     now = time.monotonic()
     _began, _pace = now, now - _began
-    requests.take(result, draft=True)
+    scene = bpy.context.scene
+    if scene.session_uid != asked:
+        return
+    requests.take(result, scene, draft=True)
     if session.state().note.startswith(NONE):
         session.state().note = ""
     settings = result["settings"]
     if _wanted:
         return
-    scene = bpy.context.scene
     if scene.optisense_simulation.draft and any(settings.get(each) for each in REUSED):
         _again = time.monotonic() + REST
     elif all(each.done for each in _open):

@@ -42,14 +42,14 @@ class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
             fields = requests.fields(context.scene)
         except EngineError as error:
             return fail(self, error, "Simulating")
-        return start(
-            self,
-            "Simulating",
-            "simulate",
-            lambda result: requests.take(result, draft=False),
-            wait=wait,
-            **fields,
-        )
+        name = context.scene.name
+
+        def taken(result: dict[str, Any]) -> None:
+            scene = bpy.data.scenes.get(name)
+            if scene is not None:
+                requests.take(result, scene, draft=False)
+
+        return start(self, "Simulating", "simulate", taken, wait=wait, **fields)
 
 
 class OPTISENSE_OT_show_picture(polls.Checked, bpy.types.Operator):

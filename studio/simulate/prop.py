@@ -12,6 +12,7 @@ from bpy.props import (
 )
 
 from ..scene import kinds
+from ..scene.results import OfScene
 from .exposure import exposure_changed
 
 SIZES = [
@@ -70,7 +71,7 @@ class OPTISENSE_PG_simulation(bpy.types.PropertyGroup):
     )
 
 
-class OPTISENSE_PG_picture(bpy.types.PropertyGroup):
+class OPTISENSE_PG_picture(OfScene, bpy.types.PropertyGroup):
     """Picture that is shown; never saved."""
 
     image: StringProperty(description="Name of the picture in the engine", options={"SKIP_SAVE"})

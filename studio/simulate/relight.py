@@ -27,10 +27,12 @@ def wanted() -> None:
     """Schedule relighting after a change of the light groups."""
     global _wanted
     now = bpy.context.window_manager.optisense_picture
-    if now.shown and now.image and session.running() is not None:
+    if not now.shown or now.other_sensor(bpy.context.scene):
+        return
+    if now.image and session.running() is not None:
         _wanted = True
         _ask()
-    elif now.shown and not now.is_before:
+    else:
         session.state().note = AGAIN
 
 
@@ -69,25 +71,31 @@ def _ask() -> None:
     if engine is None:
         return
     _wanted = False
-    image = bpy.context.window_manager.optisense_picture.image
-    _shown = lights(bpy.context.scene)
+    scene = bpy.context.scene
+    now = bpy.context.window_manager.optisense_picture
+    if not now.is_of(scene):
+        return
+    _shown = lights(scene)
     _open = engine.send(
         "relight",
         on_result=_take,
         on_error=_refused,
-        image=image,
+        image=now.image,
         lights=_shown,
-        exposure=exposure(bpy.context.scene),
+        exposure=exposure(scene),
         files=["pixels"],
         name=NAME,
     )
 
 
 def _take(result: dict[str, Any]) -> None:
-    scene = bpy.context.scene
+    now = bpy.context.window_manager.optisense_picture
+    scene = next((each for each in bpy.data.scenes if now.is_of(each)), None)
+    if scene is None:
+        return
     picture.show(np.load(result["files"]["pixels"]), shown_size(scene))
     keep_exposure(scene, result["exposure"])
-    bpy.context.window_manager.optisense_picture.is_relit = True
+    now.is_relit = True
     session.redraw()
 
 

@@ -42,12 +42,12 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
     return asked
 
 
-def take(result: dict[str, Any], *, draft: bool) -> None:
-    """Show the picture in the engine's answer."""
-    scene = bpy.context.scene
+def take(result: dict[str, Any], scene: bpy.types.Scene, *, draft: bool) -> None:
+    """Show the picture of a scene's sensor in the engine's answer."""
     picture.show(np.load(result["files"]["pixels"]), shown_size(scene) if draft else None)
     keep_exposure(scene, result["exposure"])
     now = bpy.context.window_manager.optisense_picture
+    now.scene = scene.session_uid
     now.image = result["image"]
     relight.shown(result["lights"])
     now.shown = True
@@ -59,7 +59,7 @@ def take(result: dict[str, Any], *, draft: bool) -> None:
     _sink(scene, result)
     if not all(group.shown for group in scene.optisense.light_groups):
         relight.wanted()
-    _tell_unseen(result.get("unseen") or [])
+    _tell_unseen(scene, result.get("unseen") or [])
     session.redraw()
 
 
@@ -76,9 +76,8 @@ def _pressed(result: dict[str, Any]) -> list[dict[str, Any]]:
     return [] if result.get("draft") else (result.get("settings") or {}).get("presses") or []
 
 
-def _tell_unseen(numbers: list[int]) -> None:
+def _tell_unseen(scene: bpy.types.Scene, numbers: list[int]) -> None:
     """Select the contacts that the picture does not show, and report them."""
-    scene = bpy.context.scene
     contacts = pressing(scene)
     chosen = select([contacts[each] for each in numbers if each < len(contacts)])
     if chosen:

@@ -82,6 +82,7 @@ def _show(scene: bpy.types.Scene, file: Path | None) -> bool:
         return False
     show(pixels, shown_size(scene))
     now = bpy.context.window_manager.optisense_picture
+    now.scene = scene.session_uid
     now.shown = now.is_draft = now.is_stored = True
     now.is_relit = now.is_before = False
     now.image = now.file = now.presses = ""  # the engine does not know it

@@ -44,8 +44,9 @@ class OPTISENSE_PT_simulate(SidebarPanel, bpy.types.Panel):
         icon = picture.icon()
         if icon and context.workspace.name != TAB:  # there the picture stands beside the bench
             layout.template_icon(icon_value=icon, scale=11.0)
-        if now.is_before:
-            layout.label(text="Picture of the sensor that was open before", icon="INFO")
+        other = now.other_sensor(scene)
+        if other:
+            layout.label(text=f"Picture of the {other}", icon="INFO")
         paragraph(layout, picture.kind(now) + now.summary)
         for line in now.presses.splitlines():
             paragraph(layout, line, "FORCE_FORCE")

@@ -230,8 +230,10 @@ def words(context: bpy.types.Context) -> list[str]:
     now, values = context.window_manager.optisense_picture, context.window_manager.optisense_view
     if not now.shown:
         return []
-    old = "Sensor that was open before: " if now.is_before else ""
-    lines = [f"{old}{picture.kind(now)}{now.summary}"]
+    other = now.other_sensor(context.scene)
+    lines = [
+        f"{other[:1].upper()}{other[1:]}: " * bool(other) + f"{picture.kind(now)}{now.summary}"
+    ]
     if values.pinned and values.compare == "WIPE":
         lines.append(f"On the left: the pinned picture ({values.pinned})")
     elif values.pinned and values.compare == "DIFFERENCE":

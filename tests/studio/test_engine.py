@@ -271,9 +271,9 @@ def test_drafts_follow_a_dragged_light_and_the_last_is_whole(mini: Any) -> None:
     take, engine = drafts.requests.take, session.engine()
     light, settings = objects_of(mini, "LIGHT")[0], mini.optisense_simulation
 
-    def taken(result: dict[str, Any], *, draft: bool) -> None:
+    def taken(result: dict[str, Any], scene: Any, *, draft: bool) -> None:
         pictures.append(result)
-        take(result, draft=draft)
+        take(result, scene, draft=draft)
 
     drafts.requests.take, settings.draft = taken, True
     try:

@@ -69,7 +69,7 @@ def test_scores_of_the_sensor_before_say_so(mini: Any) -> None:
     assert not values.is_before
     bpy.ops.optisense.new(sensor="gelsight-mini-ideal")
     assert values.is_before
-    evaluate_operator.take({"scores": []})
+    evaluate_operator.take({"scores": []}, mini)
     assert not values.is_before
 
 

@@ -8,6 +8,9 @@ import bpy
 import numpy as np
 from shown_picture import shown
 
+from studio.engine import session
+from studio.simulate import relight
+
 
 def test_undo_relights_the_picture(mini: Any) -> None:
     mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
@@ -35,3 +38,29 @@ def test_a_group_without_a_colour_is_dark(mini: Any) -> None:
     dark = shown()
     group.colour, group.flux = (1.0, 0.0, 0.0), 0.0
     assert np.array_equal(dark, shown())
+
+
+def test_the_lights_of_another_scene_do_not_relight_the_picture(mini: Any) -> None:
+    mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
+    bpy.context.window_manager.optisense_evaluation.chosen = {"aoap"}
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    assert bpy.ops.optisense.evaluate() == {"FINISHED"}
+    before, name = shown(), mini.name
+    bpy.ops.scene.new(type="FULL_COPY")
+    other = bpy.context.scene
+    assert other != mini and other.optisense.is_open
+    now = bpy.context.window_manager.optisense_picture
+    scored = bpy.context.window_manager.optisense_evaluation
+    other.optisense.light_groups[0].flux = 0.0
+    session.ask_and_wait("library", kind="coating")  # a relighting would have come before this
+    assert np.array_equal(shown(), before) and not now.is_relit
+    for result in (now, scored):
+        assert result.other_sensor(other) == f"sensor of the scene '{name}'"
+    assert not bpy.ops.optisense.report.poll()
+    assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
+    bpy.context.window.scene = mini
+    assert not now.other_sensor(mini) and not scored.other_sensor(mini)
+    assert bpy.ops.optisense.report.poll()
+    mini.optisense.light_groups[0].flux = 0.0
+    session.engine().wait(relight._open)
+    assert now.is_relit and not np.array_equal(shown(), before)
