@@ -33,7 +33,7 @@ def add_light(
     Args:
         pose: `position`, `direction` and optionally `up`, as in the design file.
     """
-    light = bpy.data.objects.new(group.name, _mesh(group))
+    light = bpy.data.objects.new(group.name, _mesh(scene, group))
     values = light.optisense
     values.kind = "LIGHT"
     values.group = group.name
@@ -70,7 +70,7 @@ def redraw(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
     """Redraw the lights of a group after a change of the group."""
     lights = [each for each in objects_of(scene, "LIGHT") if each.optisense.group == group.name]
     if lights:
-        mesh = _mesh(group)
+        mesh = _mesh(scene, group)
         for light in lights:
             light.data = mesh
             light.color = lamp_colour(group)
@@ -90,10 +90,14 @@ def window(group: bpy.types.PropertyGroup) -> tuple[str, tuple[float, float], fl
     return face["shape"], tuple(face["size"]), known.get("half_angle", USUAL_HALF_ANGLE)
 
 
-def _mesh(group: bpy.types.PropertyGroup) -> bpy.types.Mesh:
-    name = f"lamp {group.name}"
-    mesh = next((m for m in bpy.data.meshes if m.name == name and m.library is None), None)
-    mesh = mesh or bpy.data.meshes.new(name)
+def _mesh(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> bpy.types.Mesh:
+    """Return the mesh that the lights of a group share, in the group's present size; a mesh that
+    another scene uses, too, keeps its size.
+    """
+    lights = [each for each in objects_of(scene, "LIGHT") if each.optisense.group == group.name]
+    mesh = next((each.data for each in lights if isinstance(each.data, bpy.types.Mesh)), None)
+    if mesh is None or mesh.users > sum(each.data == mesh for each in lights):
+        mesh = bpy.data.meshes.new(f"lamp {group.name}")
     mesh.clear_geometry()
     mesh.from_pydata(*lamp_drawing(*window(group)[:2]))
     mesh.update()
