@@ -14,12 +14,8 @@ from ..scene.paths import chosen, suggested
 
 def _can_report(context: bpy.types.Context) -> bool:
     now = context.window_manager.optisense_picture
-    return (
-        bool(now.image)
-        and now.is_of(context.scene)
-        and not now.is_draft
-        and session.running() is not None
-    )
+    is_whole = bool(now.image) and now.is_of(context.scene) and not now.is_draft
+    return is_whole and session.running() is not None
 
 
 class OPTISENSE_OT_report(polls.Checked, ChoosingFile, bpy.types.Operator):

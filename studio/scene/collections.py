@@ -65,9 +65,18 @@ def next_order(scene: bpy.types.Scene, kind: str) -> int:
 
 
 def clear(scene: bpy.types.Scene, *but: str) -> None:
-    """Remove the design from a scene: its objects, except some kinds, and data they alone used."""
+    """Remove the design from a scene: its objects, except some kinds, and data they alone used.
+
+    Objects that another scene shows, too, stay there; the scene gets copies of those to keep.
+    """
+    _leave_shared(scene, but)
     for each in [one for one in _ours(scene) if one.optisense.kind not in but]:
         data = each.data
+        if len(each.users_scene) > 1:
+            for holder in (scene.collection, *scene.collection.children_recursive):
+                if each.name in holder.objects:
+                    holder.objects.unlink(each)
+            continue
         bpy.data.objects.remove(each, do_unlink=True)
         if data is not None and data.users == 0:
             if isinstance(data, bpy.types.Mesh):
@@ -76,6 +85,36 @@ def clear(scene: bpy.types.Scene, *but: str) -> None:
                 bpy.data.cameras.remove(data)
             elif isinstance(data, bpy.types.Curve):
                 bpy.data.curves.remove(data)
+
+
+def _leave_shared(scene: bpy.types.Scene, but: tuple[str, ...]) -> None:
+    """Unlink the collections of the design that a linked copy of the scene shares with it."""
+    others = {
+        child
+        for other in bpy.data.scenes
+        if other != scene
+        for child in other.collection.children_recursive
+    }
+    if not others.intersection(scene.collection.children_recursive):
+        return
+    kept = [each for each in _ours(scene) if each.optisense.kind in but]
+    parents = [scene.collection]
+    while parents:
+        parent = parents.pop()
+        for child in list(parent.children):
+            if child not in others:
+                parents.append(child)
+            elif any(each.optisense.kind != "NONE" for each in child.all_objects) or (
+                child.name.split(".")[0] in ALL
+            ):
+                parent.children.unlink(child)
+    for each in kept:
+        if each.name not in scene.objects:
+            copy = each.copy()
+            if each.data is not None:
+                copy.data = each.data.copy()
+            place = CONTACTS if each.optisense.kind == "CONTACT" else REFERENCE
+            collection(scene, place).objects.link(copy)
 
 
 def _ours(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:

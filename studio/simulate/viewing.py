@@ -231,9 +231,8 @@ def words(context: bpy.types.Context) -> list[str]:
     if not now.shown:
         return []
     other = now.other_sensor(context.scene)
-    lines = [
-        f"{other[:1].upper()}{other[1:]}: " * bool(other) + f"{picture.kind(now)}{now.summary}"
-    ]
+    old = f"{other[:1].upper()}{other[1:]}: " if other else ""
+    lines = [f"{old}{picture.kind(now)}{now.summary}"]
     if values.pinned and values.compare == "WIPE":
         lines.append(f"On the left: the pinned picture ({values.pinned})")
     elif values.pinned and values.compare == "DIFFERENCE":

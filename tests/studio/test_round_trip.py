@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from studio.engine import design_transfer, session
 from studio.scene import cages
 from studio.scene.collections import ALL, object_of, objects_of
 from studio.scene.gather import gather, gather_document
+from studio.scene.lamps import redraw
+from studio.scene.meshes import shown_vertices
 
 SENSORS = (
     "gelbelt",
@@ -248,3 +251,27 @@ def test_what_a_camera_does_with_light_comes_back(scene: Any, tmp_path: Path) ->
         *("model", "projection", "fov", "resolution"),
         *("position", "direction", "up"),
     }
+
+
+def test_a_sensor_in_a_linked_copy_of_a_scene_leaves_that_alone(mini: Any) -> None:
+    bpy.ops.optisense.add_contact()
+    before, meshes = gather(mini)
+    bpy.ops.scene.new(type="LINK_COPY")
+    copy = bpy.context.scene
+    assert copy != mini and objects_of(copy, "PART") == objects_of(mini, "PART")
+    assert bpy.ops.optisense.new_empty() == {"FINISHED"}
+    assert not objects_of(copy, "PART") and len(objects_of(copy, "CONTACT")) == 1
+    assert bpy.ops.optisense.new(sensor="gelsight-mini-ideal") == {"FINISHED"}
+    assert not objects_of(copy, "CONTACT") and objects_of(copy, "PART")
+    assert not set(copy.objects) & set(mini.objects)
+    lamp, other = (objects_of(each, "LIGHT")[0].data for each in (mini, copy))
+    size = shown_vertices(lamp)
+    group = copy.optisense.light_groups[0]
+    group.drawn = json.dumps({"window": {"shape": "disc", "size": [9.0, 9.0]}})
+    redraw(copy, group)
+    assert shown_vertices(other).max() == pytest.approx(4.5)
+    assert np.array_equal(shown_vertices(lamp), size)
+    bpy.context.window.scene = mini
+    after, found = gather(mini)
+    assert after == before and found.keys() == meshes.keys()
+    assert len(objects_of(mini, "CONTACT")) == 1
