@@ -107,6 +107,12 @@ class OPTISENSE_OT_keep_family(bpy.types.Operator):
         name="Numbers", description="Group of numbers to add to the fit, or to leave out"
     )
 
+    @classmethod
+    def description(cls, context: bpy.types.Context, values: bpy.types.OperatorProperties) -> str:
+        words = {row["name"]: row["words"] for row in catalogue.entries("calibration_families")}
+        found = words.get(values.family)
+        return f"Let the calibration fit the {found}" if found else str(cls.__doc__)
+
     def execute(self, context: bpy.types.Context) -> set[str]:
         values = _values(context)
         rows = {each["name"]: each for each in catalogue.entries("calibration_families")}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import bpy
@@ -11,6 +12,7 @@ from recording import Recording, draw, menus, panels
 from waiting import until
 
 import studio
+from studio.calibrate.operator import OPTISENSE_OT_keep_family
 from studio.engine import catalogue, session
 from studio.scene.collections import object_of, objects_of
 
@@ -35,8 +37,6 @@ def draw_all() -> dict[str, Recording]:
 
 
 def draw_menu(menu: type) -> Recording:
-    from types import SimpleNamespace
-
     layout = Recording()
     menu.draw(SimpleNamespace(layout=layout), bpy.context)
     return layout
@@ -224,3 +224,15 @@ def test_nothing_selected_is_said(
     test_menus_are_filled_by_the_engine(mini)
     with pytest.raises(RuntimeError, match=why):
         getattr(bpy.ops.optisense, operator)()
+
+
+def test_each_group_of_numbers_of_the_calibration_is_explained(scene: Any) -> None:
+    session.ask_and_wait("calibration_families")
+    until(lambda: catalogue.entries("calibration_families"))
+    rows = catalogue.entries("calibration_families")
+    told = [
+        OPTISENSE_OT_keep_family.description(bpy.context, SimpleNamespace(family=row["name"]))
+        for row in rows
+    ]
+    assert len(set(told)) == len(rows)
+    assert all(row["words"] in text for row, text in zip(rows, told, strict=True))
