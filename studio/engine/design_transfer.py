@@ -14,7 +14,7 @@ from ..core import mesh_file, schema
 from ..core.engine import EngineError
 from ..core.errors import SceneError
 from ..core.mesh_file import Mesh
-from ..scene.contacts import contact_list
+from ..scene.contacts import contact_list, pressing
 from ..scene.gather import caged_parts, gather_document, part_names
 from ..scene.meshes import REST, corners_of, part_mesh, shown_vertices
 from ..scene.paths import absolute
@@ -74,9 +74,20 @@ def contacts(scene: bpy.types.Scene) -> list[dict[str, Any]]:
     """Return the scene's active contacts as a field of requests to the engine.
 
     Raises:
-        EngineError: there is no engine.
+        EngineError: there is no engine, or a contact has no indenter.
     """
     folder = Path(session.folder()) / "indenters"
+    for number, contact in enumerate(pressing(scene)):
+        values = contact.optisense
+        if values.indenter == "mesh" and not values.file.strip() and values.shape is None:
+            raise EngineError(
+                {
+                    "kind": "ContactError",
+                    "message": f"'{contact.name}' presses with the mesh of a file, and names none",
+                    "hint": "Choose the file of the indenter under Mesh",
+                    "contact": number,
+                }
+            )
 
     def write(mesh: Mesh) -> str:
         text = hashlib.blake2b(mesh.vertices.tobytes() + mesh.faces.tobytes(), digest_size=16)

@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
+from studio.core.engine import EngineError
 from studio.engine import design_transfer, session
 from studio.scene.collections import object_of, objects_of
 
@@ -127,3 +128,16 @@ def test_a_tilted_plate_lies_as_it_is_drawn(mini: Any) -> None:
 def long_axis(points: np.ndarray) -> np.ndarray:
     """(3,) the direction in which points (n, 3) spread most."""
     return np.linalg.svd(points - points.mean(axis=0), full_matrices=False)[2][0]
+
+
+def test_a_contact_without_its_file_is_named(mini: Any) -> None:
+    bpy.ops.optisense.add_contact()
+    bpy.ops.optisense.add_contact()
+    contact = objects_of(mini, "CONTACT")[1]
+    contact.optisense.indenter = "mesh"
+    with pytest.raises(EngineError, match="presses with the mesh of a file") as caught:
+        design_transfer.contacts(mini)
+    assert caught.value.contact == 1
+    with pytest.raises(RuntimeError, match="Choose the file of the indenter under Mesh"):
+        bpy.ops.optisense.simulate()
+    assert contact.select_get()
