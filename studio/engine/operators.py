@@ -11,7 +11,12 @@ from . import design_transfer, session
 
 
 def refuse(operator: bpy.types.Operator, text: str) -> set[str]:
-    """Report an error; return the result of an operator that did nothing."""
+    """Report an error in a window of Blender; return the result of an operator that did nothing.
+
+    The panels do not keep showing the error before.
+    """
+    if not session.is_busy():
+        session.clear_problem()
     operator.report({"ERROR"}, text)
     return {"CANCELLED"}
 

@@ -28,6 +28,8 @@ _engine: Engine | None = None
 _folder: str | None = None
 _job: Request | None = None
 _job_goes_on = False
+_about: list[str] = []
+"""Names of the objects that the shown problem is about."""
 
 when_ticking: list[Callable[[], None]] = []
 """Callbacks for each poll, about twenty times a second while the engine runs."""
@@ -106,8 +108,7 @@ def restart() -> None:
             _engine.abandon()  # reports the end to pending requests
         _engine.stop()
         _engine = None
-    now = state()
-    now.problem = now.hint = ""
+    clear_problem()
     if not bpy.app.background:
         try:
             engine()
@@ -182,8 +183,9 @@ def start_job(
     """
     global _job, _job_goes_on
     _job_goes_on = bool(fields.get("go_on"))
+    clear_problem()
     now = state()
-    now.problem = now.hint = now.note = now.progress = now.left = ""
+    now.note = now.progress = now.left = ""
     now.fraction = 0.0
     now.cancelling = False
     now.about = title
@@ -245,9 +247,17 @@ def is_busy() -> bool:
     return _job is not None and not _job.done
 
 
+def clear_problem() -> None:
+    """Remove the error from the panels."""
+    _about.clear()
+    now = state()
+    now.problem = now.hint = ""
+
+
 def say(error: EngineError) -> None:
     """Show an error in the panels, and select the object that it is about."""
     now = state()
+    _about.clear()
     texts = [error.where, f"{error.hint[:1].upper()}{error.hint[1:]}" if error.hint else ""]
     if error.part or error.path or error.contact is not None:
         from ..scene.objects_at import objects_at, select
@@ -256,6 +266,7 @@ def say(error: EngineError) -> None:
         found = objects_at(scene, error.path or "", error.part or "", error.contact)
         chosen = select(found)
         if found:
+            _about.extend(each.name for each in found)
             names = ", ".join(each.name for each in chosen or found)
             texts.append(f"Selected: {names}" if chosen else f"Hidden with its collection: {names}")
     now.problem = f"{error.message[:1].upper()}{error.message[1:]}"
@@ -330,8 +341,16 @@ def _tick() -> float | None:
 @bpy.app.handlers.persistent
 def _undone(*_: Any) -> None:
     """Clear the last problem after undo or redo: the scene is another one now."""
-    now = state()
-    now.problem = now.hint = ""
+    clear_problem()
+
+
+@bpy.app.handlers.persistent
+def _changed(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
+    """Clear the problem of objects that were removed."""
+    came_or_went = bool(_about) and depsgraph.id_type_updated("COLLECTION")
+    if came_or_went and not all(name in scene.objects for name in _about):
+        clear_problem()
+        redraw()
 
 
 PROPERTIES = {"WindowManager": {"optisense": OPTISENSE_PG_session}}
@@ -346,6 +365,7 @@ def _another_engine_is_named() -> None:
 HOOKS = (
     (when_changed, _another_engine_is_named),
     (bpy.app.handlers.load_pre, _loading),
+    (bpy.app.handlers.depsgraph_update_post, _changed),
     (bpy.app.handlers.undo_post, _undone),
     (bpy.app.handlers.redo_post, _undone),
 )

@@ -141,3 +141,32 @@ def test_a_contact_without_its_file_is_named(mini: Any) -> None:
     with pytest.raises(RuntimeError, match="Choose the file of the indenter under Mesh"):
         bpy.ops.optisense.simulate()
     assert contact.select_get()
+
+
+@pytest.mark.parametrize("way", ["button", "key"])
+def test_the_error_of_a_contact_leaves_with_it(
+    way: str, mini: Any, select: Callable[..., None]
+) -> None:
+    small(mini)
+    bpy.ops.optisense.add_contact()
+    contact = objects_of(mini, "CONTACT")[0]
+    contact.optisense.indenter = "mesh"
+    with pytest.raises(RuntimeError):
+        bpy.ops.optisense.simulate()
+    assert "Selected: contact" in session.state().hint
+    bpy.context.view_layer.update()
+    assert session.state().problem
+    if way == "button":
+        bpy.ops.optisense.clear_contacts()
+    else:
+        select(contact)
+        bpy.ops.object.delete()
+    bpy.context.view_layer.update()
+    assert not session.state().problem and not session.state().hint
+
+
+def test_a_refusal_takes_the_place_of_the_error_before(mini: Any) -> None:
+    session.state().problem = "An error"
+    with pytest.raises(RuntimeError, match="There is no objective"):
+        bpy.ops.optisense.choose_objective(objective="no-such-one")
+    assert not session.state().problem
