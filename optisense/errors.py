@@ -75,6 +75,16 @@ class SetupError(OptiSenseError):
     """A component, such as libLLVM, is missing or too old on this machine."""
 
 
+_TAKEN = "Another file or folder has this name: choose another one"
+_NAMES = {
+    errno.ENAMETOOLONG: "Choose a shorter name",
+    errno.EEXIST: _TAKEN,
+    errno.ENOTDIR: _TAKEN,
+    errno.EISDIR: _TAKEN,
+}
+"""Remedies for the names of files that can't be written, by the number of the system's error."""
+
+
 class OutputError(OptiSenseError):
     """A file or folder can't be written."""
 
@@ -88,7 +98,8 @@ class OutputError(OptiSenseError):
         if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
             hint = "Choose a folder that you may write to"
             return OutputError("permission denied", where=where, hint=hint)
-        return OutputError(error.strerror or str(error), where=where)
+        text = error.strerror or str(error)
+        return OutputError(text, where=where, hint=_NAMES.get(error.errno or 0))
 
 
 class FolderInUseError(OutputError):

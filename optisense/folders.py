@@ -30,7 +30,7 @@ from pathlib import Path, PurePosixPath
 
 from optisense.errors import FolderInUseError, OutputError
 from optisense.lock_holder import UNKNOWN, Holder, process_lives, read_holder
-from optisense.writing import FREE_SPACE, TEMPORARY
+from optisense.writing import TEMPORARY, remedy
 
 LOCK_FILE = ".optisense.lock"
 
@@ -67,12 +67,12 @@ class FolderLock:
         folder: path of the folder.
     """
 
-    def __init__(self, folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> None:
+    def __init__(self, folder: str | Path, *, wait: bool = False, hint: str | None = None) -> None:
         """Take the lock, create the folder if needed, and clean up after killed processes.
 
         Args:
             wait: whether to wait for another process instead of failing.
-            hint: remedy if the folder can't be written.
+            hint: remedy if the folder can't be written; by default, the one for the reason.
 
         Raises:
             FolderInUseError: another process holds the lock; the message names it.
@@ -203,7 +203,7 @@ class FolderLock:
                 each.mkdir()
                 self._made_folders.insert(0, each)
         if not self.folder.is_dir():
-            hint = "Name a folder" if self._hint == FREE_SPACE else self._hint
+            hint = self._hint or "Name a folder"
             raise OutputError("this is a file, not a folder", where=str(self.folder), hint=hint)
 
     def _write(self, holder: Holder) -> None:
@@ -217,7 +217,7 @@ _held: dict[tuple[int, int, int], tuple[FolderLock, int]] = {}
 """Locks taken by `hold` and their counts, by thread, device and inode of the folder."""
 
 
-def hold(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> Callable[[], None]:
+def hold(folder: str | Path, *, wait: bool = False, hint: str | None = None) -> Callable[[], None]:
     """Take the lock of a folder, or share the one that this thread has taken by `hold`.
 
     Returns:
@@ -246,7 +246,9 @@ def hold(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> C
 
 
 @contextmanager
-def held(folder: str | Path, *, wait: bool = False, hint: str = FREE_SPACE) -> Iterator[FolderLock]:
+def held(
+    folder: str | Path, *, wait: bool = False, hint: str | None = None
+) -> Iterator[FolderLock]:
     """Hold the lock of a folder for the duration of a block, and yield it."""
     give_back = hold(folder, wait=wait, hint=hint)
     try:
@@ -416,7 +418,7 @@ def _elsewhere(folder: Path, holder: Holder) -> FolderInUseError:
     )
 
 
-def _cannot_write(folder: Path, error: OSError, hint: str) -> OutputError:
+def _cannot_write(folder: Path, error: OSError, hint: str | None) -> OutputError:
     if error.errno == errno.ELOOP:
         return OutputError(
             "the lock file is a link", where=str(folder / LOCK_FILE), hint="Delete the link"
@@ -424,5 +426,5 @@ def _cannot_write(folder: Path, error: OSError, hint: str) -> OutputError:
     return OutputError(
         f"the folder can't be written: {error.strerror or error}",
         where=str(folder),
-        hint=hint,
+        hint=remedy(error, hint),
     )

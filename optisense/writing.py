@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import os
 import re
@@ -18,6 +19,13 @@ TEMPORARY = re.compile(r"\..+\.(?P<process>[0-9]{1,9})-[0-9a-f]{8}(\.[^.]+)?")
 """Pattern of the names of temporary files, which contain the id of the process that writes them."""
 
 FREE_SPACE = "Free space on this disk or choose another folder"
+
+
+def remedy(error: OSError, hint: str | None = None) -> str:
+    """Return the remedy for an error of writing: the caller's, or the one for its reason."""
+    if hint is None and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return FREE_SPACE
+    return hint or OutputError.of(error).hint or "Choose another folder"
 
 
 def inside(folder: Path, relative: str) -> Path:
@@ -45,13 +53,13 @@ def inside(folder: Path, relative: str) -> Path:
         raise OutputError(
             f"the folder can't be made: {error.strerror or error}",
             where=str(final.parent),
-            hint=FREE_SPACE,
+            hint=remedy(error),
         ) from error
     return final
 
 
 @contextmanager
-def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Path], Path]]:
+def written_together(what: str, hint: str | None = None) -> Iterator[Callable[[Path], Path]]:
     """Context for files that appear all at once, when the block has ended without an error.
 
     Yields:
@@ -60,7 +68,7 @@ def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Pa
 
     Args:
         what: word for the files in messages, such as "the design".
-        hint: remedy if it fails.
+        hint: remedy if it fails; by default, the one for the reason.
 
     Raises:
         OutputError: in place of any `OSError`; no temporary file is left behind.
@@ -84,7 +92,7 @@ def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Pa
         raise OutputError(
             f"{what} can't be written: {error.strerror or error}",
             where=names.get(named, named) or None,
-            hint=hint,
+            hint=remedy(error, hint),
         ) from error
     finally:
         for temporary, _ in staged:
@@ -93,7 +101,7 @@ def written_together(what: str, hint: str = FREE_SPACE) -> Iterator[Callable[[Pa
 
 
 @contextmanager
-def written_whole(path: Path, what: str = "the file", hint: str = FREE_SPACE) -> Iterator[Path]:
+def written_whole(path: Path, what: str = "the file", hint: str | None = None) -> Iterator[Path]:
     """Context for one file, as `written_together`; yields the temporary path to write to.
 
     Raises:
@@ -103,7 +111,7 @@ def written_whole(path: Path, what: str = "the file", hint: str = FREE_SPACE) ->
         yield stage(path)
 
 
-def write_text(path: Path, text: str, what: str = "the file", hint: str = FREE_SPACE) -> None:
+def write_text(path: Path, text: str, what: str = "the file", hint: str | None = None) -> None:
     """Write a text file (UTF-8), whole.
 
     Raises:
@@ -157,7 +165,7 @@ def remove_own_page(path: Path, kind: str) -> None:
 
 
 def write_json(
-    path: Path, values: Mapping[str, Any], what: str = "the file", hint: str = FREE_SPACE
+    path: Path, values: Mapping[str, Any], what: str = "the file", hint: str | None = None
 ) -> None:
     """Write a JSON file, whole.
 

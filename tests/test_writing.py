@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 
 from optisense.errors import OutputError
 from optisense.writing import (
+    remedy,
     remove_own_page,
     write_json,
     write_text,
@@ -53,6 +55,17 @@ def test_the_user_is_told_what_where_and_what_to_do(tmp_path: Path) -> None:
         write_text(tmp_path, "text")
     assert caught.value.where == str(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_the_remedy_fits_the_reason(tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("a file")
+    for path, hint in ((taken / "file", "another one"), (tmp_path / ("b" * 300), "shorter name")):
+        with pytest.raises(OutputError) as caught:
+            write_text(path, "text")
+        assert hint in str(caught.value.hint)
+    assert remedy(OSError(errno.ENOSPC, "full")).startswith("Free space")
+    assert remedy(OSError(errno.EIO, "broken")) == "Choose another folder"
 
 
 def test_json_reads_back(tmp_path: Path) -> None:

@@ -215,7 +215,7 @@ def _coarse(
             f"part '{name}' has too large triangles to follow cage '{cage_name}': near "
             f"{_text(off.place)} it is {off.distance:.2g} mm off the shape that the cage gives",
             design.where("parts", name, "mesh"),
-            "Give the part cut_every: 1 (mm) in the recipe, or export it with a finer mesh: only "
+            "Give the part a finer mesh (Subdivide in Blender, cut_every: 1 in a recipe): only "
             "vertices are bent, and between them it stays straight",
             severity="warning",
         )

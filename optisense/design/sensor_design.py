@@ -108,7 +108,9 @@ class SensorDesign(Model):
             check_finishes(name, part, self.materials)
         if not any(part.role is Role.SENSING_SURFACE for part in self.parts.values()):
             raise InconsistentValueError(
-                "no part is a sensing_surface", ("parts",), "Give one part this role"
+                "no part is a sensing_surface",
+                ("parts",),
+                "Give one part this role; the studio makes it by Make Sensing Surface",
             )
         caged: dict[str, str] = {}
         for cage_name, cage in self.cages.items():

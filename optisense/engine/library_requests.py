@@ -12,6 +12,7 @@ from optisense.engine.jobs import Job
 from optisense.engine.protocol import Fields
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
+from optisense.errors import LibraryError
 from optisense.library import AnyEntry
 from optisense.library.adding import check_new_name
 from optisense.library.loader import kind_named
@@ -111,7 +112,11 @@ def preview(session: Session, fields: Preview, job: Job) -> dict[str, Any]:
 @handles("library_add", LibraryAdd, Lane.QUICK)
 def library_add(session: Session, fields: LibraryAdd, job: Job) -> dict[str, Any]:
     """Add values to the user's own library."""
-    check_new_name(fields.entry)
+    try:
+        check_new_name(fields.entry)
+    except LibraryError as error:  # its hint names an option of the command
+        hint = "Choose another name, of letters, digits, '-' and '_'"
+        raise LibraryError(error.message, where="entry", hint=hint) from None
     made = _made(
         fields.kind,
         fields.entry,

@@ -193,7 +193,7 @@ class OPTISENSE_OT_keep_material(polls.Checked, bpy.types.Operator):
 
     name: StringProperty(
         name="Name", default="my-material",
-        description="Letters, digits, - and _; your own entry with the same name is replaced",
+        description="Letters, digits, - and _; no entry of the library may have this name",
     )  # fmt: skip
     description: StringProperty(
         name="Description", description="One line that is shown in the lists"

@@ -85,6 +85,7 @@ class TestChecks:
         coarse = [p for p in cage_problems(raised) if "too large triangles" in p.message]
         assert [p.severity for p in coarse] == ["warning"]
         assert "'guide'" in coarse[0].message and "1 mm off" in coarse[0].message
+        assert "Subdivide in Blender" in str(coarse[0].hint)
         assert "(0.00, 0.00, -8.25)" in coarse[0].message  # 1 mm above the guide's lower face
         slight = move_points(caged, "plate", {"1,1,0": (0.0, 0.0, 0.3)})
         assert cage_problems(slight) == []

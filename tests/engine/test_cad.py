@@ -51,6 +51,10 @@ def test_a_design_is_made_of_them(engine: Any, tmp_path: Path) -> None:
 
 def test_what_makes_no_sense_is_refused(engine: Any, tmp_path: Path) -> None:
     gel = box(tmp_path / "gel.stl", (0, 0, 0), (9, 9, 4))
+    missing = engine.refused("cad", files=["/elsewhere/plate.stl"])
+    assert "no file" in missing["message"] and missing["hint"].endswith(
+        "from the folder /elsewhere"
+    )
     assert "one folder" in engine.refused("cad", files=[gel, "/elsewhere/plate.stl"])["hint"]
     assert (
         "'lid'"

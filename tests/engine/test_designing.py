@@ -156,6 +156,14 @@ def test_a_mesh_from_elsewhere_takes_a_parts_place(engine: Any, tmp_path: Path) 
     )
 
 
+def test_the_button_that_makes_a_sensing_surface_is_named(engine: Any) -> None:
+    data = engine.ask("open", design="gelsight-mini-ideal")["data"]
+    data["parts"]["skin"]["role"] = "blocker"
+    error = engine.refused("check", design={"data": data, "folder": str(engine.folder)})
+    assert "no part is a sensing_surface" in error["message"]
+    assert "Make Sensing Surface" in error["hint"]
+
+
 def test_files_that_changed_are_read_again(engine: Any, tmp_path: Path) -> None:
     folder = tmp_path / "design"
     engine.ask("save", design="gelsight-mini-ideal", to=str(folder))
@@ -214,10 +222,19 @@ def test_the_library_is_listed_drawn_and_added_to(engine: Any) -> None:
         "library_add", kind="coating", entry="mine", value=value, description="Sprayed"
     )
     assert again["kind"] == "LibraryError"
+    assert again["hint"].startswith("Choose another name") and "--" not in again["hint"]
     value["specularity"] = 7
     drawn = engine.refused("preview", kind="coating", value=value)
     assert drawn["kind"] == "LibraryError" and "specularity" in drawn["message"]
     assert engine.refused("entry", kind="light", entry="smd-3529")["hint"]
+
+
+def test_the_remedies_of_export_fit_their_errors(engine: Any, tmp_path: Path) -> None:
+    taken = tmp_path / "taken"
+    taken.write_text("a file")
+    for to, remedy in ((taken, "choose another one"), (tmp_path / ("b" * 300), "a shorter name")):
+        refused = engine.refused("export", design="gelsight-mini-ideal", to=str(to))
+        assert refused["kind"] == "OutputError" and remedy in refused["hint"]
 
 
 def test_files_for_the_workshop(engine: Any, tmp_path: Path) -> None:

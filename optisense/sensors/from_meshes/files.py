@@ -115,7 +115,7 @@ class CadFiles:
             return
         siblings = path.parent.iterdir() if is_folder(path.parent) else ()
         near = near_match(path.name, [sibling.name for sibling in siblings])
-        hint = "Correct the path; it starts from the recipe"
+        hint = f"Correct the path; it starts from the folder {self._folder}"
         if near is not None:
             hint = f"Did you mean '{Path(file).with_name(near).as_posix()}'?"
         raise MeshError(f"there is no file '{brief(file)}'", where=str(path), hint=hint)
