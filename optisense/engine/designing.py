@@ -211,8 +211,9 @@ def export(session: Session, fields: Export, job: Job) -> dict[str, Any]:
     from optisense.workshop import export as write
 
     design = design_of(session, fields, job)
-    written = write(design, fields.to, fields.formats, with_moulds=fields.moulds)
-    return {"files": [str(path) for path in written]}
+    notes: list[str] = []
+    written = write(design, fields.to, fields.formats, notes, with_moulds=fields.moulds)
+    return {"files": [str(path) for path in written], "notes": notes}
 
 
 @handles("export_robot", ExportRobot, Lane.QUICK)

@@ -239,7 +239,9 @@ def test_the_remedies_of_export_fit_their_errors(engine: Any, tmp_path: Path) ->
 
 def test_files_for_the_workshop(engine: Any, tmp_path: Path) -> None:
     given = {"design": "gelsight-mini-ideal", "to": str(tmp_path), "formats": ["stl"]}
-    files = engine.ask("export", moulds=True, **given)["files"]
+    written = engine.ask("export", moulds=True, **given)
+    files = written["files"]
+    assert written["notes"][0].startswith("gel-mould: 391 mm^2 of the gel's sides")
     assert any("mould" in file for file in files)
     assert {Path(file).name for file in files} >= {"gel.stl", "bill-of-materials.csv"}
     assert all(Path(file).is_file() for file in files)
