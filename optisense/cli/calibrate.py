@@ -10,10 +10,8 @@ import typer
 from optisense.cli.compare import PhotosArgument, reading_lines
 from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output, table_of
 from optisense.cli.options import DesignArgument, VariantOption, out_option
-from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CalibrateOptions
-from optisense.writing import write_json, write_text, written_together
 
 if TYPE_CHECKING:
     from optisense.calibration.realism import Realism
@@ -21,8 +19,6 @@ if TYPE_CHECKING:
 
 COLUMNS = "unexplained", "contact", "ring", "similarity"
 """Figures of presses whose medians are printed."""
-
-JSON_FILE, PAGE_FILE = "calibration.json", "calibration.html"
 
 
 @handles_errors
@@ -43,15 +39,11 @@ def calibrate(
     with progress_line() as line:
         line.begin("loading")
         from optisense.calibration import read_photographs
-        from optisense.calibration.calibrating import calibrate as fit_design
-        from optisense.calibration.kept_renderings import KeptRenderings
-        from optisense.report.calibration import render_calibration
-        from optisense.sensors import load, save_design
+        from optisense.report.calibration import PAGE_FILE, calibrate_into
+        from optisense.sensors import load
 
         sensor = load(design)
         photographs = read_photographs(photos, options.ball)
-        take_folder(out)
-        kept = KeptRenderings(out)
         line.begin("fitting")
 
         def report(what: str, done: int, count: int) -> None:
@@ -59,22 +51,10 @@ def calibrate(
             line.say(what, done, count)
 
         try:
-            found = fit_design(
-                sensor,
-                photographs,
-                options.settings(),
-                variant=variant,
-                kept=kept,
-                progress=report,
-            )
+            found = calibrate_into(out, sensor, photographs, options.settings(), variant, report)
         except KeyboardInterrupt:
             messages.print("interrupted: the same command continues; finished renderings are kept")
             raise typer.Exit(EXIT_INTERRUPTED) from None
-        with written_together("the calibration") as stage:
-            write_text(stage(out / PAGE_FILE), render_calibration(found))
-            write_json(stage(out / JSON_FILE), found.as_data())
-            save_design(found.design, out)
-        kept.remove()
     for note in (*found.before.notes, *found.notes):
         messages.print(f"note: {note}")
     print_calibration(found)

@@ -13,8 +13,6 @@ from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
-from optisense.folders import hold
-from optisense.writing import write_json, write_text
 
 
 class Calibrate(DesignFields, CalibrateOptions):
@@ -43,38 +41,23 @@ def calibration_families(session: Session, fields: NoFields, job: Job) -> dict[s
 def calibrate(session: Session, fields: Calibrate, job: Job) -> dict[str, Any]:
     """Fit a design to photographs, and write the fitted design and its report."""
     from optisense.calibration import read_photographs
-    from optisense.calibration.calibrating import calibrate as fit_design
-    from optisense.report.calibration import render_calibration
-    from optisense.sensors import save_design
+    from optisense.report.calibration import PAGE_FILE, calibrate_into
 
     design = design_of(session, fields, job)
     session.designs.require_valid(design)
     job.progress(0.0, "reading the photographs")
     photographs = read_photographs(Path(fields.photos), fields.ball)
     folder = Path(fields.to)
-    give_back = hold(folder)
-    try:
 
-        def report(what: str, done: int, count: int) -> None:
-            job.progress(min(done / max(count, 1), 1.0), what)
+    def report(what: str, done: int, count: int) -> None:
+        job.progress(min(done / max(count, 1), 1.0), what)
 
-        found = fit_design(
-            design,
-            photographs,
-            fields.settings(),
-            variant=session.renderer.variant,
-            progress=report,
-        )
-        save_design(found.design, folder)
-        write_json(folder / "calibration.json", found.as_data())
-        page = folder / "calibration.html"
-        write_text(page, render_calibration(found))
-    finally:
-        give_back()
+    variant = session.renderer.variant
+    found = calibrate_into(folder, design, photographs, fields.settings(), variant, report)
     held = bool(found.held_out)
     return {
         "folder": str(folder),
-        "page": str(page),
+        "page": str(folder / PAGE_FILE),
         "numbers": [asdict(each) for each in found.numbers],
         "held_out": list(found.held_out),
         "unexplained": [

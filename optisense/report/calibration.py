@@ -1,11 +1,19 @@
-"""Page of a calibration: the design before and after, beside photographs."""
+"""Page of a calibration, the design before and after beside photographs, and its folder."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from pathlib import Path
 
+from optisense.calibration.calibrating import calibrate
+from optisense.calibration.kept_renderings import KeptRenderings
+from optisense.calibration.photographs import Photographs
 from optisense.calibration.realism import PATCH, Realism
 from optisense.calibration.result import Calibration
+from optisense.calibration.settings import CalibrationSettings
+from optisense.design import SensorDesign, save_design
+from optisense.folders import held
 from optisense.report._files import page
 from optisense.report.comparison import (
     CONTRAST,
@@ -16,6 +24,10 @@ from optisense.report.comparison import (
     press_section,
     radius_cell,
 )
+from optisense.writing import write_json, write_text, written_together
+
+JSON_FILE, PAGE_FILE = "calibration.json", "calibration.html"
+"""Files of a calibration beside those of the fitted design."""
 
 FIGURES = {
     "unexplained": "unexplained, patch of 1.35 radii",
@@ -36,6 +48,41 @@ READINGS = {
     "degrees_alone": "error of the normals that it reads, degrees",
 }
 """Figures of readings whose medians the page shows, with their labels."""
+
+
+def calibrate_into(
+    folder: Path,
+    design: SensorDesign,
+    photographs: Photographs,
+    settings: CalibrationSettings,
+    variant: str,
+    progress: Callable[[str, int, int], None],
+) -> Calibration:
+    """Fit a design to photographs, and write the fitted design, its numbers and its page together.
+
+    A run that ends early leaves its finished renderings in the folder, and the next one with the
+    same arguments continues from them.
+
+    Args:
+        folder: folder of the result, whose lock is held meanwhile.
+        design, photographs, settings, variant, progress: see `calibrate`.
+
+    Raises:
+        FolderInUseError: another process is writing to the folder.
+        CalibrationError: there are too few photographs, or they do not fit the design.
+        OptiSenseError: the design can't be rendered, or the folder can't be written.
+    """
+    with held(folder):
+        kept = KeptRenderings(folder)
+        found = calibrate(
+            design, photographs, settings, variant=variant, kept=kept, progress=progress
+        )
+        with written_together("the calibration") as stage:
+            write_text(stage(folder / PAGE_FILE), render_calibration(found))
+            write_json(stage(folder / JSON_FILE), found.as_data())
+            save_design(found.design, folder)
+        kept.remove()
+    return found
 
 
 def render_calibration(found: Calibration) -> str:

@@ -41,7 +41,14 @@ def test_the_power_of_a_light_is_found_from_photographs(engine: Any, tmp_path: P
         "photons": 100_000,
     }
     keep = [each for each in families if each != "powers"]
+    number = engine.send("calibrate", to=str(to), keep=keep, **given)
+    kept = to / "renderings"
+    engine.until(lambda said: said["id"] == number and ("ok" in said or any(kept.glob("*.npz"))))
+    engine.ask("cancel", of=number)
+    assert engine.error(number)["kind"] == "Cancelled"
+    assert any(kept.glob("*.npz")) and not list(to.glob("*.*ml")) and not list(to.glob("*.json"))
     found = engine.ask("calibrate", to=str(to), keep=keep, **given)
+    assert not kept.exists()
     (red,) = [each for each in found["numbers"] if "red" in each["path"]]
     (green,) = [each for each in found["numbers"] if "green" in each["path"]]
     assert red["before"] == pytest.approx(2.1)
