@@ -14,13 +14,14 @@ from optisense.cli.options import VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import BUILDING, LOADING, sample_progress
-from optisense.cli.verify_result import conditions_of, print_conditions, print_verification
+from optisense.cli.verify_result import print_conditions, print_verification
 from optisense.commands.sampling import VerifyOptions
 from optisense.writing import write_text
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
     from optisense.optics import OpticalModel
+    from optisense.search.study.conditions import ConditionResult
     from optisense.tasks import Verification
 
 JSON_FILE = "verify.json"
@@ -77,16 +78,26 @@ class ComparisonResult(NamedTuple):
 
     Attributes:
         found: errors of what is read from both sensors.
-        conditions: conditions of the study, as from `conditions_of`.
+        conditions: conditions of the study, and how the trial meets them.
     """
 
     found: Verification
-    conditions: list[dict[str, Any]]
+    conditions: list[ConditionResult]
 
     def to_dict(self) -> dict[str, Any]:
         """Return the result, ready for JSON."""
         plain = self.found.to_dict()
-        return {**plain, "conditions": self.conditions} if self.conditions else plain
+        if self.conditions:
+            plain["conditions"] = [
+                {
+                    "condition": each.text,
+                    "start": each.before,
+                    "trial": each.value,
+                    "margin": each.margin,
+                }
+                for each in self.conditions
+            ]
+        return plain
 
 
 def compare(
@@ -107,7 +118,7 @@ def compare(
     with progress_line() as line:
         line.begin(LOADING)
         settings = options.settings()
-        names, designs = _designs(first, second, trial)
+        names, designs, conditions = _designs(first, second, trial)
         if out is not None:
             take_folder(out, (JSON_FILE, REPORT_FILE), MARK)
         line.begin(BUILDING)
@@ -133,7 +144,7 @@ def compare(
                 raise
             messages.print("interrupted: the same command continues; finished presses are kept")
             raise typer.Exit(EXIT_INTERRUPTED) from None
-        compared = ComparisonResult(found, conditions_of(first, trial) if second is None else [])
+        compared = ComparisonResult(found, conditions)
         if out is not None:
             from optisense.report.verification import render_verification
 
@@ -161,8 +172,9 @@ SIDES = ("first sensor", "second sensor")
 
 def _designs(
     first: str, second: str | None, trial: str
-) -> tuple[tuple[str, str], tuple[SensorDesign, SensorDesign]]:
-    """Return the names and the designs that are compared.
+) -> tuple[tuple[str, str], tuple[SensorDesign, SensorDesign], list[ConditionResult]]:
+    """Return the names and the designs that are compared, and the results of the trial's
+    conditions, which are empty without a study.
 
     Raises:
         SearchError: there is no such trial, or it is the start itself.
@@ -171,6 +183,7 @@ def _designs(
     """
     from optisense.errors import SearchError
     from optisense.search import Study
+    from optisense.search.study.conditions import condition_results
     from optisense.search.study.settings import STUDY_FILE
     from optisense.sensors import load
 
@@ -179,7 +192,7 @@ def _designs(
             raise typer.BadParameter("it needs a study", param_hint="--trial")
         one, other = load(first), load(second)
         names = (first, second) if one.name == other.name else (one.name, other.name)
-        return names, (one, other)
+        return names, (one, other), []
     if not (Path(first) / STUDY_FILE).is_file():
         if not Path(first).exists():
             load(first)  # raises if there is no built-in sensor of this name
@@ -194,7 +207,9 @@ def _designs(
                 where=first,
                 hint="Search on, choose a --trial NUMBER, or name two designs",
             )
-        return ("the start", f"trial {chosen.number}"), (study.space.design, chosen.design)
+        names = ("the start", f"trial {chosen.number}")
+        conditions = condition_results(chosen.conditions, chosen, study.start)
+        return names, (study.space.design, chosen.design), conditions
 
 
 def _model(name: str, design: SensorDesign, variant: str) -> OpticalModel:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import closing
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from optisense.cli.console import output, table_of
 
 if TYPE_CHECKING:
+    from optisense.search.study.conditions import ConditionResult
     from optisense.tasks import Verification
 
 
@@ -43,35 +44,14 @@ def print_verification(found: Verification) -> None:
     output.print(f"{found.in_words()}.")
 
 
-def conditions_of(folder: str, which: str) -> list[dict[str, Any]]:
-    """Return the conditions of a study: each with the value of the start and that of a trial, which
-    are None if nothing was measured, and whether the trial meets it.
-
-    Raises:
-        SearchError: there is no such study or trial.
-    """
-    from optisense.search import Study
-    from optisense.search.study.conditions import margins
-
-    with closing(Study.open(folder)) as study:
-        chosen, start = study.trial(which), study.start
-        before = {} if start is None else dict(start.conditions)
-        return [
-            {"condition": text, "start": before.get(text), "trial": value, "margin": margin}
-            for text, value, margin in margins(chosen)
-        ]
-
-
-def print_conditions(conditions: list[dict[str, Any]]) -> None:
+def print_conditions(conditions: Sequence[ConditionResult]) -> None:
     """Print whether the trial of a study meets the conditions of the search, beside the start."""
     if not conditions:
         return
+    from optisense.search.study.conditions import shown
+
     table = table_of("condition", "start", "trial", "margin")
     for each in conditions:
-        values = [
-            "not measured" if each[name] is None else f"{each[name]:.4g}"
-            for name in ("start", "trial", "margin")
-        ]
-        broken = each["margin"] is None or each["margin"] < 0.0
-        table.add_row(each["condition"], *values[:2], "broken" if broken else values[2])
+        margin = shown(each.margin) if each.met else "broken"
+        table.add_row(each.text, shown(each.before), shown(each.value), margin)
     output.print(table)

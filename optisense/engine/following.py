@@ -212,7 +212,7 @@ def curve_row(trial: Trial) -> dict[str, Any]:
 
 def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
     """Return a trial without its design."""
-    from optisense.search.study.conditions import margins
+    from optisense.search.study.conditions import condition_results
     from optisense.search.study.study import beside
 
     return {
@@ -221,7 +221,7 @@ def trial_row(study: Study, trial: Trial) -> dict[str, Any]:
         "vector": trial.vector,
         "beside": beside(study, trial),
         "conditions": [
-            {"condition": text, "value": value, "margin": margin}
-            for text, value, margin in margins(trial)
+            {"condition": each.text, "value": each.value, "margin": each.margin}
+            for each in condition_results(trial.conditions, trial)
         ],
     }

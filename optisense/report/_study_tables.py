@@ -12,7 +12,7 @@ import numpy as np
 
 from optisense.report.before_after import RayFigures
 from optisense.search.evaluation.outcome import rank_of
-from optisense.search.evaluation.requirements import Requirement
+from optisense.search.study.conditions import condition_results
 from optisense.search.study.failures import by_cause
 from optisense.search.study.study import Study, beside
 from optisense.search.study.trial import Trial
@@ -83,20 +83,14 @@ def scores(study: Study, start: Trial | None, best: Trial | None) -> Table:
 def conditions(study: Study, start: Trial | None, best: Trial | None) -> Table | None:
     """Return each condition with its values before and after, and the best's margin."""
     rows = []
-    for text in study.settings.requirements:
-        wanted = Requirement.parse(text)
-        values = [
-            math.nan if trial is None else _or_nan(trial.conditions.get(text))
-            for trial in (start, best)
+    for each in condition_results(study.settings.requirements, best, start):
+        measured = [
+            number(math.nan if value is None else value)
+            for value in (each.before, each.value, each.margin)
         ]
-        margin = wanted.margin(values[1])
-        shown = "broken" if margin < 0.0 and wanted.violation(values[1]) else number(margin)
-        rows.append([str(wanted), *map(number, values), shown])
+        broken = each.margin is not None and not each.met
+        rows.append([each.text, *measured[:2], "broken" if broken else measured[2]])
     return Table(["", "before", "after", "margin"], rows) if rows else None
-
-
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 def fresh(trial: Trial, name: str) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from optisense import set_value
+from optisense.cli.verify_result import print_conditions
 from optisense.design import SensorDesign
 from optisense.errors import SearchError, UnknownPartError
 from optisense.objectives.evaluation import Evaluation
@@ -25,6 +26,8 @@ from optisense.search.study.best import best_of, nearest
 from optisense.search.study.conditions import (
     condition_lines,
     condition_note,
+    condition_results,
+    unmet,
     worsened,
     worsened_note,
 )
@@ -122,7 +125,9 @@ def test_a_generation_in_which_all_break_conditions_still_teaches() -> None:
     assert np.isfinite(values).all()
 
 
-def test_a_trial_that_breaks_a_condition_is_never_the_best(mini: SensorDesign) -> None:
+def test_a_trial_that_breaks_a_condition_is_never_the_best(
+    mini: SensorDesign, capsys: pytest.CaptureFixture[str]
+) -> None:
     space = SearchSpace({"camera.fov": (30.0, 60.0)}).bind(mini)
 
     def trial(number: int, found: Outcome) -> Trial:
@@ -141,6 +146,11 @@ def test_a_trial_that_breaks_a_condition_is_never_the_best(mini: SensorDesign) -
         "the start breaks conditions, which is allowed: coverage >= 0.5 (is 0.4)"
     )
     assert condition_lines(trials[2], trials[0]) == ["coverage >= 0.5: 0.6 (margin 0.1, start 0.4)"]
+    rounded = trial(3, outcome(2.0, coverage=0.5 - 1e-12))
+    assert "margin" in condition_lines(rounded, None)[0] and not unmet(rounded.conditions)
+    print_conditions(condition_results(rounded.conditions, rounded, trials[0]))
+    printed = capsys.readouterr().out
+    assert "0.4" in printed and "-1e-12" in printed and "broken" not in printed
     assert best_of(trials[:2]) is None
     close = nearest(trials[:2])
     assert close is not None and close.number == 1

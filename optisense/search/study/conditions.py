@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from optisense.objectives.combined import objective_of
 from optisense.objectives.registry import WATCHED
@@ -18,40 +18,59 @@ changes may come from the rounding of pixels and triangles.
 """
 
 
+@dataclass(frozen=True)
+class ConditionResult:
+    """A condition of a study, and how a trial meets it.
+
+    Attributes:
+        text: text of the condition.
+        value: value of the limited quantity; None if it was not measured.
+        before: value of the start; None if it was not measured.
+        margin: distance of the value from the limit, negative if it lies beyond; None if it was not
+            measured.
+        met: whether the condition is met; a value that misses the limit by rounding meets it.
+    """
+
+    text: str
+    value: float | None
+    before: float | None
+    margin: float | None
+    met: bool
+
+
+def condition_results(
+    texts: Iterable[str], trial: Trial | None, start: Trial | None = None
+) -> list[ConditionResult]:
+    """Return the results of conditions for a trial; without a trial, nothing was measured."""
+    now, before = ({} if each is None else each.conditions for each in (trial, start))
+    return [_result(text, now.get(text), before.get(text)) for text in texts]
+
+
+def _result(text: str, value: float | None, before: float | None = None) -> ConditionResult:
+    wanted = Requirement.parse(text)
+    if value is None:
+        return ConditionResult(text, None, before, None, met=False)
+    met = wanted.violation(value) == 0.0
+    return ConditionResult(text, value, before, wanted.margin(value), met)
+
+
 def unmet(conditions: Mapping[str, float | None]) -> list[str]:
     """Return the conditions that are broken, each with its value: ``coverage >= 0.6 (is 0.52)``.
 
     Args:
         conditions: value of the limited quantity, by the text of each condition.
     """
-    return [
-        f"{text} (is {_shown(value)})"
-        for text, value in conditions.items()
-        if Requirement.parse(text).violation(math.nan if value is None else value) > 0.0
-    ]
-
-
-def margins(trial: Trial) -> list[tuple[str, float | None, float | None]]:
-    """Return each condition with its value and its margin: the distance of the value from the
-    limit, negative if the condition is broken. Both are None if nothing was measured.
-    """
-    return [
-        (text, value, None if value is None else Requirement.parse(text).margin(value))
-        for text, value in trial.conditions.items()
-    ]
+    results = [_result(text, value) for text, value in conditions.items()]
+    return [f"{each.text} (is {shown(each.value)})" for each in results if not each.met]
 
 
 def condition_lines(trial: Trial, start: Trial | None) -> list[str]:
     """Return a line of text for each condition: value of a trial, margin, value of the start."""
     lines = []
-    for text, value in trial.conditions.items():
-        wanted = Requirement.parse(text)
-        measured = math.nan if value is None else value
-        before = None if start is None else start.conditions.get(text)
-        margin = wanted.margin(measured)
-        state = f"margin {margin:.3g}" if wanted.violation(measured) == 0.0 else "broken"
-        beside = "" if before is None else f", start {_shown(before)}"
-        lines.append(f"{text}: {_shown(value)} ({state}{beside})")
+    for each in condition_results(trial.conditions, trial, start):
+        state = f"margin {each.margin:.3g}" if each.met else "broken"
+        beside = "" if each.before is None else f", start {shown(each.before)}"
+        lines.append(f"{each.text}: {shown(each.value)} ({state}{beside})")
     return lines
 
 
@@ -106,5 +125,6 @@ def worsened_note(best: Trial | None, start: Trial | None) -> str | None:
     return f"the score rose, but {phrases}: search with {options} to keep it"
 
 
-def _shown(value: float | None) -> str:
+def shown(value: float | None) -> str:
+    """Return a value of a limited quantity as text."""
     return "not measured" if value is None else f"{value:.4g}"
