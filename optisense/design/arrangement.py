@@ -26,6 +26,26 @@ SAMPLES = (8, 6)
 """Number of points across and down the picture at which the sensing surface is looked for."""
 
 
+def one_medium(design: SensorDesign, name: str, other: str) -> bool:
+    """Return whether two parts are solids that are one medium to the light."""
+    parts = design.parts[name], design.parts[other]
+    if not all(part.role in TRANSPARENT_SOLIDS for part in parts):
+        return False
+    one, two = (design.materials[part.material or ""].medium() for part in parts)
+    if one is None or two is None:
+        return False
+    return abs(one.ior - two.ior) <= EQUAL_INDEX and one.absorption == two.absorption
+
+
+def may_overlap(design: SensorDesign, name: str, other: str) -> bool:
+    """Return whether two parts may share space: they are transparent solids that are one medium, or
+    of which one is cut out of the other, as their priorities differ.
+    """
+    parts = design.parts[name], design.parts[other]
+    solid = all(part.role in TRANSPARENT_SOLIDS for part in parts)
+    return solid and (parts[0].priority != parts[1].priority or one_medium(design, name, other))
+
+
 def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
     """Return problems of solids of different index that overlap without a priority between them.
 
@@ -35,11 +55,7 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
     problems: list[Diagnostic] = []
     solids = [n for n in meshes if design.parts[n].role in TRANSPARENT_SOLIDS]
     for name, other in combinations(solids, 2):
-        parts = design.parts[name], design.parts[other]
-        one, two = (design.materials[p.material or ""].medium() for p in parts)
-        if parts[0].priority != parts[1].priority or one is None or two is None:
-            continue
-        if abs(one.ior - two.ior) <= EQUAL_INDEX and one.absorption == two.absorption:
+        if may_overlap(design, name, other):
             continue
         place = common_space(meshes[name], meshes[other], CONTACT)
         if place is not None:
@@ -47,7 +63,7 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
                 Diagnostic(
                     f"parts '{name}' and '{other}' overlap near "
                     "({:.2f}, {:.2f}, {:.2f}) mm".format(*place)
-                    + f" and have the same priority {parts[0].priority}",
+                    + f" and have the same priority {design.parts[name].priority}",
                     design.where("parts", other, "priority"),
                     "Move them apart, or give the part that fills the common space the larger "
                     "priority",

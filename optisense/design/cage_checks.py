@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from optisense.design.arrangement import may_overlap, one_medium
 from optisense.design.cage import Cage
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
@@ -50,7 +51,7 @@ def cage_problems(design: SensorDesign, meshes: Meshes | None = None) -> list[Di
     deformed parts that cut into, or lie inside, a part from which they were separate before; and
     deformed parts that have lost contact with a part that they lay on (a warning). Parts in one
     cage move together and are not compared. Of overlapping solids with different priorities one is
-    cut out of the other, which is a warning; solids of one refractive index may overlap. The check
+    cut out of the other, which is a warning; solids of one medium may overlap. The check
     is fast enough for searches: displacements of ordinary size take milliseconds.
 
     Args:
@@ -174,16 +175,12 @@ def _has_moved(cage: Cage) -> bool:
 def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
     """Return whether two parts may overlap.
 
-    Solids of one refractive index may ("yes"); solids of different priority are cut out of each
-    other, which is unusual ("odd"); others may not ("no").
+    Solids of one medium may ("yes"); solids of different priority are cut out of each other, which
+    is unusual ("odd"); others may not ("no").
     """
-    parts = design.parts[name], design.parts[other]
-    if not all(part.role in TRANSPARENT_SOLIDS for part in parts):
-        return "no"
-    one, two = (design.materials[part.material or ""].medium() for part in parts)
-    if one is not None and two is not None and one.ior == two.ior:
+    if one_medium(design, name, other):
         return "yes"
-    return "no" if parts[0].priority == parts[1].priority else "odd"
+    return "odd" if may_overlap(design, name, other) else "no"
 
 
 def _folds(design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh) -> list[Diagnostic]:
@@ -233,7 +230,7 @@ def _meetings(
     if meeting is None:
         return _partings(design, cage_name, name, other, bent, overlap)
     if overlap == "yes" or find_overlap(design.meshes[name], design.meshes[other]) is not None:
-        return []  # equal indices, or an overlap at rest, which is intended
+        return []  # one medium, or an overlap at rest, which is intended
     distance = np.linalg.norm(bent[name].vertices - meeting.place, axis=1)
     mover = _mover(design, cage_name, name, int(np.argmin(distance)))
     return [

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
+from optisense.design.arrangement import may_overlap
+from optisense.design.cage_checks import _overlap
 from optisense.design.camera_checks import view_shares
 from optisense.design.check import inside
 from optisense.geometry import TriangleMesh
+from optisense.search.space.constraints import NoCrossings
 
 LIGHTS = ["smd-3528", "generic-spot"]
 
@@ -144,6 +147,17 @@ class TestOverlaps:
     def test_what_is_one_to_the_light_may(self, design: SensorDesign) -> None:
         gel = design.parts["gel"].priority
         assert check_design(with_plate(design, -2.5, gel, 1.41)) == []
+
+    def test_searches_and_cages_know_the_same_medium(self, design: SensorDesign) -> None:
+        gel = design.parts["gel"].priority
+        start = with_plate(design, -3.5, gel, 1.41)
+        moved = with_plate(design, -2.5, gel, 1.41)
+        assert may_overlap(moved, "gel", "plate") and NoCrossings(start).meeting(moved) is None
+        tinted = set_value(moved, "materials.glass.absorption", [0.1, 0.1, 0.1])
+        assert not may_overlap(tinted, "gel", "plate")
+        crossing = NoCrossings(start).meeting(tinted)
+        assert crossing is not None and {crossing.one, crossing.other} == {"gel", "plate"}
+        assert [_overlap(each, "gel", "plate") for each in (moved, tinted)] == ["yes", "no"]
 
     def test_what_only_touches_does_not_overlap(self, design: SensorDesign) -> None:
         gel = design.parts["gel"].priority

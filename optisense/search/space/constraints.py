@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import Role, SensorDesign
+from optisense.design.arrangement import may_overlap
 from optisense.design.cage_checks import fold_problems
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.errors import OptiSenseError, SearchError
@@ -40,8 +41,8 @@ class CrossingParts(NamedTuple):
 class NoCrossings:
     """Constraint: no part may cut through another one that it does not cut in the starting design.
 
-    Transparent solids may overlap if their priorities differ, and a sensing surface lies on its
-    gel: such pairs are not tested, nor those that do not move.
+    Some solids may overlap (see `may_overlap`), and a sensing surface lies on its gel: such pairs
+    are not tested, nor those that do not move.
     """
 
     def __init__(self, design: SensorDesign) -> None:
@@ -50,7 +51,7 @@ class NoCrossings:
         self._pairs = [
             (one, other)
             for one, other in combinations(self._meshes, 2)
-            if _may_not_meet(design, one, other)
+            if not _lies_on(design, one, other)
         ]
         self._known: dict[tuple[str, str], bool] = {}
 
@@ -74,7 +75,7 @@ class NoCrossings:
         for one, other in self._pairs:
             if one not in meshes or other not in meshes or not moved & {one, other}:
                 continue
-            if self._crossed_before(one, other):
+            if may_overlap(design, one, other) or self._crossed_before(one, other):
                 continue
             place = _crossing(meshes[one], meshes[other])
             if place is not None:
@@ -171,14 +172,11 @@ def why_forbidden(design: SensorDesign, constraints: Sequence[Constraint]) -> st
     return None
 
 
-def _may_not_meet(design: SensorDesign, one: str, other: str) -> bool:
-    first, second = design.parts[one], design.parts[other]
-    if Role.INDENTER in (first.role, second.role):
-        return False
-    solids = [part for part in (first, second) if part.role in TRANSPARENT_SOLIDS]
-    if len(solids) == 2:
-        return first.priority == second.priority
-    return not (solids and Role.SENSING_SURFACE in (first.role, second.role))
+def _lies_on(design: SensorDesign, one: str, other: str) -> bool:
+    """Return whether a part is an indenter, or a sensing surface beside a transparent solid."""
+    roles = {design.parts[one].role, design.parts[other].role}
+    on_solid = Role.SENSING_SURFACE in roles and bool(roles & TRANSPARENT_SOLIDS)
+    return Role.INDENTER in roles or on_solid
 
 
 def _crossing(one: TriangleMesh, other: TriangleMesh) -> NDArray[np.float64] | None:
