@@ -18,14 +18,13 @@ from optisense.design.difference import fingerprint
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, Sphere
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
-from optisense.mechanics import ELASTIC
-from optisense.quality import SAMPLE_PHOTONS
-from optisense.reading.camera_noise import MEASURED_NOISE, add_camera_noise
+from optisense.reading.camera_noise import add_camera_noise
 from optisense.reading.integration import NormalIntegrator
 from optisense.reading.tilts import normals_of, tilts_of
 from optisense.reading.untouched import UntouchedSurface
 from optisense.tasks._colour_to_normal import METHODS, TiltReader, fit_reader
 from optisense.tasks._draws import Places
+from optisense.tasks._sample_rendering import SampleRendering
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
@@ -64,7 +63,7 @@ _NEXT_READER = 1009
 
 
 @dataclass(frozen=True)
-class ReconstructionSettings:
+class ReconstructionSettings(SampleRendering):
     """Settings of the fit and the test of a reader.
 
     Attributes:
@@ -84,14 +83,10 @@ class ReconstructionSettings:
     presses: int = 40
     radius: float = 1.5
     depth: tuple[float, float] = (0.2, 0.6)
-    seed: int = 0
-    camera_noise: float = MEASURED_NOISE
-    resolution: tuple[int, int] | None = None
     width: int = WIDTH
-    photons: int = SAMPLE_PHOTONS
-    skin: str = ELASTIC
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.method not in METHODS:
             raise TaskError(
                 f"there is no method '{self.method}'", hint="Use one of " + ", ".join(METHODS)
@@ -103,8 +98,6 @@ class ReconstructionSettings:
                 "deep, are impossible",
                 hint="Press at least one ball, above 0 mm and not deeper than its radius",
             )
-        if not 0 <= self.camera_noise < 256:
-            raise TaskError(f"the camera noise is {self.camera_noise:g}", hint="Give 0 to 255")
 
 
 class CalibratedSensor:
@@ -225,15 +218,7 @@ class CalibratedSensor:
         return Places.of(self._model, self.resolution)
 
     def _render(self, contacts: Sequence[Contact]) -> TactileImage:
-        image = self._model.render(
-            contacts,
-            resolution=self.resolution,
-            photons=self._settings.photons,
-            seed=self._settings.seed,
-            partial=False,
-            skin=self._settings.skin,
-        )
-        return image
+        return self._settings.render(self._model, contacts, self.resolution)
 
     def _picture(self, image: TactileImage, seed: list[int]) -> NDArray[np.uint8]:
         picture = image.picture(self._exposure, (*seed, _SENSOR))

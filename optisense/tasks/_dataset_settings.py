@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from optisense.errors import TaskError
-from optisense.mechanics import ELASTIC
 from optisense.optics.estimators import RADIANCE_CACHE
-from optisense.quality import SAMPLE_PHOTONS
 from optisense.tasks._draws import ContactDraw
+from optisense.tasks._sample_rendering import SampleRendering
 
 
 @dataclass(frozen=True)
-class DatasetSettings:
+class DatasetSettings(SampleRendering):
     """Settings of the samples. The number of samples does not affect the first ones.
 
     Attributes:
@@ -31,21 +30,14 @@ class DatasetSettings:
     """
 
     contacts: ContactDraw = field(default_factory=ContactDraw)
-    resolution: tuple[int, int] | None = None
-    photons: int = SAMPLE_PHOTONS
-    seed: int = 0
     exposure: float | str = "auto"
-    camera_noise: float = 0.0
+    camera_noise: float = field(default=0.0, kw_only=True)
     radiance: bool = False
     estimator: str = RADIANCE_CACHE
-    skin: str = ELASTIC
     hold_out: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if not 0 <= self.camera_noise < 256:
-            raise TaskError(f"the camera noise is {self.camera_noise}", hint="Give 0 to 255")
-        if self.seed < 0:
-            raise TaskError(f"the seed is {self.seed}", hint="Give 0 or more")
+        super().__post_init__()
         for text in self.hold_out:
             if text not in self.contacts.indenters:
                 raise TaskError(

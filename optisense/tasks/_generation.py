@@ -280,14 +280,9 @@ class _Maker:
         return exposure
 
     def _image(self, *contacts: Contact) -> TactileImage:
-        return self._model.render(
-            contacts,
-            resolution=self._resolution,
-            photons=self._settings.photons,
-            seed=self._settings.seed,
-            estimator=self._settings.estimator,
-            skin=self._settings.skin,
-            partial=False,
+        settings = self._settings
+        return settings.render(
+            self._model, contacts, self._resolution, estimator=settings.estimator
         )
 
     def _write_background(self, image: TactileImage, exposure: float) -> None:

@@ -20,14 +20,14 @@ from optisense.array_types import ByteArray, FloatArray
 from optisense.errors import TaskError
 from optisense.folders import held
 from optisense.geometry import Contact
-from optisense.mechanics import CONFORMING, ELASTIC
+from optisense.mechanics import CONFORMING
 from optisense.objectives.score import json_ready
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
-from optisense.quality import SAMPLE_PHOTONS
-from optisense.reading.camera_noise import MEASURED_NOISE, add_camera_noise
+from optisense.reading.camera_noise import add_camera_noise
 from optisense.tasks._digests import design_values, mesh_digests
 from optisense.tasks._records import KEPT, CsvTable, read_object, refuse_differences
 from optisense.tasks._regression import FOLDS, ForestReading, read_by_forest
+from optisense.tasks._sample_rendering import SampleRendering
 from optisense.tasks._snr import NEIGHBOURS, signal_to_noise
 from optisense.untrusted_files import COPY_AGAIN
 from optisense.writing import write_json
@@ -100,7 +100,7 @@ class PerceptionTask(Protocol):
 
 
 @dataclass(frozen=True)
-class SampleSettings:
+class SampleSettings(SampleRendering):
     """Settings of the samples.
 
     Attributes:
@@ -114,12 +114,7 @@ class SampleSettings:
     """
 
     count: int = 200
-    seed: int = 0
-    camera_noise: float = MEASURED_NOISE
-    resolution: tuple[int, int] | None = None
-    photons: int = SAMPLE_PHOTONS
     estimator: str = RADIANCE_CACHE
-    skin: str = ELASTIC
 
 
 @dataclass(frozen=True)
@@ -224,8 +219,6 @@ def collect(
     """Render, measure and label `settings.count` random contacts; see `perceive`."""
     if settings.count < 1:
         raise TaskError(f"{settings.count} samples are asked for", hint="Ask for 1 or more")
-    if not (np.isfinite(settings.camera_noise) and settings.camera_noise >= 0):
-        raise TaskError(f"the camera noise is {settings.camera_noise}", hint="Give 0 or more")
     task.check(model)
     names = (*task.features, *task.targets)
     with ExitStack() as kept:
@@ -274,17 +267,13 @@ class _Camera:
         return [*map(float, self._task.measure(picture, image)), *map(float, targets)]
 
     def _render(self, contacts: Sequence[Contact]) -> TactileImage:
-        image = self._model.render(
+        return self._settings.render(
+            self._model,
             contacts,
-            resolution=_resolution(self._task, self._model, self._settings),
-            photons=self._settings.photons,
-            seed=self._settings.seed,
+            _resolution(self._task, self._model, self._settings),
             estimator=self._settings.estimator,
-            skin=self._settings.skin,
             only_contacts=bool(contacts) and self._task.contact_only,
-            partial=False,
         )
-        return image
 
 
 def _resolution(

@@ -18,7 +18,9 @@ from optisense.tasks import (
     BallForce,
     BallShear,
     CylinderRadius,
+    DatasetSettings,
     Misalignment,
+    ReconstructionSettings,
     SampleSettings,
     perceive,
 )
@@ -152,8 +154,12 @@ def test_what_cannot_work_is_told_before_any_picture(lambertian: Any) -> None:
         perceive(Misalignment(), lambertian, SampleSettings(count=8))
     with pytest.raises(TaskError, match="are impossible"):
         perceive(Misalignment(), lambertian, QUIET, neighbours=60)
-    with pytest.raises(TaskError, match="camera noise"):
-        perceive(Misalignment(), lambertian, SampleSettings(camera_noise=float("nan")))
+    for kind in (SampleSettings, DatasetSettings, ReconstructionSettings):
+        for noise in (-1.0, 256.0, float("nan")):
+            with pytest.raises(TaskError, match=r"camera noise is .*Give 0 to 255"):
+                kind(camera_noise=noise)
+        with pytest.raises(TaskError, match="seed is -1"):
+            kind(seed=-1)
     with pytest.raises(TaskError):
         Misalignment(range=0)
     with pytest.raises(TaskError):

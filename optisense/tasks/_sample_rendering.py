@@ -1,0 +1,68 @@
+"""Rendering of samples: the settings that datasets, perception tasks and fits of readers share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from optisense.errors import TaskError
+from optisense.geometry import Contact
+from optisense.mechanics import ELASTIC
+from optisense.optics.estimators import RADIANCE_CACHE
+from optisense.quality import SAMPLE_PHOTONS
+from optisense.reading.camera_noise import MEASURED_NOISE
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, TactileImage
+
+
+@dataclass(frozen=True, kw_only=True)
+class SampleRendering:
+    """Settings of the pictures of samples.
+
+    Attributes:
+        resolution: (width, height) pixels; None for that of the kind of samples.
+        photons: number of photons of the light that all samples share.
+        seed: seed of all random numbers; sample i depends on it and on i only.
+        camera_noise: standard deviation in levels of 255 (see `camera_noise`).
+        skin: "elastic" or "conforming"; see docs/mechanics.md.
+    """
+
+    resolution: tuple[int, int] | None = None
+    photons: int = SAMPLE_PHOTONS
+    seed: int = 0
+    camera_noise: float = MEASURED_NOISE
+    skin: str = ELASTIC
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.camera_noise < 256:
+            raise TaskError(f"the camera noise is {self.camera_noise:g}", hint="Give 0 to 255")
+        if self.seed < 0:
+            raise TaskError(f"the seed is {self.seed}", hint="Give 0 or more")
+
+    def render(
+        self,
+        model: OpticalModel,
+        contacts: Sequence[Contact],
+        resolution: tuple[int, int],
+        *,
+        estimator: str = RADIANCE_CACHE,
+        only_contacts: bool = False,
+    ) -> TactileImage:
+        """Return the image of contacts; an interrupted rendering is no image.
+
+        Args:
+            resolution: (width, height) pixels.
+            estimator, only_contacts: see `OpticalModel.render`.
+        """
+        return model.render(
+            contacts,
+            resolution=resolution,
+            photons=self.photons,
+            seed=self.seed,
+            estimator=estimator,
+            skin=self.skin,
+            only_contacts=only_contacts,
+            partial=False,
+        )
