@@ -11,6 +11,7 @@ from rich.table import Table
 
 from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.options import DesignArgument, out_option
+from optisense.commands.options import MOST_MARGIN
 from optisense.errors import DesignError
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def add(
         float,
         typer.Option(
             min=0.0,
-            max=100.0,
+            max=MOST_MARGIN,
             metavar="MM",
             help="Distance between the parts and the sides of the cage, mm.",
         ),

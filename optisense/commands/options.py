@@ -23,6 +23,9 @@ MOST_ITEMS = 10_000_000
 EXPOSURES = (1e-9, 1e9)
 """Smallest and largest factor on the radiance; built-in sensors have factors of 10 to 1000."""
 
+MOST_MARGIN = 100.0
+"""Largest distance between a cage and its parts, mm: more than the size of a tactile sensor."""
+
 MOST_SEED = 2**32 - 1
 """Largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""
 

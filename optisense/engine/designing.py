@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field
 
+from optisense.commands.options import MOST_MARGIN
 from optisense.design import (
     Role,
     SensorDesign,
@@ -68,10 +69,10 @@ class ChangeCage(DesignFields):
     cage: str
     parts: list[str] = Field(default_factory=list)
     resolution: Resolution = (3, 3, 3)
-    margin: float = Field(default=0.0, ge=0.0)
+    margin: float = Field(default=0.0, ge=0.0, le=MOST_MARGIN)
     c_min: list[Place] | None = None
     c_max: list[Place] | None = None
-    blend: float | None = 0.0
+    blend: float | None = Field(default=0.0, ge=0.0, le=1.0)
 
 
 class CageWeights(DesignFields):

@@ -92,6 +92,8 @@ def test_a_cage_is_added_refined_and_settled(engine: Any) -> None:
     assert ranged["new"]["blend"] == 0.5 and len(ranged["new"]["c_max"]) == 27
     short = engine.refused("cage", design=caged, action="range", cage="new", c_max=[[0, 0, 0]])
     assert "27" in short["message"]
+    wide = engine.refused("cage", design=one, action="add", cage="w", parts=["boards"], margin=101)
+    assert "margin" in wide["message"] and "100" in wide["message"]
     gone = engine.ask("cage", design=caged, action="remove", cage="new")
     assert gone["cages"] == {}
 
