@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli.compare import PhotosArgument, reading_lines
-from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output, table_of
+from optisense.cli.console import (
+    EXIT_INTERRUPTED,
+    handles_errors,
+    messages,
+    output,
+    print_notes,
+    table_of,
+)
 from optisense.cli.options import DesignArgument, VariantOption, out_option
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CalibrateOptions
@@ -55,8 +62,7 @@ def calibrate(
         except KeyboardInterrupt:
             messages.print("interrupted: the same command continues; finished renderings are kept")
             raise typer.Exit(EXIT_INTERRUPTED) from None
-    for note in (*found.before.notes, *found.notes):
-        messages.print(f"note: {note}")
+    print_notes([*found.before.notes, *found.notes])
     print_calibration(found)
     output.print(f"design: {out}")
     output.print(f"page:   {out / PAGE_FILE}")

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import handles_errors, messages, output, table_of
+from optisense.cli.console import (
+    handles_errors,
+    output,
+    print_json,
+    print_notes,
+    table_of,
+)
 from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.progress import progress_line
 from optisense.commands.comparing import CompareOptions
@@ -75,11 +80,9 @@ def compare(
         if out is not None:
             line.begin("writing the page")
             write_comparison(out, sensor, found)
-    for note in found.notes:
-        messages.print(f"note: {note}")
+    print_notes(found.notes)
     if as_json:
-        data = {"notes": list(found.notes), **found.realism.as_data()}
-        print(json.dumps(data, indent=2, allow_nan=False))
+        print_json({"notes": list(found.notes), **found.realism.as_data()})
         return
     print_comparison(found)
     if out is not None:

@@ -6,10 +6,11 @@ Results go to standard output, everything else to standard error, so that output
 from __future__ import annotations
 
 import functools
+import json
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
@@ -65,6 +66,11 @@ def print_notes(notes: Iterable[str]) -> None:
     """Print notes for the user, beside the results."""
     for note in notes:
         messages.print(f"note: {note}", style="yellow")
+
+
+def print_json(values: Mapping[str, Any]) -> None:
+    """Print a result as JSON; NaN and infinity, which JSON does not have, are a defect."""
+    print(json.dumps(values, indent=2, allow_nan=False))
 
 
 _P = ParamSpec("_P")

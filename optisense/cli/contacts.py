@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from optisense.cli.compare import PhotosArgument
-from optisense.cli.console import handles_errors, messages, output, table_of
+from optisense.cli.console import handles_errors, output, print_notes, table_of
 from optisense.cli.options import out_option
 from optisense.commands.comparing import PhotographOptions
 
@@ -37,8 +37,7 @@ def contacts(
     found = finder.contacts(refine=not options.as_labelled)
     notes = [*photographs.warnings(), *finder.doubts()]
     write_contacts(out, photos.name, photographs, found, notes)
-    for note in notes:
-        messages.print(f"note: {note}")
+    print_notes(notes)
     table = table_of("press", "column", "row", "radius (pixels)")
     for press, place in zip(photographs.presses, found, strict=True):
         if place is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -15,6 +14,7 @@ from optisense.cli.console import (
     handles_errors,
     messages,
     output,
+    print_json,
     print_notes,
     table_of,
 )
@@ -29,7 +29,7 @@ from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, progress_line
 from optisense.cli.sampling import BUILDING, LOADING
 from optisense.commands.scoring import EvaluateOptions
-from optisense.writing import remove_own_page, write_text
+from optisense.writing import remove_own_page, write_json
 
 if TYPE_CHECKING:
     from optisense.objectives import Objective
@@ -118,7 +118,7 @@ def evaluate(
     if out is not None:
         _write(scored, out, objectives if report else [])
     if as_json:
-        print(json.dumps(scored.to_dict(), indent=2, allow_nan=False))
+        print_json(scored.to_dict())
     else:
         _print_table(scored)
         if out is not None:
@@ -160,8 +160,7 @@ def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
     """Write the JSON file, and the page if there are objectives to explain in it."""
     from optisense.report.scores import write_score_report
 
-    text = json.dumps(scored.to_dict(), indent=2, allow_nan=False) + "\n"
-    write_text(folder / JSON_FILE, text)
+    write_json(folder / JSON_FILE, scored.to_dict())
     if objectives:
         write_score_report(folder / REPORT_FILE, scored, objectives)
     else:  # a page of earlier scores would contradict these

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from optisense.cli.console import handles_errors, output, table_of
+from optisense.cli.console import handles_errors, output, print_json, table_of
 from optisense.cli.options import DesignArgument, VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.rendering import LedgerOptions
-from optisense.writing import write_text
+from optisense.writing import write_json, write_text
 
 if TYPE_CHECKING:
     from optisense.optics.ledger import LightLedger
@@ -74,12 +73,11 @@ def ledger(
     data = found.as_data() | {"camera": seen.as_data()}
     if places:
         data["places"] = [place.as_data() for place in section.places]
-    text = json.dumps(data, indent=2, allow_nan=False)
     if out is not None:
-        write_text(out / JSON_FILE, text + "\n")
+        write_json(out / JSON_FILE, data)
         write_text(out / PAGE_FILE, ledger_page(sensor, section))
     if as_json:
-        print(text)
+        print_json(data)
         return
     _print(found, seen)
     for place in section.places:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
-from optisense.cli.console import handles_errors, messages, output
+from optisense.cli.console import handles_errors, messages, output, print_notes
 from optisense.cli.output_folder import take_folder
 from optisense.errors import DesignError, OptiSenseError, OutputError
 from optisense.folders import is_empty
@@ -165,12 +165,10 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
     save_design(made.design, folder, new=is_new)
     save_made(folder)
     save_recipe(recipe, folder / RECIPE_FILE)
-    for note in made.notes:
-        messages.print(f"note: {note}", style="yellow")
+    print_notes(made.notes)
     unused = unused_imaging(made.design.camera)
     if unused is not None:
-        sentence = f"note: {unused}; set imaging: true in the recipe's camera to use them"
-        messages.print(sentence, style="yellow")
+        print_notes([f"{unused}; set imaging: true in the recipe's camera to use them"])
     for problem in problems:
         messages.print(f"warning: {problem}", style="yellow")
     for sentence in overdriven_lights(made.design):

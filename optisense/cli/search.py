@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from contextlib import ExitStack
@@ -18,6 +17,7 @@ from optisense.cli.console import (
     handles_errors,
     messages,
     output,
+    print_json,
     print_notes,
 )
 from optisense.cli.options import (
@@ -122,7 +122,7 @@ def search(
         best = result.study.best
         better = best is not None and not best.is_start
         if as_json:
-            print(json.dumps(summary(result), indent=2, allow_nan=False))
+            print_json(summary(result))
         else:
             print_result(result, out)
     if result.interrupted:

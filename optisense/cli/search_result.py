@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from optisense.cli.console import messages, output, table_of
+from optisense.cli.console import output, print_notes, table_of
 
 if TYPE_CHECKING:
     from optisense.search import SearchResult, Study, Trial
@@ -67,8 +67,7 @@ def print_result(result: SearchResult, out: Path) -> None:
     from optisense.search.study.conditions import condition_lines
 
     study = result.study
-    for note in result.notes:
-        messages.print(f"note: {note}", style="yellow")
+    print_notes(result.notes)
     best, start = study.best, study.start
     failed = [trial for trial in result.trials if trial.failure is not None]
     if failed:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from optisense.cli.console import messages
+from optisense.cli.console import print_notes
 from optisense.cli.progress import about, progress_line
 
 if TYPE_CHECKING:
@@ -37,8 +37,7 @@ def search_progress(workers: int) -> Iterator[Callable[[SearchProgress], None]]:
 
         def show(progress: SearchProgress) -> None:
             last[:] = [progress]
-            for warning in warnings.of(progress):
-                messages.print(f"note: {warning}", style="yellow")
+            print_notes(warnings.of(progress))
             line.follow(*stage_text(progress), notes(progress))
 
         yield show

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from optisense import tasks
-from optisense.cli.console import handles_errors, messages, output
+from optisense.cli.console import handles_errors, messages, output, print_json
 from optisense.cli.options import (
     DesignArgument,
     VariantOption,
@@ -203,7 +202,7 @@ def reconstruction(
 
         _write(out, values, draw_reconstruction(result, model.design.camera.axes()))
     if as_json:
-        _print_json(values)
+        print_json(values)
     else:
         print_reconstruction(result)
         _print_folder(out)
@@ -234,7 +233,7 @@ def _perceive(
             if folder is not None:
                 _write(folder, values[-1], draw_perception(results[-1]))
     if as_json:
-        _print_json(values[0] if len(values) == 1 else {"tasks": values})
+        print_json(values[0] if len(values) == 1 else {"tasks": values})
     else:
         print_perception(results)
         _print_folder(out)
@@ -264,10 +263,6 @@ def _write(folder: Path, values: dict[str, Any], figure: Figure) -> None:
     write_json(folder / RESULT, values)
     with written_whole(folder / FIGURE) as path:
         figure.savefig(path, dpi=110)
-
-
-def _print_json(values: dict[str, Any]) -> None:
-    print(json.dumps(values, indent=2, allow_nan=False))
 
 
 def _print_folder(out: Path | None) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from optisense.cli import stopping
-from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output, table_of
+from optisense.cli.console import (
+    EXIT_INTERRUPTED,
+    handles_errors,
+    messages,
+    output,
+    print_json,
+    table_of,
+)
 from optisense.cli.options import (
     DesignArgument,
     VariantOption,
@@ -21,7 +27,7 @@ from optisense.cli.options import (
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
 from optisense.commands.scoring import ToleranceOptions
-from optisense.writing import remove_own_page, write_text
+from optisense.writing import remove_own_page, write_json, write_text
 
 if TYPE_CHECKING:
     from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
@@ -84,11 +90,10 @@ def tolerance(
             progress=show,
             on_wait=stopping.print_wait,
         )
-    text = json.dumps(found.to_dict(), indent=2, allow_nan=False)
     if out is not None:
-        _write(found, out, text, report)
+        _write(found, out, report)
     if as_json:
-        print(text)
+        print_json(found.to_dict())
     else:
         _print(found)
         if out is not None:
@@ -121,10 +126,10 @@ def _waits(line: ProgressLine, last: list[int]) -> str:
     )
 
 
-def _write(found: Tolerance, folder: Path, text: str, report: bool) -> None:
+def _write(found: Tolerance, folder: Path, report: bool) -> None:
     from optisense.report.tolerance import render_tolerance
 
-    write_text(folder / JSON_FILE, text + "\n")
+    write_json(folder / JSON_FILE, found.to_dict())
     if report:
         write_text(folder / REPORT_FILE, render_tolerance(found))
     else:  # a page of earlier figures would contradict these

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output
+from optisense.cli.console import EXIT_INTERRUPTED, handles_errors, messages, output, print_json
 from optisense.cli.options import VariantOption, json_option, out_option
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.cli.sampling import BUILDING, LOADING, sample_progress
 from optisense.cli.verify_result import print_conditions, print_verification
 from optisense.commands.sampling import VerifyOptions
-from optisense.writing import write_text
+from optisense.writing import write_json, write_text
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
@@ -68,7 +67,7 @@ def verify(
     """
     compared = compare(first, second, trial, options, out, variant)
     if as_json:
-        print(json.dumps(compared.to_dict(), indent=2, allow_nan=False))
+        print_json(compared.to_dict())
         return
     print_comparison(compared, out)
 
@@ -148,8 +147,7 @@ def compare(
         if out is not None:
             from optisense.report.verification import render_verification
 
-            text = json.dumps(compared.to_dict(), indent=2, allow_nan=False)
-            write_text(out / JSON_FILE, text + "\n")
+            write_json(out / JSON_FILE, compared.to_dict())
             first_axes, second_axes = (design.camera.axes() for design in designs)
             page = render_verification(found, (first_axes, second_axes))
             write_text(out / REPORT_FILE, page)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from optisense.cli.console import output, table_of
+from optisense.cli.console import output, print_notes, table_of
 
 if TYPE_CHECKING:
     from optisense.search.study.conditions import ConditionResult
@@ -39,8 +39,7 @@ def print_verification(found: Verification) -> None:
         f"{found.flat[0]:.1f} degrees and {found.flat[1]:.3f} mm",
         style="dim",
     )
-    for note in found.notes():
-        output.print(f"note: {note}", style="yellow")
+    print_notes(found.notes())
     output.print(f"{found.in_words()}.")
 
 
