@@ -1,4 +1,6 @@
-"""Places in the Python code of users, for messages about errors in it."""
+"""Errors of any kind as errors for the user, with the place in the user's Python code if it took
+part.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,7 @@ from importlib.metadata import distributions
 from pathlib import Path
 from types import FrameType
 
-from optisense.errors import OwnCodeError
+from optisense.errors import OptiSenseError, OutputError, OwnCodeError, SetupError
 
 HOME = Path(__file__).parent
 """Folder of this package."""
@@ -26,6 +28,25 @@ def place_of(error: BaseException, file: str | None = None) -> str | None:
     frames = traceback.extract_tb(error.__traceback__)
     inside = [frame for frame in frames if file is None or frame.filename == file]
     return f"{inside[-1].filename}:{inside[-1].lineno}" if inside else file
+
+
+def as_user_error(error: BaseException, *, less_work: str, see: str) -> OptiSenseError:
+    """Return an error of any kind as one for the user; an `OptiSenseError` is returned as it is.
+
+    Args:
+        less_work: remedy if the memory does not suffice.
+        see: what shows the traceback of a defect of this package.
+    """
+    if isinstance(error, OptiSenseError):
+        return error
+    if isinstance(error, MemoryError):
+        return SetupError("not enough memory", hint=less_work)
+    if isinstance(error, OSError):
+        return OutputError.of(error)
+    return error_of_own_code(error) or OptiSenseError(
+        f"unexpected {type(error).__name__}: {error}",
+        hint=f"This is a defect of OptiSense; {see} shows where it is",
+    )
 
 
 def error_of_own_code(error: BaseException) -> OwnCodeError | None:

@@ -21,8 +21,8 @@ from rich.segment import Segment
 
 from optisense import starting
 from optisense.cli.from_options import with_options
-from optisense.errors import OptiSenseError, OutputError, SetupError
-from optisense.own_code import error_of_own_code
+from optisense.errors import OutputError, SetupError
+from optisense.own_code import as_user_error
 from optisense.text import visible
 
 if TYPE_CHECKING:
@@ -127,24 +127,12 @@ def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
                 before = _ending.set(ending)
                 ending.callback(_ending.reset, before)
                 return command(*args, **kwargs)
-        except OptiSenseError as error:
-            print_error(error.message, where=error.where, hint=error.hint)
-            failure = isinstance(error, (OutputError, SetupError))
-            raise typer.Exit(EXIT_FAILURE if failure else EXIT_BAD_INPUT) from None
         except KeyboardInterrupt:
             messages.print("interrupted")
             raise typer.Exit(EXIT_INTERRUPTED) from None
         except BrokenPipeError:
             # The reader of the pipe has closed it; keep Python from complaining at exit.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise typer.Exit(EXIT_FAILURE) from None
-        except OSError as error:
-            failed = OutputError.of(error)
-            print_error(failed.message, where=failed.where, hint=failed.hint)
-            _show_traceback()
-            raise typer.Exit(EXIT_FAILURE) from None
-        except MemoryError:
-            print_error("not enough memory", hint="Use a smaller --resolution or fewer --photons")
             raise typer.Exit(EXIT_FAILURE) from None
         except typer.Exit:
             raise
@@ -157,13 +145,16 @@ def handles_errors(command: Callable[_P, _R]) -> Callable[..., _R]:
             # Typer prints usage errors itself; every other error is a defect, here or in own code.
             if type(error).__module__.split(".")[0] in ("click", "typer"):
                 raise
-            told = error_of_own_code(error) or OptiSenseError(
-                f"unexpected {type(error).__name__}: {error}",
-                hint="This is a defect of OptiSense; `optisense --debug ...` shows where it is",
+            told = as_user_error(
+                error,
+                less_work="Use a smaller --resolution or fewer --photons",
+                see="`optisense --debug ...`",
             )
             print_error(told.message, where=told.where, hint=told.hint)
-            _show_traceback()
-            raise typer.Exit(EXIT_FAILURE) from None
+            if told is not error:
+                _show_traceback()
+            failure = told is not error or isinstance(told, (OutputError, SetupError))
+            raise typer.Exit(EXIT_FAILURE if failure else EXIT_BAD_INPUT) from None
 
     return with_options(run)
 

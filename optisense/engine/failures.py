@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from optisense.design import Diagnostic, SensorDesign
-from optisense.errors import OptiSenseError, OutputError, SetupError
-from optisense.own_code import error_of_own_code
+from optisense.errors import OptiSenseError
+from optisense.own_code import as_user_error
 
 
 class ProtocolError(OptiSenseError):
@@ -67,24 +67,20 @@ def as_data(error: BaseException, design: SensorDesign | None = None) -> dict[st
         error: an error of any kind; an `OptiSenseError` tells its place and a remedy.
         design: design of the request, in which the part is looked up.
     """
-    told, kind = error, type(error).__name__
+    told = as_user_error(
+        OptiSenseError("the request was cancelled") if isinstance(error, Cancelled) else error,
+        less_work="Use a smaller resolution or fewer photons",
+        see="the log of the engine",
+    )
     if isinstance(error, Cancelled):
-        told = OptiSenseError("the request was cancelled")
+        kind = "Cancelled"
     elif isinstance(error, InvalidDesignError):
         kind = "DesignError"
     elif isinstance(error, WrongContactError):
         kind = error.kind
-    elif isinstance(error, MemoryError):
-        hint = "Use a smaller resolution or fewer photons"
-        told, kind = SetupError("not enough memory", hint=hint), "SetupError"
-    elif isinstance(error, OSError):
-        told, kind = OutputError.of(error), "OutputError"
-    elif not isinstance(error, OptiSenseError):
-        hint = "This is a defect of OptiSense; the log of the engine shows where it is"
-        defect = OptiSenseError(f"unexpected {kind}: {error}", hint=hint)
-        told = error_of_own_code(error) or defect
-        kind = "InternalError" if told is defect else type(told).__name__
-    assert isinstance(told, OptiSenseError)
+    else:
+        is_defect = told is not error and type(told) is OptiSenseError
+        kind = "InternalError" if is_defect else type(told).__name__
     problems = error.problems if isinstance(error, InvalidDesignError) else ()
     return {
         "kind": kind,
