@@ -327,7 +327,7 @@ def _model(plain: Plain) -> OpticalModel:
 
     The model of the same design as before keeps the light that was traced for it.
     """
-    from optisense.objectives.score import json_ready
+    from optisense.json_values import json_ready
 
     key = (plain["sensor"], repr(json_ready(plain["dimensions"])))
     if key not in _keepers:

@@ -14,7 +14,7 @@ import yaml
 from numpy.typing import NDArray
 
 from optisense import __version__
-from optisense.objectives.score import json_ready
+from optisense.json_values import json_ready
 from optisense.search.study.settings import package_versions
 from optisense.writing import write_json, write_text, written_whole
 from paper.bench import Bench

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
-from optisense.objectives.score import json_ready
+from optisense.json_values import json_ready
 from paper.unit import Unit
 
 LEAST_UNITS = 6

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from optisense import __version__
 from optisense.errors import OptiSenseError, OutputError, SetupError
-from optisense.objectives.score import json_ready
+from optisense.json_values import json_ready
 from optisense.search.study.settings import package_versions
 from optisense.writing import inside, write_json, written_together
 from paper.errors import ExperimentError

@@ -47,7 +47,7 @@ def summary(result: SearchResult) -> dict[str, Any]:
 
 
 def _plain(trial: Trial) -> dict[str, Any]:
-    from optisense.objectives.score import json_ready
+    from optisense.json_values import json_ready
 
     return {
         "number": trial.number,

@@ -7,16 +7,15 @@ meaning.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from optisense.design.problems import design_error
 from optisense.engine.failures import ProtocolError
+from optisense.json_values import json_ready
 from optisense.untrusted_files import as_text, parse_json
 
 PROTOCOL = 1
@@ -122,21 +121,12 @@ def refusal(number: RequestId | None, error: Mapping[str, Any]) -> dict[str, Any
 
 def to_line(message: Mapping[str, Any]) -> bytes:
     """Return a message as a line of JSON; numbers that are not finite become null."""
-    text = json.dumps(_plain(message), ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    text = json.dumps(
+        json_ready(message, _plain), ensure_ascii=False, allow_nan=False, separators=(",", ":")
+    )
     return text.encode("utf-8", "replace") + b"\n"
 
 
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, bool | str | int):
-        return value
-    if isinstance(value, Mapping):
-        return {str(key): _plain(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(inner) for inner in value]
-    if isinstance(value, BaseModel):
-        return _plain(value.model_dump(mode="json"))
-    return str(value)
+def _plain(value: object) -> object:
+    """Return a model as a dict, and any other object as text."""
+    return value.model_dump(mode="json") if isinstance(value, BaseModel) else str(value)

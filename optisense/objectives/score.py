@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from optisense.errors import ObjectiveError
+from optisense.json_values import json_ready
 from optisense.text import to_html
 
 if TYPE_CHECKING:
@@ -132,32 +132,6 @@ def numbers_of(parts: Mapping[str, Any]) -> dict[str, float]:
         for name, value in parts.items()
         if isinstance(value, int | float) and not isinstance(value, bool)
     }
-
-
-def json_ready(value: Any) -> Any:
-    """Convert a value to plain dicts, lists, strings and finite numbers; NaN becomes None.
-
-    Raises:
-        ObjectiveError: the value contains an object that JSON cannot represent.
-    """
-    if isinstance(value, np.generic):
-        value = value.item()
-    if value is None or isinstance(value, bool | str | int):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, Mapping):
-        return {str(key): json_ready(inner) for key, inner in value.items()}
-    if isinstance(value, np.ndarray):
-        listed = value.tolist()
-        is_plain = value.dtype.kind == "f" and np.isfinite(value).all()
-        return listed if is_plain else json_ready(listed)  # element by element takes long
-    if isinstance(value, list | tuple):
-        return [json_ready(inner) for inner in value]
-    raise ObjectiveError(
-        f"a {type(value).__name__} among its parts can't be written as JSON",
-        hint="Use numbers, texts, lists and dicts",
-    )
 
 
 def shown_number(value: float | str) -> str:

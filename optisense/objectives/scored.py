@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from optisense.design import SensorDesign
+from optisense.json_values import json_ready
 from optisense.objectives.evaluation import Evaluation
-from optisense.objectives.score import Score, deviation_of, json_ready
+from optisense.objectives.score import Score, deviation_of
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from optisense.errors import ObjectiveError, OptiSenseError, SetupError, UnknownPartError
+from optisense.json_values import json_ready
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.registry import Objective
-from optisense.objectives.score import Score, json_ready
+from optisense.objectives.score import Score
 from optisense.own_code import place_of
 
 RETURNS = "a number, a number and a dict of its parts, or a Score"

@@ -20,8 +20,8 @@ from optisense.array_types import ByteArray, FloatArray
 from optisense.errors import TaskError
 from optisense.folders import held
 from optisense.geometry import Contact
+from optisense.json_values import json_ready
 from optisense.mechanics import CONFORMING
-from optisense.objectives.score import json_ready
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.reading.camera_noise import add_camera_noise
 from optisense.tasks._digests import design_values, mesh_digests

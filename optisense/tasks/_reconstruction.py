@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.geometry import Contact, Cylinder, MeshIndenter, Sphere, TriangleMesh
-from optisense.objectives.score import json_ready
+from optisense.json_values import json_ready
 from optisense.reading.tilts import angles_between
 from optisense.tasks._calibration import LEAST_PIXELS, CalibratedSensor, ReconstructionSettings
 

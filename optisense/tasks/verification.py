@@ -17,10 +17,10 @@ from scipy.spatial import cKDTree
 from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.geometry.objects import OBJECTS
+from optisense.json_values import json_ready
 from optisense.kept_arrays import NOTHING_KEPT, KeptArrays
 from optisense.mechanics.skins import CONFORMING
 from optisense.near import suggestion
-from optisense.objectives.score import json_ready
 from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
 from optisense.tasks._draws import rays_of_places
 from optisense.tasks._unseen_presses import UnseenPress, choose_presses

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from optisense.objectives.score import json_ready
+from optisense.json_values import json_ready
 from paper import EXPERIMENTS, Experiment, Finding, Record, find, write_page
 from paper.errors import ExperimentError
 from paper.experiment import gaps, write

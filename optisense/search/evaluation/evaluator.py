@@ -13,13 +13,13 @@ from typing import Any, ClassVar, Protocol
 from optisense.array_types import FloatArray
 from optisense.design import Role, SensorDesign
 from optisense.errors import OptiSenseError, SearchError, SetupError, UnknownPartError
+from optisense.json_values import json_ready
 from optisense.objectives import Objective, Score, Settings, evaluate
 from optisense.objectives.combined import goal_of
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.named import named_in
 from optisense.objectives.registry import CONDITIONS, WATCHED, find
 from optisense.objectives.run import split_settings
-from optisense.objectives.score import json_ready
 from optisense.objectives.scoring import score_of
 from optisense.own_code import place_of
 from optisense.search.evaluation.models import ModelCache

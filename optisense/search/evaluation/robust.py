@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from optisense.array_types import FloatArray
 from optisense.errors import OptiSenseError, UnknownPartError
+from optisense.json_values import json_ready
 from optisense.objectives.evaluation import ProgressCallback
 from optisense.objectives.registry import CONDITIONS
 from optisense.search.evaluation.evaluator import DesignEvaluator
@@ -83,14 +84,14 @@ class RobustEvaluator:
             scores[name] = percentile(values, LOW)
             middle, high = percentile(values, MIDDLE), percentile(values, HIGH)
             parts[name] = {
-                "p10": _or_none(scores[name]),
-                "p50": _or_none(middle),
-                "p90": _or_none(high),
-                "samples": [_or_none(value) for value in values],
+                "p10": json_ready(scores[name]),
+                "p50": json_ready(middle),
+                "p90": json_ready(high),
+                "samples": json_ready(values),
             }
         if self.usual.requirements:
             parts[CONDITIONS] = {
-                str(each): _or_none(_reached(each, found)) for each in self.usual.requirements
+                str(each): json_ready(_reached(each, found)) for each in self.usual.requirements
             }
         failure = None
         if any(math.isnan(value) for value in scores.values()):
@@ -134,7 +135,3 @@ def percentile(values: ArrayLike, share: float) -> float:
     if not math.isfinite(low):
         return math.nan
     return float(low + (place - math.floor(place)) * (high - low))
-
-
-def _or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -14,7 +14,8 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
-from optisense.objectives.score import deviation_of, json_ready
+from optisense.json_values import json_ready
+from optisense.objectives.score import deviation_of
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
