@@ -177,14 +177,10 @@ class Following:
             return self._child.outcome()
         if self._child is None and self._job.cancelled:
             raise Cancelled
-        best = study.best
+        from optisense.search import SearchResult
+
         ended = study.store.fact("ended")
-        return {
-            "interrupted": ended == "interrupted",
-            "ended": ended,
-            "notes": [],
-            "best": None if best is None else best.number,
-        }
+        return SearchResult(study, ended == "interrupted", ended).to_dict()
 
 
 def _score(row: Row, objective: str) -> float:

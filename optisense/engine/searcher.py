@@ -72,14 +72,7 @@ def _run(
         study.lock()  # before the mark, which names the process that has the study
         mark.write_text(json.dumps({"pid": os.getpid()}), encoding="utf-8")
         try:
-            result = run_study(study, workers=workers, limit=budget)
-            best = study.best
-            return {
-                "interrupted": result.interrupted,
-                "ended": result.ended,
-                "notes": list(result.notes),
-                "best": None if best is None else best.number,
-            }
+            return run_study(study, workers=workers, limit=budget).to_dict()
         finally:
             with contextlib.suppress(OSError):
                 mark.unlink(missing_ok=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
@@ -94,6 +95,16 @@ class SearchResult:
     def front(self) -> list[Trial]:
         """Pareto front: the trials that no other one dominates."""
         return self.study.front
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the end of the search, with the number of the best trial, ready for JSON."""
+        best = self.study.best
+        return {
+            "interrupted": self.interrupted,
+            "ended": self.ended,
+            "notes": list(self.notes),
+            "best": None if best is None else best.number,
+        }
 
 
 SearchProgressCallback = Callable[[SearchProgress], None]
