@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -26,7 +25,7 @@ from optisense.cli.options import (
     print_summaries,
 )
 from optisense.cli.output_folder import take_folder
-from optisense.cli.progress import ProgressLine, progress_line
+from optisense.cli.progress import progress_line
 from optisense.cli.sampling import BUILDING, LOADING
 from optisense.commands.scoring import EvaluateOptions
 from optisense.writing import remove_own_page, write_json
@@ -34,7 +33,6 @@ from optisense.writing import remove_own_page, write_json
 if TYPE_CHECKING:
     from optisense.objectives import Objective
     from optisense.objectives.scored import Scored
-    from optisense.optics import OpticalModel
 
 JSON_FILE = "scores.json"
 REPORT_FILE = "scores.html"
@@ -88,7 +86,7 @@ def evaluate(
         line.begin(LOADING)
         from optisense.objectives import BUILT_IN, Settings
         from optisense.objectives.combined import resolve
-        from optisense.objectives.run import split_settings
+        from optisense.objectives.run import Scoring, split_settings
         from optisense.sensors import load
 
         objectives = resolve(options.objectives or BUILT_IN)
@@ -108,9 +106,19 @@ def evaluate(
         line.begin("scoring", seeds)
         try:
             for number in range(seeds):
+                of = f"seed {number + 1} of {seeds}, " if seeds > 1 else ""
+
+                def show(
+                    done: float, title: str, step: str, number: int = number, of: str = of
+                ) -> None:
+                    line.advance(number + done)
+                    line.say(f"{of}{title}: {step}" if step else f"{of}{title}")
+
                 seed_of_run = {**settings, "seed": options.seed + number}
-                progress = ScoreProgress(line, number, seeds, objectives)
-                _score(model, objectives, seed_of_run, scored, progress)
+                scoring = Scoring(model, objectives, seed_of_run, show)
+                scores = scored.add(scoring.evaluation)
+                for score in scoring:
+                    scores[score.objective] = score
         except KeyboardInterrupt:
             if not scored.scores:
                 raise
@@ -130,30 +138,6 @@ def evaluate(
         raise typer.Exit(EXIT_INTERRUPTED)
     if scored.failed():
         raise typer.Exit(EXIT_FAILURE)
-
-
-def _score(
-    model: OpticalModel,
-    objectives: list[Objective],
-    settings: dict[str, Any],
-    scored: Scored,
-    progress: ScoreProgress,
-) -> None:
-    """Score with one seed, objective by objective, so that Ctrl-C keeps what is finished."""
-    from optisense.objectives import Evaluation, Settings
-    from optisense.objectives.registry import pixels_read
-    from optisense.objectives.run import split_settings
-    from optisense.objectives.scoring import run_objective
-
-    shared, own = split_settings(settings, objectives)
-    evaluation = Evaluation(
-        model, Settings(**shared), progress.images, pixels_read(objectives, own)
-    )
-    scores = scored.add(evaluation)
-    for each in objectives:
-        progress.begin(each.title)
-        scores[each.name] = run_objective(each, evaluation, own[each.name])
-        progress.end()
 
 
 def _write(scored: Scored, folder: Path, objectives: list[Objective]) -> None:
@@ -188,44 +172,3 @@ def _print_table(scored: Scored) -> None:
     for score in scored.scores.values():
         if score.failure is not None:
             output.print(f"{score.name} failed: {score.failure}")
-
-
-IMAGES_SHARE = 0.8
-"""Share of the images in the time of scoring; the rest is that of the objectives themselves."""
-
-
-class ScoreProgress:
-    """Progress of scoring with one seed: images, which objectives share, and objectives."""
-
-    def __init__(
-        self, line: ProgressLine, number: int, seeds: int, objectives: Sequence[Objective]
-    ) -> None:
-        """Show seed ``number`` (from 0) of ``seeds``."""
-        self._line = line
-        self._number, self._seeds, self._objectives = number, seeds, len(objectives)
-        self._images_share = 0.0 if all(each.rays_only for each in objectives) else IMAGES_SHARE
-        self._images = 0.0
-        self._finished = 0
-        self._title = ""
-
-    def begin(self, title: str) -> None:
-        """Begin an objective."""
-        self._title = title
-        self._show(title)
-
-    def end(self) -> None:
-        """Mark the objective as finished."""
-        self._finished += 1
-        self._show(self._title)
-
-    def images(self, fraction: float, text: str) -> None:
-        """Show that a fraction (0 to 1) of the images is rendered."""
-        self._images = max(self._images, fraction)
-        self._show(f"{self._title}: {text}")
-
-    def _show(self, text: str) -> None:
-        share = self._images_share
-        done = share * self._images + (1.0 - share) * self._finished / self._objectives
-        self._line.advance(self._number + done)
-        of = f"seed {self._number + 1} of {self._seeds}, " if self._seeds > 1 else ""
-        self._line.say(f"{of}{text}")

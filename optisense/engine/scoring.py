@@ -66,38 +66,30 @@ def _finite(bounds: tuple[float, float]) -> tuple[float, float] | None:
 @handles("evaluate", Evaluate, Lane.RENDER)
 def evaluate(session: Session, fields: Evaluate, job: Job) -> dict[str, Any]:
     """Score a design, objective by objective."""
-    from optisense.objectives import Evaluation, Settings
+    from optisense.objectives import Settings
     from optisense.objectives.combined import resolve
-    from optisense.objectives.registry import pixels_read
-    from optisense.objectives.run import split_settings
-    from optisense.objectives.scoring import run_objective
+    from optisense.objectives.run import Scoring, split_settings
 
     files = session.files(fields, job.id)
     with own_objectives():
         wanted = resolve(fields.objectives)
-    shared, own = split_settings(fields.settings, wanted)
-    settings = Settings(**shared)
+    shared, _ = split_settings(fields.settings, wanted)
+    Settings(**shared)  # wrong ones are refused before any work
     design = design_of(session, fields, job)
     session.designs.require_valid(design)
     job.progress(0.0, "building the sensor")
     model = session.renderer.model(design)
-    done = 0
 
-    def report(fraction: float, text: str) -> None:
-        job.progress((done + min(max(fraction, 0.0), 1.0)) / len(wanted), text)
+    def report(done: float, title: str, step: str) -> None:
+        job.progress(done, step or title)
 
-    evaluation = Evaluation(model, settings, report, pixels_read(wanted, own))
     rows = []
-    for each in wanted:
-        report(0.0, each.title)
-        score = run_objective(each, evaluation, own[each.name])
-        job.check()
+    for score in Scoring(model, wanted, fields.settings, report):
         row = score.to_dict() | {"beside": score.beside, "figure": None}
         if fields.figures:
             row["figure"] = _figure(score, files)
         job.send("score", score=row)
         rows.append(row)
-        done += 1
     return {"scores": rows}
 
 

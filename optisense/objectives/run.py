@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -21,6 +21,65 @@ from optisense.objectives.settings import Settings
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
+
+IMAGES_SHARE = 0.8
+"""Share of the images in the time of scoring; the rest is that of the objectives themselves."""
+
+
+class Scoring:
+    """Scoring of a model, objective by objective, with the progress of all.
+
+    Iteration runs the objectives and yields their scores, so that those before an interruption are
+    known.
+
+    Attributes:
+        evaluation: images and rays that the objectives share.
+    """
+
+    def __init__(
+        self,
+        model: OpticalModel,
+        objectives: Sequence[Objective],
+        settings: Mapping[str, Any],
+        progress: Callable[[float, str, str], None],
+    ) -> None:
+        """Store the arguments.
+
+        Args:
+            settings: fields of `Settings`, and keyword arguments of the objectives.
+            progress: function that is called with the finished fraction (0 to 1), the title of the
+                objective, and the step of its images, which is empty between them.
+
+        Raises:
+            ObjectiveError: a setting is unknown or invalid.
+        """
+        shared, self._own = split_settings(settings, objectives)
+        reads = pixels_read(objectives, self._own)
+        self.evaluation = Evaluation(model, Settings(**shared), self._show_images, reads)
+        self._objectives = objectives
+        self._progress = progress
+        self._images_share = 0.0 if all(each.rays_only for each in objectives) else IMAGES_SHARE
+        self._images = 0.0
+        self._finished = 0
+        self._title = ""
+
+    def __iter__(self) -> Iterator[Score]:
+        for each in self._objectives:
+            self._title = each.title
+            self._show()
+            score = run_objective(each, self.evaluation, self._own[each.name])
+            self._finished += 1
+            self._show()
+            yield score
+
+    def _show_images(self, fraction: float, step: str) -> None:
+        self._images = max(self._images, min(fraction, 1.0))
+        self._show(step)
+
+    def _show(self, step: str = "") -> None:
+        share = self._images_share
+        done = share * self._images + (1.0 - share) * self._finished / len(self._objectives)
+        self._progress(done, self._title, step)
 
 
 @overload

@@ -22,6 +22,7 @@ from optisense.objectives._exposure import MOST_SATURATED, exposure_for
 from optisense.objectives.normdiff import SAMPLE_SHARE, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
+from optisense.objectives.run import IMAGES_SHARE, Scoring
 from optisense.optics.radiance_cache import store
 from optisense.optics.radiance_cache.tracing_limits import MAX_SINGLE_PASS
 from optisense.optics.transport.photons import trace_photons
@@ -276,6 +277,20 @@ def test_progress_only_grows(model: OpticalModel) -> None:
     assert told[0] == 0.0
     assert told[-1] == pytest.approx(1.0)
     assert all(np.diff(told) >= -1e-9)
+
+
+def test_the_progress_of_several_objectives_has_images_and_their_titles(
+    model: OpticalModel,
+) -> None:
+    told: list[tuple[float, str, str]] = []
+    both = [find("rgb2normal"), find("aoap")]
+    scores = list(Scoring(model, both, SMALL, lambda *said: told.append(said)))
+    assert [score.objective for score in scores] == ["rgb2normal", "aoap"]
+    done = [fraction for fraction, _, _ in told]
+    assert done[0] == 0.0 and done[-1] == pytest.approx(1.0) and done == sorted(done)
+    rendered = max(fraction for fraction, _, step in told if step)
+    assert rendered == pytest.approx(IMAGES_SHARE)
+    assert told[0][1:] == (both[0].title, "") and told[-1][1:] == (both[1].title, "")
 
 
 @pytest.mark.parametrize(
