@@ -27,9 +27,22 @@ fits on a screen.
 """
 
 
+def design_values(design: SensorDesign) -> dict[str, Any]:
+    """Return all values that affect the simulation; names of files and provenance are left out."""
+    data = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
+    for part in data["parts"].values():
+        del part["mesh"]
+    return data
+
+
+def mesh_digests(design: SensorDesign) -> dict[str, str]:
+    """Return digests by part that distinguish meshes of the same name."""
+    return {name: _print_of(mesh) for name, mesh in design.meshes.items()}
+
+
 def fingerprint(design: SensorDesign) -> str:
     """Return a short text that is equal for designs whose simulations are equal."""
-    digest = hashlib.sha256(json.dumps(_values(design), sort_keys=True).encode())
+    digest = hashlib.sha256(json.dumps(design_values(design), sort_keys=True).encode())
     for name in sorted(design.meshes):
         mesh = design.meshes[name]
         digest.update(name.encode())
@@ -42,7 +55,7 @@ def fingerprint(design: SensorDesign) -> str:
 
 def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
     """Return the changes from one design to another, one per line: 'PATH: OLD -> NEW'."""
-    found = plain_differences(_values(old), _values(new))
+    found = plain_differences(design_values(old), design_values(new))
     for name in sorted(set(old.meshes) | set(new.meshes)):
         if name in old.meshes and name in new.meshes:
             said = _compare_meshes(old.meshes[name], new.meshes[name])
@@ -54,7 +67,7 @@ def differences(old: SensorDesign, new: SensorDesign) -> list[str]:
 def notes(design: SensorDesign) -> dict[str, Any]:
     """Return a summary of a design (JSON-ready), from which later edits can be found."""
     return {
-        "values": _values(design),
+        "values": design_values(design),
         "meshes": {
             name: [len(mesh.vertices), len(mesh.faces), _print_of(mesh)]
             for name, mesh in sorted(design.meshes.items())
@@ -64,7 +77,7 @@ def notes(design: SensorDesign) -> dict[str, Any]:
 
 def differences_from(noted: dict[str, Any], new: SensorDesign) -> list[str]:
     """Return the changes of a design since its `notes` were written."""
-    found = plain_differences(noted["values"], _values(new))
+    found = plain_differences(noted["values"], design_values(new))
     now = notes(new)["meshes"]
     for name, (vertices, faces, mark) in noted["meshes"].items():
         if name in now and now[name][2] != mark:
@@ -75,9 +88,10 @@ def differences_from(noted: dict[str, Any], new: SensorDesign) -> list[str]:
 
 
 def plain_differences(old: Any, new: Any) -> list[str]:
-    """Return the changes between JSON-ready values, one per line."""
+    """Return the changes between values, one per line, as JSON has them: tuples equal lists."""
     found: list[str] = []
-    _compare(old, new, (), found)
+    before, now = (json.loads(json.dumps(each)) for each in (old, new))
+    _compare(before, now, (), found)
     return found
 
 
@@ -86,14 +100,6 @@ def listed(changed: list[str]) -> str:
     shown = "\n".join(f"  {line}" for line in changed[:MOST_SHOWN])
     more = len(changed) - MOST_SHOWN
     return shown + (f"\n  and {more} more" if more > 0 else "")
-
-
-def _values(design: SensorDesign) -> dict[str, Any]:
-    """Return all values that affect the simulation; names of files and provenance are left out."""
-    data = design.model_dump(mode="json", exclude={"provenance", "description", "name"})
-    for part in data["parts"].values():
-        del part["mesh"]
-    return data
 
 
 def _compare(old: Any, new: Any, path: tuple[str | int, ...], found: list[str]) -> None:

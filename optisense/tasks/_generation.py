@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import load_design
+from optisense.design.difference import design_values, mesh_digests
 from optisense.design.storage import files_of
 from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
@@ -26,7 +27,7 @@ from optisense.reading.untouched import UntouchedSurface
 from optisense.sensors import save_design
 from optisense.tasks._camera_model import camera_model, ray_arrays
 from optisense.tasks._dataset_settings import DatasetSettings
-from optisense.tasks._digests import design_values, file_digest, mesh_digests
+from optisense.tasks._digests import file_digest
 from optisense.tasks._draws import DrawnContact, Places, is_cut, keeps_margin
 from optisense.tasks._records import CsvTable, refuse_differences, write_whole
 from optisense.tasks._splits import split_of

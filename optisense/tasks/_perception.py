@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from optisense.array_types import ByteArray, FloatArray
+from optisense.design.difference import design_values, mesh_digests
 from optisense.errors import TaskError
 from optisense.folders import held
 from optisense.geometry import Contact
@@ -24,7 +25,6 @@ from optisense.json_values import json_ready
 from optisense.mechanics import CONFORMING
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.reading.camera_noise import add_camera_noise
-from optisense.tasks._digests import design_values, mesh_digests
 from optisense.tasks._records import KEPT, CsvTable, read_object, refuse_differences
 from optisense.tasks._regression import FOLDS, ForestReading, read_by_forest
 from optisense.tasks._sample_rendering import SampleRendering

@@ -9,23 +9,17 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from optisense.design.difference import plain_differences
+from optisense.design.difference import listed, plain_differences
 from optisense.errors import OutputError, TaskError
 from optisense.untrusted_files import COPY_AGAIN, read_json, read_table
 from optisense.writing import written_whole
 
 KEPT = "Free space on this disk or choose another folder; finished samples are kept"
-
-MOST_SHOWN = 5
-"""Largest number of differences between settings that a message lists; further ones are only
-counted, so that the message stays readable.
-"""
 
 
 def write_whole(path: Path, writer: Callable[[Path], object]) -> None:
@@ -120,15 +114,13 @@ def refuse_differences(
     what: str, folder: Path, before: Mapping[str, Any], now: Mapping[str, Any]
 ) -> None:
     """Raise TaskError if a folder was begun with other settings; the message lists them."""
-    found = plain_differences(*(json.loads(json.dumps(each)) for each in (before, now)))
-    if not found:
-        return
-    more = f" and {len(found) - MOST_SHOWN} more" if len(found) > MOST_SHOWN else ""
-    raise TaskError(
-        f"the folder holds {what} with other settings: " + "; ".join(found[:MOST_SHOWN]) + more,
-        where=str(folder),
-        hint="Name another folder, or repeat the settings of this one to continue it",
-    )
+    found = plain_differences(before, now)
+    if found:
+        raise TaskError(
+            f"the folder holds {what} with other settings:\n{listed(found)}",
+            where=str(folder),
+            hint="Name another folder, or repeat the settings of this one to continue it",
+        )
 
 
 def _text(value: object) -> str:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 from pathlib import Path
 
 import pytest
 
+from optisense import load
+from optisense.design.difference import mesh_digests
 from optisense.errors import TaskError
 from optisense.tasks._records import CsvTable, read_object, refuse_differences
 
@@ -55,11 +58,21 @@ def test_other_settings_are_refused_with_their_paths() -> None:
     with pytest.raises(TaskError) as raised:
         refuse_differences("things", Path(), before, now)
     assert raised.value.message == (
-        "the folder holds things with other settings: depth[1]: 1 -> 0.9; seen.seed: 3 -> 4; "
-        'indenters: ["plane"] -> ["plane", "mesh"]'
+        "the folder holds things with other settings:\n"
+        "  depth[1]: 1 -> 0.9\n"
+        "  seen.seed: 3 -> 4\n"
+        '  indenters: ["plane"] -> ["plane", "mesh"]'
     )
     with pytest.raises(TaskError, match="and 2 more"):
-        refuse_differences("things", Path(), {}, {str(n): n for n in range(7)})
+        refuse_differences("things", Path(), {}, {str(n): n for n in range(10)})
+
+
+def test_digests_of_datasets_of_older_releases_are_still_known() -> None:
+    """They are those of the bytes of a mesh, as release 0.2 wrote them."""
+    design = load("gelsight-mini-ideal")
+    mesh = design.meshes["gel"]
+    written = hashlib.sha256(mesh.vertices.tobytes() + mesh.faces.tobytes()).hexdigest()
+    assert mesh_digests(design)["gel"] == written
 
 
 def test_json_that_is_none_is_told(tmp_path: Path) -> None:

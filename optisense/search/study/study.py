@@ -183,8 +183,7 @@ class Study:
             SearchError: some differ; the message lists them.
         """
         here = json.loads(self.settings.to_text())
-        there = json.loads(json.dumps(wanted))
-        changed = plain_differences({key: here[key] for key in there}, there)
+        changed = plain_differences({key: here[key] for key in wanted}, wanted)
         if changed:
             raise SearchError(
                 f"the study was begun with other settings:\n{listed(changed)}",
