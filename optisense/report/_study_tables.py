@@ -12,7 +12,7 @@ import numpy as np
 
 from optisense.report.before_after import RayFigures
 from optisense.search.evaluation.outcome import rank_of
-from optisense.search.study.conditions import condition_results
+from optisense.search.study.conditions import condition_results, is_worse
 from optisense.search.study.failures import by_cause
 from optisense.search.study.study import Study, beside
 from optisense.search.study.trial import Trial
@@ -25,11 +25,6 @@ MOST_CHANGES = 40
 
 MOST_CAUSES = 10
 """Largest number of causes of failure in the table, by frequency; the others are counted."""
-
-WORSE = 0.02
-"""Relative change of a ray measure below which it does not count as worse; smaller changes may come
-from the rounding of rays and triangles.
-"""
 
 NONE = "–"
 """Text of a cell without a number."""
@@ -128,15 +123,15 @@ def ray_figures(before: RayFigures | None, after: RayFigures | None) -> Table | 
 
 
 _FIGURES = (
-    ("AOAP (higher is better)", "aoap", False, 1),
-    ("coverage: area of the skin in view", "coverage", True, 1),
-    ("pixels that see the skin", "seeing", True, 1),
-    ("upright rays: mean cosine to the skin's normal", "upright", False, 1),
-    ("2to3PW: evenness of the pixels (higher is better)", "evenness", False, 1),
-    ("stretching, median pixel (1 is undistorted)", "stretching", False, -1),
-    ("stretching of the worst tenth of the pixels, at least", "worst_stretching", False, -1),
+    ("AOAP (higher is better)", "aoap", False, False),
+    ("coverage: area of the skin in view", "coverage", True, False),
+    ("pixels that see the skin", "seeing", True, False),
+    ("upright rays: mean cosine to the skin's normal", "upright", False, False),
+    ("2to3PW: evenness of the pixels (higher is better)", "evenness", False, False),
+    ("stretching, median pixel (1 is undistorted)", "stretching", False, True),
+    ("stretching of the worst tenth of the pixels, at least", "worst_stretching", False, True),
 )
-"""Label, attribute of `RayFigures`, whether it is shown in percent, and the sign of better."""
+"""Label, attribute of `RayFigures`, whether it is shown in percent, and whether lower is better."""
 
 
 def _figure(side: RayFigures | None, field: str, percent: bool) -> str:
@@ -151,9 +146,9 @@ def worsened_figures(before: RayFigures | None, after: RayFigures | None) -> lis
     if before is None or after is None:
         return []
     found = []
-    for label, field, percent, sign in _FIGURES:
+    for label, field, percent, lower_is_better in _FIGURES:
         old, new = getattr(before, field), getattr(after, field)
-        if math.isfinite(old) and math.isfinite(new) and sign * (new - old) < -WORSE * abs(old):
+        if is_worse(new, old, lower_is_better=lower_is_better):
             name = re.split(r"[:(]", label)[0].strip()
             scale, unit = (100.0, " %") if percent else (1.0, "")
             found.append(f"{name} ({scale * old:.3g}{unit} before, {scale * new:.3g}{unit} after)")

@@ -100,7 +100,7 @@ def test_what_got_worse_is_told_where_rays_may_move(page: str) -> None:
     mini = ots.load("gelsight-mini-ideal")
     found = search(mini, {"camera.fov": (40.0, 60.0)}, wide, method="random", budget=3)
     figures = RayFigures(0.5, 0.25, 0.75, 0.5, 4.0, 1.1, 1.5, np.full((3, 4), 1.2))
-    after = replace(figures, aoap=0.6, evenness=1.0)
+    after = replace(figures, aoap=0.6, evenness=1.0, coverage=0.24)
     text = render_study(
         found.study, {"before": DesignView(figures=figures), "after": DesignView(figures=after)}
     )

@@ -13,8 +13,8 @@ from optisense.search.study.best import nearest
 from optisense.search.study.trial import Trial
 
 WORSE = 0.1
-"""Share of the start's value by which a watched quantity must be worse to be reported; smaller
-changes may come from the rounding of pixels and triangles.
+"""Share of the start's value by which a quantity must be worse to be reported, by commands and on
+pages; smaller changes may come from the rounding of pixels and triangles.
 """
 
 
@@ -90,6 +90,12 @@ def condition_note(trials: Sequence[Trial]) -> str | None:
     return f"the start breaks conditions, which is allowed: {', '.join(unmet(start.conditions))}"
 
 
+def is_worse(now: float, before: float, *, lower_is_better: bool) -> bool:
+    """Return whether a quantity is worse than before by more than `WORSE`; not if one is NaN."""
+    loss = now - before if lower_is_better else before - now
+    return loss > WORSE * abs(before)
+
+
 def worsened(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
     """Return the quantities without a condition that are worse in the best outcome than in the
     start, by the name of the objective.
@@ -101,8 +107,8 @@ def worsened(best: Outcome, start: Outcome) -> dict[str, tuple[float, float]]:
     before, now = start.parts.get(WATCHED, {}), best.parts.get(WATCHED, {})
     found = {}
     for name in now.keys() & before.keys() - limited:
-        sign = 1.0 if objective_of(name).lower_is_better else -1.0
-        if sign * (now[name] - before[name]) > WORSE * abs(before[name]):
+        lower_is_better = objective_of(name).lower_is_better
+        if is_worse(now[name], before[name], lower_is_better=lower_is_better):
             found[name] = (now[name], before[name])
     return dict(sorted(found.items()))
 
