@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
+from optisense.geometry import Contact, Sphere
+from optisense.objectives import Settings
 from optisense.objectives.frames import nearest_press
+
+if TYPE_CHECKING:
+    from optisense.optics import OpticalModel, TactileImage
 
 LEAST_PIXELS = 12
 """Smallest number of pixels of a visible ball (about 4 x 3); smaller ones can't be made out."""
@@ -43,6 +49,25 @@ class Ball:
     def seen(self) -> bool:
         """True if the ball is large enough to be made out."""
         return self.pixels >= LEAST_PIXELS
+
+
+def nine_balls(
+    model: OpticalModel, settings: Settings, across: int, photons: int
+) -> tuple[TactileImage, list[Contact]]:
+    """Return an image of the nine balls that objectives press in, and the balls.
+
+    Args:
+        settings: settings with the radius and the depth of the balls, and with the skin.
+        across: width of the image, pixels.
+
+    Raises:
+        OptiSenseError: the design can't be rendered.
+    """
+    contacts = model.nine_contacts(Sphere(settings.radius), settings.depth)
+    size = model.design.camera.size_at(across)
+    skin = settings.skin
+    image = model.render(contacts, resolution=size, photons=photons, skin=skin, partial=False)
+    return image, contacts
 
 
 def find_balls(

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SetupError
-from optisense.geometry import Contact, Sphere
 from optisense.objectives import Evaluation, Settings, evaluate
 from optisense.quality import PICTURE_PHOTONS
-from optisense.report._balls import Ball, find_balls
+from optisense.report._balls import Ball, find_balls, nine_balls
 from optisense.report.camera_rays import CameraRays
 
 if TYPE_CHECKING:
-    from optisense.optics import OpticalModel
+    pass
 
 ACROSS = 320
 """Width of each of the two pictures compared, pixels: both fit side by side on a page."""
@@ -102,9 +101,11 @@ def design_view(
         found["rays"] = CameraRays.of(model)
         found["figures"] = ray_figures(Evaluation(model, shared))
         if pictures:
-            contacts = model.nine_contacts(Sphere(shared.radius), shared.depth)
             found["pressed"] = shared.radius, shared.depth
-            found["picture"], found["balls"] = _picture(model, contacts, photons, shared.skin)
+            image, contacts = nine_balls(model, shared, ACROSS, photons)
+            found["picture"] = image.picture()
+            places = np.array([contact.point for contact in contacts], dtype=np.float64)
+            found["balls"] = find_balls(image.points, image.contact_mask, places)
     except SetupError:
         raise
     except OptiSenseError as error:
@@ -135,14 +136,3 @@ def ray_figures(evaluation: Evaluation) -> RayFigures:
         worst_stretching=float(worst),
         map=stretching,
     )
-
-
-def _picture(
-    model: OpticalModel, contacts: list[Contact], photons: int, skin: str
-) -> tuple[NDArray[np.uint8], tuple[Ball, ...]]:
-    size = model.design.camera.size_at(ACROSS)
-    image = model.render(contacts, resolution=size, photons=photons, skin=skin)
-    if image.interrupted:
-        raise KeyboardInterrupt
-    places = np.array([contact.point for contact in contacts], dtype=np.float64)
-    return image.picture(), find_balls(image.points, image.contact_mask, places)

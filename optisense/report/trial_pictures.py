@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import OptiSenseError, SetupError
-from optisense.geometry import Sphere
 from optisense.objectives import Settings
+from optisense.report._balls import nine_balls
 from optisense.report._study_figures import spread_out
 from optisense.search.evaluation.outcome import rank_of
 from optisense.search.study.study import Study
@@ -67,12 +67,7 @@ class TrialPictures:
             self._model = OpticalModel(design)
         else:
             self._model.set_design(design)
-        size = design.camera.size_at(ACROSS)
-        shared = self._settings
-        contacts = self._model.nine_contacts(Sphere(shared.radius), shared.depth)
-        image = self._model.render(contacts, resolution=size, photons=PHOTONS, skin=shared.skin)
-        if image.interrupted:
-            raise KeyboardInterrupt
+        image, _ = nine_balls(self._model, self._settings, ACROSS, PHOTONS)
         return image.picture()
 
 
