@@ -8,12 +8,13 @@ import json
 import os
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
+
+from optisense.version import version_of
 
 FOLDER = Path(__file__).parent
 JSON = FOLDER / "results.json"
@@ -88,12 +89,8 @@ def machine() -> dict[str, Any]:
     if info.is_file():
         names = [x.split(":", 1)[1] for x in info.read_text().splitlines() if "model name" in x]
         model = names[0].strip() if names else model
-    versions = {}
-    for name in ("mitsuba", "drjit", "numpy", "pyluxcore"):
-        try:
-            versions[name] = version(name)
-        except PackageNotFoundError:
-            versions[name] = "not installed"
+    packages = ("mitsuba", "drjit", "numpy", "pyluxcore")
+    versions = {name: version_of(name, "not installed") for name in packages}
     load = os.getloadavg()[0]
     return {
         "date": datetime.date.today().isoformat(),

@@ -7,7 +7,6 @@ import json
 from dataclasses import asdict, dataclass, field, fields
 from datetime import UTC, datetime
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -16,6 +15,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from optisense.errors import SearchError
 from optisense.text import brief
 from optisense.untrusted_files import COPY_AGAIN, first_problem, is_file, read_json
+from optisense.version import version_of
 from optisense.writing import write_text
 
 STUDY_VERSION = 1
@@ -176,12 +176,4 @@ def _fields() -> list[str]:
 
 def package_versions() -> dict[str, str]:
     """Return the installed versions of the packages on which the numbers of a study depend."""
-    return {name: _version_of(name) for name in LIBRARIES}
-
-
-@cache
-def _version_of(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return "unknown"
+    return {name: version_of(name) for name in LIBRARIES}
