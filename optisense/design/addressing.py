@@ -115,9 +115,11 @@ def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:
         if isinstance(key, int):
             if key < len(value):
                 return value[key]
+            hint = f"Indices run from 0 to {len(value) - 1}" if len(value) else None
+            if not len(value) and done[:1] == ("cages",):
+                hint = "The points of this cage follow from its blend: change that, or settle it"
             raise DesignError(
-                f"'{path}' does not exist: {here} has {len(value)} entries",
-                hint=f"Indices run from 0 to {len(value) - 1}",
+                f"'{path}' does not exist: {here} has {len(value)} entries", hint=hint
             )
         known = ["x", "y", "z"] if len(value) == 3 else []
     else:

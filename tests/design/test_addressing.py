@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from optisense import sensors
 from optisense.design import Point, SensorDesign, get_value, numbers, set_value
 from optisense.errors import DesignError
 
@@ -100,3 +101,9 @@ def test_private_attributes_are_out_of_reach(design: SensorDesign) -> None:
     for path in ("_meshes", "model_fields", "__class__", "camera.__dict__", "lights.keys"):
         with pytest.raises(DesignError):
             get_value(design, path)
+
+
+def test_points_of_a_cage_with_a_blend_are_refused_in_words() -> None:
+    with pytest.raises(DesignError, match="has 0 entries") as refused:
+        get_value(sensors.load("gelsight-svelte"), "cages.M1.points[3].y")
+    assert "blend" in str(refused.value.hint)

@@ -12,7 +12,7 @@ from optisense import OpticalModel, load
 from optisense.design import Markers
 from optisense.errors import OptiSenseError
 from optisense.geometry import Contact, Sphere
-from optisense.optics.imaging.markers import MarkerDots, ink_factor
+from optisense.optics.imaging.markers import MarkerDots, _between_pixels, ink_factor
 from optisense.optics.imaging.tactile_image import TactileImage
 
 SIZE = (160, 120)
@@ -101,3 +101,29 @@ def test_markers_that_make_no_sense_are_refused(fields: dict[str, object]) -> No
     design["markers"] = {"radius": 0.3, **fields}
     with pytest.raises((OptiSenseError, ValueError), match=r"markers|grid"):
         type(load("gelsight-mini-ideal")).model_validate(design)
+
+
+@pytest.mark.parametrize("radius", [0.01, 0.04, 0.1, 0.3])
+def test_dots_of_any_size_cover_their_area(radius: float) -> None:
+    """A pixel is 0.1 mm wide; the smallest dots are a twentieth of it."""
+    width, count = 0.1, 60
+    grid = (np.arange(count) + 0.5) * width
+    x, y = np.meshgrid(grid, grid)
+    skin = np.stack([x, y, np.zeros_like(x)], axis=2)
+    areas = []
+    for shift in np.random.default_rng(1).uniform(0, width, (200, 2)):
+        middle = np.array([[*(count * width / 2 + shift), 0.0]])
+        dots = MarkerDots(np.zeros((1, 2)), middle, np.array([[0.0, 0.0, 1.0]]), radius)
+        areas.append(dots.coverage(skin).sum() * width**2)
+    assert np.mean(areas) == pytest.approx(np.pi * radius**2, rel=0.02)
+
+
+def test_displacements_are_interpolated_between_pixels() -> None:
+    rows, columns = np.indices((6, 8)) + 0.5
+    moved = np.stack([0.01 * columns, 0.02 * rows, 0.0 * rows], axis=2)
+    moved[0, 0] = np.nan
+    places = np.array([[3.2, 2.9], [1.9, 1.2], [7.9, 5.9]])
+    found = _between_pixels(moved, places)
+    assert found[0] == pytest.approx([0.032, 0.058, 0.0])
+    assert np.isfinite(found[1]).all()  # the one beside the gap
+    assert found[2] == pytest.approx([0.075, 0.11, 0.0])  # half a pixel from the picture's edge

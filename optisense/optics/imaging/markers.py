@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 from scipy.spatial import cKDTree
 
 from optisense.array_types import FloatArray
@@ -96,7 +97,7 @@ class MarkerDots:
         along = np.einsum("ni,ni->n", offset, self.normals[nearest])
         beside = np.sqrt(np.maximum(np.einsum("ni,ni->n", offset, offset) - along**2, 0.0))
         width = np.maximum(_pixel_width(material)[seen], 1e-9)
-        share = np.clip(0.5 + (self.radius - beside) / width, 0.0, 1.0)
+        share = _covered(self.radius / width, beside / width)
         result[seen] = np.where(np.abs(along) < DEEPEST_MISS, share, 0.0)
         return result
 
@@ -138,11 +139,7 @@ class MarkerDots:
         after = self.pixels(material)
         displacement = np.full((len(self.points), 3), np.nan)
         known = np.isfinite(after).all(axis=1)
-        column, row = (
-            after[known, k].astype(np.int64).clip(0, size - 1)
-            for k, size in ((0, moved.shape[1]), (1, moved.shape[0]))
-        )
-        displacement[known] = moved[row, column]
+        displacement[known] = _between_pixels(moved, after[known])
         return MarkerPlaces(self.coordinates, self.pixels(at_rest), after, displacement)
 
 
@@ -161,6 +158,33 @@ def ink_factor(markers: Markers, coating: CoatingModel) -> FloatArray:
     share = lobe.specularity
     own = (1.0 - share) * diffuse + (share * metal if share > 0.0 else 0.0)
     return np.asarray(np.array(markers.reflectance) / np.maximum(own, 1e-6))
+
+
+def _covered(radius: FloatArray, beside: FloatArray) -> FloatArray:
+    """Return the share (n,) of pixels that a dot covers, from its radius and the distance of its
+    middle from that of the pixel, both in widths of the pixel.
+
+    The share falls linearly over the width of a pixel. Such an edge at the radius R holds the area
+    pi (R^2 + 1/12), so that it lies a little inside the dot; a dot with a radius below 3^-1/2
+    covers no pixel wholly. The sum over pixels is the area of the dot in each case.
+    """
+    edge = 0.5 + np.sqrt(np.maximum(radius**2 - 1.0 / 12.0, 0.0)) - beside
+    within_a_pixel = 3.0 * radius**2 * (1.0 - beside)
+    return np.asarray(np.clip(np.where(radius < 3.0**-0.5, within_a_pixel, edge), 0.0, 1.0))
+
+
+def _between_pixels(values: FloatArray, places: FloatArray) -> FloatArray:
+    """Return the values (n, k) of a map (h, w, k) at columns and rows (n, 2), interpolated between
+    the middles of pixels; those of the nearest pixel where a neighbour has none.
+    """
+    upright = np.moveaxis(values, 2, 0)
+    spots = places[:, ::-1].T - 0.5
+    found = [
+        [ndimage.map_coordinates(each, spots, order=order, mode="nearest") for each in upright]
+        for order in (1, 0)
+    ]
+    smooth, nearest = (np.array(each).T for each in found)
+    return np.asarray(np.where(np.isfinite(smooth), smooth, nearest))
 
 
 def _pixel_width(material: FloatArray) -> FloatArray:
