@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Protocol
 
 from optisense.array_types import FloatArray
 from optisense.design import Role, SensorDesign
+from optisense.design.cage_checks import contact_problems, fold_problems
 from optisense.errors import OptiSenseError, SearchError, SetupError, UnknownPartError
 from optisense.json_values import json_ready
 from optisense.objectives import Objective, Score, Settings, evaluate
@@ -27,14 +28,13 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.requirements import requirements_of
 from optisense.search.evaluation.views import SameMirrors, least_skin, may_change_view
 from optisense.search.space.buildable import (
-    DeformedPartsInContact,
     LightsOnSupports,
     LightsOutsideParts,
     PartsInContact,
     SizeLimit,
     SolidsStaySolid,
 )
-from optisense.search.space.constraints import Constraint, NoCrossings, NoFolds, why_forbidden
+from optisense.search.space.constraints import Constraint, NoCrossings, NoNewProblems, why_forbidden
 from optisense.search.space.pickling import PickledWithoutCaches
 from optisense.search.space.rigid_moves import PartShift, PartTurn
 from optisense.search.space.search_space import BoundSpace
@@ -147,7 +147,7 @@ class DesignEvaluator(PickledWithoutCaches):
         if space.reshapes and (apart is None or apart):
             self.constraints.append(NoCrossings(space.design))
         if any(name.startswith("cages.") for name in space.names):
-            self.constraints.append(NoFolds(space.design))
+            self.constraints.append(NoNewProblems(space.design, fold_problems))
         self.apart = apart
         self.models = ModelCache(variant, coarse=self.coarse)
         self.renders = bool(self._objectives or self.requirements)
@@ -269,7 +269,7 @@ class DesignEvaluator(PickledWithoutCaches):
             self.kept += [PartsInContact(design, moved), LightsOnSupports(design, moved)]
         bends = any(name.startswith("cages.") for name in names)
         if apart and bends:
-            self.kept.append(DeformedPartsInContact(design))
+            self.kept.append(NoNewProblems(design, contact_problems))
         if apart and (moved or bends):
             self.kept.append(SizeLimit(design))
         if apart and (moved or bends or any(MOVES_LIGHTS.search(name) for name in names)):

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import Role, SensorDesign
-from optisense.design.cage_checks import contact_problems
 from optisense.design.material_checks import is_gas
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import find_coincident
@@ -230,25 +229,6 @@ def _solids(design: SensorDesign) -> dict[str, TriangleMesh]:
         for name, mesh in design.deformed_meshes().items()
         if mesh.is_closed and design.parts[name].role is not Role.INDENTER
     }
-
-
-class DeformedPartsInContact:
-    """Constraint: parts that a cage deforms must keep contact with the parts outside of the cage on
-    which they lie, and must not grow into transparent parts.
-
-    Problems that the starting design has are ignored.
-    """
-
-    def __init__(self, design: SensorDesign) -> None:
-        """Find the problems of the design that the search starts from."""
-        self._always = {problem.where for problem in contact_problems(design)}
-
-    def __call__(self, design: SensorDesign) -> str | None:
-        """Return a message with a part that lost contact with another, or grew into it, or None."""
-        for problem in contact_problems(design):
-            if problem.where not in self._always:
-                return problem.message
-        return None
 
 
 class SizeLimit:

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from optisense.design import Role, SensorDesign
 from optisense.design.arrangement import may_overlap
-from optisense.design.cage_checks import fold_problems
 from optisense.design.parts import TRANSPARENT_SOLIDS
+from optisense.design.problems import Diagnostic
 from optisense.errors import OptiSenseError, SearchError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.crossings import crossings
@@ -88,22 +88,31 @@ class NoCrossings:
         return self._known[one, other]
 
 
-class NoFolds:
-    """Constraint: no cage may fold a part or turn it inside out, because such a shape can't be
-    made.
+class NoNewProblems:
+    """Constraint: a check of designs may find no problem that the starting design does not have.
 
-    A part that is folded in the starting design is exempt, as `NoCrossings` exempts parts that cut
-    through each other there.
+    Such are folds of the parts that cages deform, because a folded part can't be made, and parts
+    that lose contact with those on which they lie.
     """
 
-    def __init__(self, design: SensorDesign) -> None:
-        """Find the folded parts of the design that the search starts from."""
-        self._always = {problem.where for problem in fold_problems(design)}
+    def __init__(
+        self, design: SensorDesign, problems: Callable[[SensorDesign], Sequence[Diagnostic]]
+    ) -> None:
+        """Find the problems of the design that the search starts from, which are ignored.
+
+        Args:
+            design: design that the search starts from.
+            problems: function that returns the problems of a design.
+        """
+        self._problems = problems
+        self._always = {problem.where for problem in problems(design)}
 
     def __call__(self, design: SensorDesign) -> str | None:
-        """Return a message with the part that is folded, or None."""
-        new = [each for each in fold_problems(design) if each.where not in self._always]
-        return new[0].message if new else None
+        """Return the message of the first new problem, or None."""
+        for problem in self._problems(design):
+            if problem.where not in self._always:
+                return problem.message
+        return None
 
 
 class UserRule(PickledWithoutCaches):
