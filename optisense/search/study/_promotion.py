@@ -11,13 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from optisense.search.space.parameters import Choice
 from optisense.search.study.best import ranked
-from optisense.search.study.rescoring import MOST_BROKEN, Work, fresh_seeds
+from optisense.search.study.rescoring import MOST_BROKEN, Work, fresh_seeds, scored
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 
@@ -67,14 +66,14 @@ def promote(study: Study, work: Work) -> None:
             break
         waiting = waiting[len(batch) :]
         further = len(seeds[1:])
-        promoted += _scored(batch, seeds[:1], work, further)
+        promoted += scored(batch, seeds[:1], work, further)
         if start:
-            start = _scored(start, seeds[:1], work, further)
+            start = scored(start, seeds[:1], work, further)
     while (leader := _leader(promoted)) is not None and len(leader.fresh) < len(seeds):
         others = [trial for trial in promoted if trial.number != leader.number]
-        promoted = [*_scored([leader], seeds, work), *others]
+        promoted = [*scored([leader], seeds, work), *others]
     if start and leader is not None and _may_be_as_good(start[0], leader):
-        _scored(start, seeds, work)
+        scored(start, seeds, work)
 
 
 def _may_be_as_good(trial: Trial, leader: Trial) -> bool:
@@ -101,18 +100,6 @@ def _leader(promoted: Sequence[Trial]) -> Trial | None:
     """Return the trial with the best mean of full scores that meets all conditions, or None."""
     fine = [each for each in promoted if math.isfinite(each.fresh_score()) and each.is_feasible]
     return max(fine, key=lambda trial: (trial.fresh_score(), trial.score), default=None)
-
-
-def _scored(
-    trials: Sequence[Trial], seeds: Sequence[int], work: Work, more: int = 0
-) -> list[Trial]:
-    """Return the trials with full scores by these seeds; `more` scores are expected later."""
-    jobs = [(trial, seed) for trial in trials for seed in seeds if seed not in trial.fresh]
-    outcomes = work(jobs, more) if jobs else []
-    fresh = {trial.number: dict(trial.fresh) for trial in trials}
-    for (trial, seed), outcome in zip(jobs, outcomes, strict=True):
-        fresh[trial.number][seed] = outcome
-    return [replace(trial, fresh=fresh[trial.number]) for trial in trials]
 
 
 def _different(trials: Sequence[Trial]) -> list[Trial]:

@@ -65,34 +65,30 @@ def rescore(study: Study, work: Work) -> None:
     for number, trial in enumerate(others[:MOST_BROKEN]):
         if trial.score <= best or (number >= MOST_RESCORED and best > -math.inf):
             return  # even with its luck it is not better, or enough were scored
-        scored = [trial, *start] if number == 0 else [trial]
-        again = _score(scored, seeds, work)[0]
+        group = [trial, *start] if number == 0 else [trial]
+        again = _score(group, seeds, work)[0]
         if again.is_feasible and math.isfinite(again.fresh_score()):
             best = max(best, again.fresh_score())
+
+
+def scored(trials: Sequence[Trial], seeds: Sequence[int], work: Work, more: int = 0) -> list[Trial]:
+    """Return the trials with full scores by these seeds; `more` scores are expected later."""
+    jobs = [(trial, seed) for trial in trials for seed in seeds if seed not in trial.fresh]
+    outcomes = work(jobs, more) if jobs else []
+    fresh = {trial.number: dict(trial.fresh) for trial in trials}
+    for (trial, seed), outcome in zip(jobs, outcomes, strict=True):
+        fresh[trial.number][seed] = outcome
+    return [replace(trial, fresh=fresh[trial.number]) for trial in trials]
 
 
 def _score(trials: Sequence[Trial], seeds: Sequence[int], work: Work) -> list[Trial]:
     """Return the trials with their scores by fresh seeds; one seed suffices if seeds do not
     matter.
     """
-    first = [(trial, seeds[0]) for trial in trials if seeds[0] not in trial.fresh]
-    rest = len(trials) * (len(seeds) - 1)
-    found = work(first, rest) if first else []
-    outcomes = dict(zip((t.number for t, _ in first), found, strict=True))
-    fresh = {t.number: {**t.fresh} for t in trials}
-    for number, outcome in outcomes.items():
-        fresh[number][seeds[0]] = outcome
-    more = [
-        (trial, seed)
-        for trial in trials
-        for seed in seeds[1:]
-        if seed not in fresh[trial.number]
-        and not _alike(fresh[trial.number][seeds[0]], trial.outcome)
-    ]
-    outcomes_of_more = work(more, 0) if more else []
-    for (trial, seed), outcome in zip(more, outcomes_of_more, strict=True):
-        fresh[trial.number][seed] = outcome
-    return [replace(trial, fresh=fresh[trial.number]) for trial in trials]
+    first = scored(trials, seeds[:1], work, more=len(trials) * (len(seeds) - 1))
+    noisy = [each for each in first if not _alike(each.fresh[seeds[0]], each.outcome)]
+    known = {each.number: each for each in scored(noisy, seeds[1:], work)}
+    return [known.get(each.number, each) for each in first]
 
 
 def _alike(one: Outcome, other: Outcome) -> bool:
