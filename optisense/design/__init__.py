@@ -3,7 +3,7 @@
 A design is a folder with `design.yaml` and `meshes/`. This package does not render.
 """
 
-from optisense.design.addressing import get_value, numbers, parse_path, set_value, set_values
+from optisense.design.addressing import get_value, parse_path, set_value, set_values
 from optisense.design.cage import Cage, Point, Share
 from optisense.design.cage_checks import cage_problems
 from optisense.design.cage_edit import (
@@ -63,7 +63,6 @@ __all__ = [
     "get_value",
     "load_design",
     "move_points",
-    "numbers",
     "parse_path",
     "refine_cage",
     "remove_cage",

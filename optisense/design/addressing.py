@@ -66,11 +66,6 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
         raise design_error(error, data, where=", ".join(values)) from None
 
 
-def numbers(design: SensorDesign) -> Iterator[tuple[str, float]]:
-    """Yield every number of the design with its path, in file order."""
-    yield from _numbers(design.model_dump(mode="json", exclude={"provenance"}), ())
-
-
 def parse_path(path: str) -> Steps:
     """Split a path into names and indices.
 
@@ -151,14 +146,3 @@ def _plain(value: object) -> object:
     if isinstance(value, tuple | list):
         return [_plain(item) for item in value]
     return value
-
-
-def _numbers(value: Any, path: Steps) -> Iterator[tuple[str, float]]:
-    if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _numbers(item, (*path, key))
-    elif isinstance(value, list):
-        for index, item in enumerate(value):
-            yield from _numbers(item, (*path, index))
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield dotted(path), float(value)

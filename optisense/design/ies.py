@@ -34,13 +34,11 @@ class IesProfile:
             their range the lamp is dark.
         horizontal_angles: angles (nh,) around the axis, degrees, ascending, from 0 to 360.
         candela: intensity (nh, nv), with multiplier and ballast factor applied.
-        rated_lumens: lumens that the header states for bare lamps, or None (absolute photometry).
     """
 
     vertical_angles: FloatArray
     horizontal_angles: FloatArray
     candela: FloatArray
-    rated_lumens: float | None
 
     @property
     def lumens(self) -> float:
@@ -84,8 +82,8 @@ def parse_ies(text: str, source: str) -> IesProfile:
     values = _Values(lines, tilt_line + 1, source)
     tilt = _tilt_factor(lines[tilt_line].split("=", 1)[1].strip(), values, tilt_line, source)
 
-    lamps = values.integer("number of lamps", 1, 1_000_000)
-    lumens_per_lamp = values.number("lumens per lamp")
+    values.integer("number of lamps", 1, 1_000_000)
+    values.number("lumens per lamp")
     multiplier = values.number("candela multiplier")
     n_vertical = values.integer("number of vertical angles", 2, MAX_VALUES)
     n_horizontal = values.integer("number of horizontal angles", 1, MAX_VALUES)
@@ -112,8 +110,7 @@ def parse_ies(text: str, source: str) -> IesProfile:
         values.fail("intensities must not be negative, and not all 0")
     table = candela.reshape(n_horizontal, n_vertical) * scale
     horizontal, table = _expanded(horizontal, table, values)
-    rated = lamps * lumens_per_lamp if lumens_per_lamp > 0.0 else None
-    return IesProfile(vertical, horizontal, table, rated)
+    return IesProfile(vertical, horizontal, table)
 
 
 class _Values:

@@ -200,15 +200,6 @@ class MeshIndenter(IndenterKind):
                 )
         return cls(file, **rest)
 
-    def to_plain(self) -> dict[str, Any]:
-        """Return the values of `from_plain`; the mesh must come from a file."""
-        if isinstance(self.source, TriangleMesh):
-            raise ContactError(
-                "an indenter that is a mesh in memory cannot be written to a file",
-                hint="Save the mesh, and give the path of its file as the source",
-            )
-        return {"kind": self.kind, "file": str(self.source), "scale": self.scale}
-
     @cached_property
     def _whole(self) -> TriangleMesh:
         source = self.source

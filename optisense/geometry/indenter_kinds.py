@@ -194,10 +194,6 @@ class IndenterKind(ABC):
             numbers[name] = float(value)
         return cls(**numbers)
 
-    def to_plain(self) -> dict[str, Any]:
-        """Return the indenter in the form of `from_plain`, with its kind."""
-        return {"kind": self.kind, **dataclasses.asdict(self)}
-
 
 @dataclass(frozen=True)
 class Tilted:

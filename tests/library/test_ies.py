@@ -37,7 +37,6 @@ def test_a_lambertian_lamp_has_pi_times_its_peak() -> None:
         vertical=" ".join(map(str, angles)), candela=" ".join(f"{c:.9f}" for c in abs(candela))
     )
     assert profile.lumens == pytest.approx(100 * np.pi, rel=FLUX_TOLERANCE)
-    assert profile.rated_lumens is None
 
 
 def test_an_even_lamp_has_four_pi() -> None:
@@ -62,10 +61,9 @@ def test_values_may_wrap_anywhere() -> None:
     np.testing.assert_array_equal(parse_ies(text, "x").candela, read().candela)
 
 
-def test_multiplier_and_ballast_factor_and_rated_lumens() -> None:
+def test_multiplier_and_ballast_factor() -> None:
     profile = read(lamps="2 300 3", tail="1 2 0 0 0\n0.5 1 5\n")
     assert profile.candela[0, 0] == 150.0
-    assert profile.rated_lumens == 600.0
 
 
 def test_included_tilt_applies_the_factor_of_the_untilted_lamp() -> None:

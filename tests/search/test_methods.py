@@ -157,13 +157,7 @@ def test_cma_es_restarts_with_more(two_numbers: BoundSpace) -> None:
 
 def test_cma_es_finds_whole_numbers(mixed: BoundSpace) -> None:
     """The best option is the last one, the best number in the middle."""
-    peak = mixed.vector(
-        {
-            "coating.specularity": 0.4,
-            mixed.names[1]: (0.0, 0.0, 1.0),
-            "camera.resolution[0]": 102,
-        }
-    )
+    peak = np.array([0.4, 2.0, 102.0])
 
     def score(point: FloatArray) -> float:
         return -float(((point - peak) ** 2).sum())

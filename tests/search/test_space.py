@@ -61,12 +61,6 @@ class TestNumbers:
                 mixed.check(bad)
             assert told.value.where == mixed.names[index]
 
-    def test_values_and_vectors_are_one_another(self, mixed: BoundSpace) -> None:
-        point = mixed.from_unit([0.3, 0.5, 0.9])
-        assert np.array_equal(mixed.vector(mixed.values(point)), point)
-        with pytest.raises(SearchError, match="no parameter 'flux'"):
-            mixed.vector({"flux": 1.0})
-
 
 class TestCages:
     def test_all_81_numbers_of_a_cage(self, svelte: SensorDesign) -> None:

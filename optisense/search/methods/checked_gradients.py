@@ -310,12 +310,6 @@ class GradientEvaluator(PickledWithoutCaches):
         for way in ways:
             yield _Check(way * span, float(way @ scaled), typical)
 
-    def differences(self, vector: FloatArray, seed: int) -> FloatArray:
-        """Return the gradient (n,) of the true score at a point (n,) by central differences over
-        `STEP`; 0 for coordinates with no score on one of the sides.
-        """
-        return self._differences.gradients(vector, seed, self.wanted[:1])[0]
-
     def difference(
         self, vector: FloatArray, way: FloatArray, step: float, seed: int
     ) -> float | None:

@@ -153,22 +153,6 @@ class BoundSpace:
             )
         }
 
-    def vector(self, values: Mapping[str, object]) -> FloatArray:
-        """Return the point (n,) with these values; parameters that are not named keep their start.
-
-        Raises:
-            SearchError: a name is unknown, or a value lies outside its bounds.
-        """
-        point = self.start.copy()
-        names = self.names
-        for name, value in values.items():
-            if name not in names:
-                raise SearchError(f"the space has no parameter '{name}'")
-            number = names.index(name)
-            point[number] = _coordinate(self.parameters[number], value)
-        self.check(point)
-        return point
-
     def check(self, vector: ArrayLike) -> None:
         """Check that a vector (n,) is a point of the space.
 
@@ -355,19 +339,6 @@ def _meaning(parameter: Parameter, coordinate: float) -> float | int | str:
     if isinstance(kind, Choice):
         return kind.labels[round(coordinate)]
     return round(coordinate) if isinstance(kind, Integer) else coordinate
-
-
-def _coordinate(parameter: Parameter, value: object) -> float:
-    kind = parameter.kind
-    if isinstance(kind, Choice):
-        if value in kind.labels:
-            return float(kind.labels.index(str(value)))
-        option = tuple(value) if isinstance(value, list) else value
-        if option in kind.options:
-            return float(kind.options.index(option))
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        return float(value)
-    raise SearchError(f"{value!r} is not a value of this parameter", where=parameter.name)
 
 
 def _may_nest(path: str) -> bool:
