@@ -14,14 +14,12 @@ from optisense.array_types import FloatArray
 from optisense.errors import NoDerivativeError, SearchError
 from optisense.search import Around, CagePoints, SearchSpace, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
+from optisense.search.methods._gradient_sources import GradientSource
 from optisense.search.methods.base import Problem
 from optisense.search.methods.checked_gradients import (
-    DIFFERENCES,
     FEW_PARAMETERS,
     GRADIENT_BY,
     GRADIENT_HOLDS,
-    LAYERS,
-    RAYS,
     Agreement,
     GradientEvaluator,
 )
@@ -197,7 +195,7 @@ def test_a_transparent_part_that_moves_is_climbed_by_differences() -> None:
     with pytest.raises(NoDerivativeError, match="gel"):
         evaluator.gradient(bound.start)
     outcome = evaluator(bound.start, 0)
-    assert outcome.parts["2to3pw"][GRADIENT_BY] == DIFFERENCES
+    assert outcome.parts["2to3pw"][GRADIENT_BY] == GradientSource.DIFFERENCES.value
     assert outcome.gradient is not None
     assert np.abs(outcome.gradient).max() > 0
     found.tell(bound.start[None], [outcome])
@@ -249,7 +247,7 @@ def test_derivatives_that_differences_contradict_at_the_start_are_checked_everyw
         parts = evaluator(point, 0).parts["aoap"]
         assert (GRADIENT_HOLDS in parts) is contradicted
         if not contradicted:
-            assert parts[GRADIENT_BY] == RAYS
+            assert parts[GRADIENT_BY] == GradientSource.RAYS.value
 
 
 def test_the_same_search_takes_the_same_steps(svelte: SensorDesign) -> None:
@@ -298,7 +296,7 @@ def test_powers_of_lights_climb_by_relit_pictures(mini: SensorDesign) -> None:
         settings=small, options={"starts": 1}, require="power <= 60",
     )  # fmt: skip
     assert result.best.score > result.start.score + 0.01
-    assert result.best.parts["rgb2normal"][GRADIENT_BY] == LAYERS
+    assert result.best.parts["rgb2normal"][GRADIENT_BY] == GradientSource.LAYERS.value
     power = result.best.conditions["power <= 60"]
     assert power is not None and power <= 60
     exact = evaluate(result.best.design, "rgb2normal", seed=0, **small).value

@@ -21,10 +21,11 @@ from optisense.search.methods.score_differences import STEP
 
 
 class GradientSource(Enum):
-    """A source of gradients."""
+    """A source of gradients, with its name in outcomes."""
 
     RAYS = "derivatives of rays"
-    LAYERS = "relit pictures"
+    LAYERS = "differences of scores of relit pictures"
+    DIFFERENCES = "differences of scores"
     TRIALS = "differences of trials"
 
 
@@ -45,8 +46,9 @@ class PointsWantedError(Exception):
         self.points = points
 
 
-def source_of(problem: Problem) -> GradientSource:
-    """Return the source of the gradients for a problem.
+def source_of(problem: Problem) -> tuple[GradientSource, list[str]]:
+    """Return the source of the gradients for a problem, and for derivatives of rays also the parts
+    that points move.
 
     Raises:
         SearchError: a parameter is a choice or an integer, or no parameter changes the score.
@@ -61,12 +63,14 @@ def source_of(problem: Problem) -> GradientSource:
     try:
         rays_only = are_rays_only([objective])
     except ObjectiveError:  # a function of the caller's program
-        return GradientSource.TRIALS
+        return GradientSource.TRIALS, []
     if not rays_only:
         relit = all(RELIGHTS.search(name) for name in space.names)
-        return GradientSource.LAYERS if relit else GradientSource.TRIALS
-    moving_parts(space)  # raises an error for a parameter that changes no ray
-    return GradientSource.TRIALS if SmoothScore.of(objective) is None else GradientSource.RAYS
+        return (GradientSource.LAYERS if relit else GradientSource.TRIALS), []
+    parts = moving_parts(space)  # raises an error for a parameter that changes no ray
+    if SmoothScore.of(objective) is None:
+        return GradientSource.TRIALS, []
+    return GradientSource.RAYS, parts
 
 
 class TrialDifferences:

@@ -47,6 +47,8 @@ class Jacobian:
 def moving_parts(space: BoundSpace) -> list[str]:
     """Return the names of the parts whose shape a point of the space changes.
 
+    All parameters must be continuous.
+
     Raises:
         SearchError: chief rays have no derivative by a parameter.
     """
@@ -54,12 +56,6 @@ def moving_parts(space: BoundSpace) -> list[str]:
     meshes = start.deformed_meshes()
     moving: set[str] = set()
     for number, parameter in enumerate(space.parameters):
-        if space.discrete[number]:
-            raise SearchError(
-                "a choice or a whole number has no gradient",
-                where=parameter.name,
-                hint="Search it with --method grid, or vary it with cma-es",
-            )
         design = space.apply(_beside(space, space.start, number)[0])
         changed = [n for n, m in design.deformed_meshes().items() if not _same(m, meshes[n])]
         # A point inside of a cage may move no part: it has a gradient, of 0.

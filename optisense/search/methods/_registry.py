@@ -9,16 +9,12 @@ from optisense.errors import OptiSenseError, SearchError
 from optisense.keyword_types import as_type, types_of
 from optisense.near import suggestion
 from optisense.own_code import place_of
-from optisense.registry import Registry, place_of_definition
+from optisense.registry import Registry, must_derive, place_of_definition
 from optisense.search.methods.base import Method, Problem
 
 
 def _check(name: str, kind: Any) -> None:
-    if not (isinstance(kind, type) and issubclass(kind, Method)):
-        raise SearchError(
-            f"the search method '{name}' is not a subclass of Method",
-            hint="Derive its class from optisense.search.methods.Method",
-        )
+    must_derive(Method, SearchError, "search method")(name, kind)
     lacking = [each for each in ("name", "summary") if not _is_text(getattr(kind, each, None))]
     lacking += sorted(getattr(kind, "__abstractmethods__", ()))
     if lacking:

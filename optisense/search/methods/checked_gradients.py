@@ -24,6 +24,7 @@ from optisense.design import SensorDesign
 from optisense.errors import NoDerivativeError, OptiSenseError
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
+from optisense.search.methods._gradient_sources import GradientSource
 from optisense.search.methods._jacobian import Jacobian, jacobian, predicts
 from optisense.search.methods._smooth_scores import SmoothScore
 from optisense.search.methods.score_differences import STEP, ScoreDifferences
@@ -60,16 +61,12 @@ LIMITED = "smoothed_limited"
 """Key of the smoothed limited quantities, in the order of conditions, in an outcome's parts."""
 
 GRADIENT_BY = "gradient_by"
-"""Key of the source of the gradient in an outcome's parts: `RAYS` or `DIFFERENCES`."""
+"""Key of the source of the gradient in an outcome's parts."""
 
 GRADIENT_HOLDS = "gradient_holds"
 """Key in an outcome's parts of whether the gradient agrees with differences of the true score over
 two steps. If it does not, the score has no derivative at this scale.
 """
-
-RAYS, DIFFERENCES = "derivatives of rays", "differences of scores"
-LAYERS = "differences of scores of relit pictures"
-"""Sources of gradients, as outcomes and notes name them."""
 
 
 class Agreement(Enum):
@@ -87,13 +84,13 @@ class CheckedGradient(NamedTuple):
         values: smoothed score, and smoothed value of the quantity that each condition limits, (1 +
             m,); the exact ones where there is no smooth form.
         gradients: gradients of `values` by the coordinates, (1 + m, n).
-        source: source of the gradients: `RAYS`, `DIFFERENCES` or `LAYERS`.
+        source: source of the gradients: rays, layers or differences.
         holds: whether the gradient of the score passed the check; None if it was not checked.
     """
 
     values: FloatArray
     gradients: FloatArray
-    source: str
+    source: GradientSource
     holds: bool | None
 
 
@@ -154,7 +151,7 @@ class GradientEvaluator(PickledWithoutCaches):
         except OptiSenseError as error:
             return self.usual.failed(str(error), began)
         parts = dict(outcome.parts)
-        facts: dict[str, Any] = {SMOOTHED: float(found.values[0]), GRADIENT_BY: found.source}
+        facts: dict[str, Any] = {SMOOTHED: float(found.values[0]), GRADIENT_BY: found.source.value}
         if len(found.values) > 1:
             facts[LIMITED] = found.values[1:].tolist()
         if found.holds is not None:
@@ -177,7 +174,9 @@ class GradientEvaluator(PickledWithoutCaches):
         """
         if self.layers:
             gradients = self._differences.gradients(vector, seed, self.wanted)
-            return CheckedGradient(self._values(vector, seed), gradients, LAYERS, None)
+            return CheckedGradient(
+                self._values(vector, seed), gradients, GradientSource.LAYERS, None
+            )
         if self.usual.space.size > FEW_PARAMETERS:
             try:
                 return self._by_rays(vector, seed)
@@ -185,7 +184,8 @@ class GradientEvaluator(PickledWithoutCaches):
                 pass
         gradients = self._differences.gradients(vector, seed, self.wanted)
         steady = self.steady(vector, gradients[0], seed)
-        return CheckedGradient(self._values(vector, seed), gradients, DIFFERENCES, steady)
+        values = self._values(vector, seed)
+        return CheckedGradient(values, gradients, GradientSource.DIFFERENCES, steady)
 
     def _by_rays(self, vector: FloatArray, seed: int) -> CheckedGradient:
         """Return the smoothed values at a point (n,) and their gradients by ray derivatives; by
@@ -211,7 +211,7 @@ class GradientEvaluator(PickledWithoutCaches):
             names = [self.wanted[k] for k in rough]
             gradients[rough] = self._differences.gradients(vector, seed, names)
             values[rough] = self._differences.exact(self.usual.space.apply(vector), seed, names)
-        return CheckedGradient(values, gradients, RAYS, holds)
+        return CheckedGradient(values, gradients, GradientSource.RAYS, holds)
 
     def _contradicted_at_start(self, seed: int) -> bool:
         """Return whether differences contradict ray derivatives at the start; computed once."""

@@ -51,15 +51,12 @@ from optisense.search.methods._gradient_sources import (
     TrialDifferences,
     source_of,
 )
-from optisense.search.methods._jacobian import moving_parts
 from optisense.search.methods.base import Method, Problem
 from optisense.search.methods.checked_gradients import (
-    DIFFERENCES,
     FEW_PARAMETERS,
     GRADIENT_BY,
     GRADIENT_HOLDS,
     LIMITED,
-    RAYS,
     SMOOTHED,
     TOLERANCE,
     GradientEvaluator,
@@ -121,8 +118,7 @@ class Gradient(Method):
             raise SearchError(f"there are {starts} starts", hint="Give 1 or more")
         self.resolution, self.memory = resolution, memory
         self._starts = _starts(problem, starts)
-        self.source = source_of(problem)
-        self.parts = moving_parts(problem.space) if self.source is GradientSource.RAYS else []
+        self.source, self.parts = source_of(problem)
         self._differences = TrialDifferences(problem, self.requirements)
         span = self.space.upper - self.space.lower
         self._start_unit = np.clip((self.space.start - self.space.lower) / span, 0.0, 1.0)
@@ -313,10 +309,12 @@ class Gradient(Method):
     def notes(self) -> list[str]:
         """Return notes on where gradients are differences, where scores have none, and why."""
         found = [o.parts[self.objective] for o in self._known.values() if o.gradient is not None]
-        by_differences = sum(parts[GRADIENT_BY] == DIFFERENCES for parts in found)
+        by_differences = sum(
+            parts[GRADIENT_BY] == GradientSource.DIFFERENCES.value for parts in found
+        )
         checked = [parts for parts in found if GRADIENT_HOLDS in parts]
         unsteady = [parts for parts in checked if not parts[GRADIENT_HOLDS]]
-        by_rays = sum(parts[GRADIENT_BY] == RAYS for parts in unsteady)
+        by_rays = sum(parts[GRADIENT_BY] == GradientSource.RAYS.value for parts in unsteady)
         notes = []
         if by_differences:
             why = (
