@@ -15,6 +15,7 @@ from optisense.design.section import section
 from optisense.figures import AMBER, BLUE, GREY, PALE, RED, new_figure
 from optisense.report._drawing import legend_above
 from optisense.search.space.parameters import Choice
+from optisense.search.study.best import start_of
 from optisense.search.study.trial import Trial
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ def convergence(
         marks: record of the positions of trials in the figure.
     """
     figure = new_figure(9.5, 0.6 + 2.7 * len(names))
-    start = next((trial for trial in trials if trial.is_start), None)
+    start = start_of(trials)
     later = [trial for trial in trials if not trial.is_start]
     panels = figure.subplots(len(names), 1, squeeze=False, sharex=True)[:, 0]
     for axes, name in zip(panels, names, strict=True):
@@ -229,7 +230,7 @@ def front(
         axes.plot(
             *edge.T, style, color=BLUE, ms=5, lw=1.2, drawstyle="steps-pre", label=label, zorder=3
         )
-    start = next((trial for trial in trials if trial.is_start), None)
+    start = start_of(trials)
     for each in spread_out(chosen, one, MOST_NUMBERED):
         axes.annotate(
             str(each.number),

@@ -9,7 +9,7 @@ from typing import Any
 from optisense.design import SensorDesign
 from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import FolderInUseError, OptiSenseError, SearchError
-from optisense.search.evaluation.evaluator import Evaluator, Goal
+from optisense.search.evaluation.evaluator import Evaluator, Goal, as_goals
 from optisense.search.executors import Runner, Workers, create_runner
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors, ToleranceDistribution
 from optisense.search.space.search_space import SearchSpace
@@ -172,11 +172,3 @@ def _hint_after(error: OptiSenseError, study: Study) -> str | None:
     if not error.hint:
         return advice
     return f"{error.hint}{'' if error.hint.endswith('?') else '.'} {advice}"
-
-
-def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:
-    """Return one objective or several as a list."""
-    if isinstance(objective, list | tuple):
-        return list(objective)
-    single: Any = objective
-    return [single]

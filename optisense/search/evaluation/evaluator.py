@@ -46,6 +46,14 @@ Goal = str | Objective | DesignFunction
 """A goal of a search."""
 
 
+def as_goals(objective: Goal | Sequence[Goal]) -> list[Goal]:
+    """Return one objective or several as a list."""
+    if isinstance(objective, list | tuple):
+        return list(objective)
+    single: Any = objective
+    return [single]
+
+
 RELIGHTS = re.compile(r"^lights\..*\.(flux|colour)(\W|$)")
 """Pattern of the names of parameters that only rescale the light of a group, so that no ray has to
 be traced anew.

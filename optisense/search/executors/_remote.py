@@ -38,7 +38,7 @@ HOW_TO_START = (
 class ExecutorRunner(Runner):
     """Trials on an executor that the caller has set up (MPI, a batch system, threads, ...)."""
 
-    def __init__(self, evaluator: Evaluator, executor: Executor, workers: int = 1) -> None:
+    def __init__(self, evaluator: Evaluator, executor: Executor) -> None:
         """Take an executor; `close` does not shut it down.
 
         Raises:
@@ -47,7 +47,6 @@ class ExecutorRunner(Runner):
         self._blob = pickled(evaluator)
         self._key = hashlib.sha256(self._blob).hexdigest()
         self._executor = executor
-        self.workers = workers
         self.window = SUBMITTED_AHEAD
 
     def submit(self, vector: NDArray[np.float64], seed: int) -> Future[Outcome]:

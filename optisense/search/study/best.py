@@ -62,6 +62,11 @@ def ranked(trials: Iterable[Trial]) -> list[Trial]:
     return [trial for _, trial in order]
 
 
+def start_of(trials: Iterable[Trial]) -> Trial | None:
+    """Return the trial of the starting design, or of the nearest point in the space, or None."""
+    return next((trial for trial in trials if trial.is_start), None)
+
+
 def best_of(trials: Sequence[Trial]) -> Trial | None:
     """Return the best trial by the rule above; None if none has a score and meets conditions."""
     fine = ranked(trials)

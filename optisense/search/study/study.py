@@ -33,7 +33,7 @@ from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.methods.dominance import front as front_of
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.search_space import BoundSpace, SearchSpace
-from optisense.search.study.best import best_of, nearest, without_rounding
+from optisense.search.study.best import best_of, nearest, start_of, without_rounding
 from optisense.search.study.folder import (
     STORE_FILE,
     lock_new_folder,
@@ -263,7 +263,7 @@ class Study:
     @property
     def start(self) -> Trial | None:
         """Trial of the starting design, or of the nearest point in the space; None if unscored."""
-        return next((trial for trial in self.trials if trial.is_start), None)
+        return start_of(self.trials)
 
     @property
     def best(self) -> Trial | None:
@@ -285,7 +285,7 @@ class Study:
         if which == "best":
             found = best_of(trials)
         elif which == "start":
-            found = next((trial for trial in trials if trial.is_start), None)
+            found = start_of(trials)
         else:
             try:
                 number = int(which)

@@ -16,7 +16,7 @@ from optisense.design import SensorDesign
 from optisense.errors import SearchError
 from optisense.json_values import json_ready
 from optisense.objectives.score import deviation_of
-from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
+from optisense.search.evaluation.evaluator import DesignEvaluator, Goal, as_goals
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.evaluation.robust import HIGH, LOW, MIDDLE
 from optisense.search.executors import Runner, SerialRunner, Workers, create_runner
@@ -213,7 +213,7 @@ def tolerance(
     else:
         making = errors if isinstance(errors, ManufacturingErrors) else ManufacturingErrors(errors)
     bound = making.bind(design)
-    goals: list[Goal] = list(objective) if isinstance(objective, list | tuple) else [objective]  # type: ignore[list-item]
+    goals = as_goals(objective)
     evaluator = DesignEvaluator(bound.space, goals, settings, keeps=False, variant=variant)
     count, rows = _columns(making), _rows(making, sensors)
     points = bound.points(paired_errors(bound, rows, seed))
