@@ -26,6 +26,7 @@ from optisense.design import (
     Role,
     SensorDesign,
 )
+from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._digit_sources import provenance
 from optisense.sensors._half_round import HalfRound, stacked
@@ -157,7 +158,6 @@ def digit(size: DigitDimensions) -> SensorDesign:
     lamp_z = window_bottom + size.led_height
     # The camera looks along +z with +y up, so the right of the picture is -x.
     places = {"red": size.led_pitch, "green": -size.led_pitch, "blue": 0.0}
-    colours = {"red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
     design = SensorDesign(
         name=NAME,
         description="DIGIT, domed gel",
@@ -175,7 +175,7 @@ def digit(size: DigitDimensions) -> SensorDesign:
             "housing": Part(role=Role.BLOCKER, mesh="meshes/housing.obj", material=HOUSING),
         },
         lights={
-            name: _led(edge, places[name], size.led_gap, lamp_z, colours[name], flux)
+            name: _led(edge, places[name], size.led_gap, lamp_z, NAMED_COLOURS[name], flux)
             for name in places
         },
         camera=Camera(

@@ -26,6 +26,7 @@ from optisense.design import (
     Role,
     SensorDesign,
 )
+from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._belt_path import (
     BeltHalf,
@@ -64,9 +65,6 @@ GEL, TAPE, FILM, WINDOW, BLACK = (
     "black-absorber",
 )
 LED = "smd-3528"
-
-RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-"""Shares of red, green and blue in the light of each colour."""
 
 ALONG_X, ALONG_Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 """Unit vectors of the axes along which rows of lights extend."""
@@ -224,9 +222,9 @@ def gelbelt(size: GelBeltDimensions) -> SensorDesign:
     row, side = (size.leds_per_group, size.led_pitch), half[1] + size.led_gap
     rows = {
         # The camera looks along +z with +y up, so the right of the picture is -x.
-        "red": (RED, row_of_lights((0.0, side, middle), ALONG_X, *row, (0.0, -1.0, 0.0))),
-        "green": (GREEN, row_of_lights((-x, 0.0, z), ALONG_Y, *row, (-dx, 0.0, dz))),
-        "blue": (BLUE, row_of_lights((0.0, -side, middle), ALONG_X, *row, (0.0, 1.0, 0.0))),
+        "red": row_of_lights((0.0, side, middle), ALONG_X, *row, (0.0, -1.0, 0.0)),
+        "green": row_of_lights((-x, 0.0, z), ALONG_Y, *row, (-dx, 0.0, dz)),
+        "blue": row_of_lights((0.0, -side, middle), ALONG_X, *row, (0.0, 1.0, 0.0)),
     }
     coating = library.coating("semi-specular").model_copy(
         update={"reflectance": (size.reflectance,) * 3, "specularity": size.specularity}
@@ -257,8 +255,8 @@ def gelbelt(size: GelBeltDimensions) -> SensorDesign:
             ),
         },
         lights={
-            name: LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
-            for (name, (colour, lights)), flux in zip(rows.items(), led_flux, strict=True)
+            name: LightGroup(model=LED, colour=NAMED_COLOURS[name], flux=flux, lights=lights)
+            for (name, lights), flux in zip(rows.items(), led_flux, strict=True)
         },
         camera=Camera(
             model="pi-v2",

@@ -16,7 +16,6 @@ from optisense.design import (
     Cage,
     Camera,
     Dielectric,
-    Light,
     LightGroup,
     Material,
     Part,
@@ -26,9 +25,11 @@ from optisense.design import (
     SensorDesign,
     Status,
 )
+from optisense.design.colour import NAMED_COLOURS
 from optisense.geometry import TriangleMesh
 from optisense.sensors._gelsight_mini_sources import provenance
 from optisense.sensors._led_flux import balanced_flux
+from optisense.sensors._shapes import row_of_lights
 from optisense.sensors.dimensions import (
     Dimensions,
     Length,
@@ -139,9 +140,9 @@ def _flat(size: GelSightMiniDimensions) -> SensorDesign:
         },
         lights={
             # The camera looks along +z with +y up, so the right of the picture is -x.
-            "red": _row((1, 0, 0), (0, 1), half_y + size.led_gap, lamp_z, *leds),
-            "green": _row((0, 1, 0), (-1, 0), half_x + size.led_gap, lamp_z, *leds),
-            "blue": _row((0, 0, 1), (0, -1), half_y + size.led_gap, lamp_z, *leds),
+            "red": _row("red", (0, 1), half_y + size.led_gap, lamp_z, *leds),
+            "green": _row("green", (-1, 0), half_x + size.led_gap, lamp_z, *leds),
+            "blue": _row("blue", (0, -1), half_y + size.led_gap, lamp_z, *leds),
         },
         camera=Camera(
             model="gelsight-mini",
@@ -324,7 +325,7 @@ def _plate(size: tuple[float, float], bottom: float, top: float) -> TriangleMesh
 
 
 def _row(
-    colour: tuple[float, float, float],
+    name: str,
     side: tuple[int, int],
     distance: float,
     z: float,
@@ -334,12 +335,6 @@ def _row(
 ) -> LightGroup:
     """Return LEDs in a row on one side of the guide, facing it."""
     x, y = side
-    offsets = [(index - 0.5 * (count - 1)) * pitch for index in range(count)]
-    lights = [
-        Light(
-            position=(x * distance + abs(y) * offset, y * distance + abs(x) * offset, z),
-            direction=(float(-x), float(-y), 0.0),
-        )
-        for offset in offsets
-    ]
-    return LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
+    centre, along = (x * distance, y * distance, z), (abs(y), abs(x), 0.0)
+    lights = row_of_lights(centre, along, count, pitch, (float(-x), float(-y), 0.0), upright=False)
+    return LightGroup(model=LED, colour=NAMED_COLOURS[name], flux=flux, lights=lights)

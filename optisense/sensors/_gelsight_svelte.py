@@ -28,6 +28,7 @@ from optisense.design import (
     Share,
 )
 from optisense.design.cage import as_points
+from optisense.design.colour import NAMED_COLOURS
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_points
@@ -267,13 +268,14 @@ def _lights(palm: Palm, size: GelSightSvelteDimensions, flux: float) -> dict[str
             hint="Take fewer LEDs or a smaller pitch",
         )
     groups = {}
-    for name, colour, side in (("red", (1.0, 0.0, 0.0), 1.0), ("green", (0.0, 1.0, 0.0), -1.0)):
+    for name, side in (("red", 1.0), ("green", -1.0)):
         lights = []
         for share in shares:
             point, along = palm.at(float(share), 0.5 * size.gel_thickness)
             place = (float(point[0]), side * (0.5 * size.gel_width + gap), float(point[1]))
             up = (float(along[0]), 0.0, float(along[1]))
             lights += row_of_lights(place, up, 1, pitch, (0.0, -side, 0.0))
+        colour = NAMED_COLOURS[name]
         groups[name] = LightGroup(model=LED, colour=colour, flux=flux, lights=lights)
     if size.tip_leds:
         point, along = palm.at(1.0, 0.5 * size.gel_thickness)
@@ -286,5 +288,6 @@ def _lights(palm: Palm, size: GelSightSvelteDimensions, flux: float) -> dict[str
             min(4.0, size.gel_width / size.tip_leds),
             towards,
         )
-        groups["blue"] = LightGroup(model=LED, colour=(0.0, 0.0, 1.0), flux=flux, lights=row)
+        blue = NAMED_COLOURS["blue"]
+        groups["blue"] = LightGroup(model=LED, colour=blue, flux=flux, lights=row)
     return groups

@@ -172,21 +172,29 @@ def pieces_of_arc(radius: float, degrees: float, tessellation: float, least: int
 
 
 def row_of_lights(
-    centre: Vector, along: Vector, count: int, pitch: float, direction: Vector
+    centre: Vector,
+    along: Vector,
+    count: int,
+    pitch: float,
+    direction: Vector,
+    *,
+    upright: bool = True,
 ) -> list[Light]:
     """Return lights side by side that all shine in one direction.
 
     Args:
         centre: middle of the row, mm.
-        along: unit vector of the row, which is also the `up` of each light.
+        along: unit vector of the row.
         pitch: distance between neighbours, mm.
         direction: direction in which they shine.
+        upright: True if `along` is the `up` of each light, False if they have none.
     """
     offsets: Sequence[float] = [(index - 0.5 * (count - 1)) * pitch for index in range(count)]
+    up = along if upright else None
     places = [
         tuple(c + offset * a for c, a in zip(centre, along, strict=True)) for offset in offsets
     ]
     return [
-        Light(position=(place[0], place[1], place[2]), direction=direction, up=along)
+        Light(position=(place[0], place[1], place[2]), direction=direction, up=up)
         for place in places
     ]
