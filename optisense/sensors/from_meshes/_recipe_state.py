@@ -7,7 +7,7 @@ from optisense.design import Provenance, Role
 from optisense.errors import LibraryError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import repaired
-from optisense.sensors.from_meshes._moving import posed
+from optisense.sensors.from_meshes._part_poses import posed
 from optisense.sensors.from_meshes.files import CadFiles
 from optisense.sensors.from_meshes.recipe import Recipe
 from optisense.sensors.from_meshes.recipe_parts import ShapeReference

@@ -27,8 +27,8 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.plane_cuts import cut_along_planes
 from optisense.geometry.repair import refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
-from optisense.sensors.from_meshes._moving import laid_on, resting_order
-from optisense.sensors.from_meshes._posing import check_places, place_camera, place_lights
+from optisense.sensors.from_meshes._part_poses import laid_on, resting_order
+from optisense.sensors.from_meshes._placement import check_places, place_camera, place_lights
 from optisense.sensors.from_meshes._recipe_state import RecipeState
 from optisense.sensors.from_meshes._touching import (
     lay_on_elastomer,

@@ -15,7 +15,7 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rotations import turn_about_axes
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe, read_recipe, save_recipe
-from optisense.sensors.from_meshes._moving import laid_on, posed
+from optisense.sensors.from_meshes._part_poses import laid_on, posed
 from optisense.sensors.from_meshes._pick_and_place import BoardPart, read_pick_and_place
 from optisense.sensors.from_meshes._strips import along, from_table
 from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
