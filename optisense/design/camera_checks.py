@@ -1,4 +1,4 @@
-"""Checks of the camera: its field of view, its position, and the skin in its view.
+"""Checks of the camera: its field of view, its lens, its position, and the skin in its view.
 
 A design does not state the size of its camera's lens, so the size of the smallest camera on sale is
 assumed.
@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from optisense.design.arrangement import in_picture, skin_distances, straight_rays
 from optisense.design.camera import Camera
-from optisense.design.lens_checks import fold_problems
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
+from optisense.design.projection import folding_angle
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -162,7 +162,7 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagn
         meshes: deformed meshes, mm, by part.
     """
     found = lens_problems(design.camera, design.where("camera", "fov"))
-    found = found or fold_problems(design.camera, design.where("camera", "distortion"))
+    found = found or distortion_problems(design.camera, design.where("camera", "distortion"))
     found = found or place_problems(design, meshes)
     return found[0] if found else None
 
@@ -291,3 +291,23 @@ def _distance(point: NDArray[np.float64], mesh: TriangleMesh) -> float:
         return float("inf")
     part = mesh.with_faces(mesh.faces[near])
     return float(np.linalg.norm(closest_points(part, point) - point, axis=1).min())
+
+
+def distortion_problems(camera: Camera, where: str) -> list[Diagnostic]:
+    """Return the problem of a distortion that folds within the picture.
+
+    Args:
+        where: place of the lens's distortion in the design.
+    """
+    angle = folding_angle(camera)
+    if angle is None:
+        return []
+    return [
+        Diagnostic(
+            f"the lens's distortion folds {angle:.3g} degrees off its axis, inside the picture: "
+            "points beyond are shown twice, or some pixels show nothing",
+            where,
+            "Give coefficients nearer to 0, or a smaller field of view (fov); a calibration is "
+            "valid only where its marks were",
+        )
+    ]

@@ -11,8 +11,12 @@ from optisense.design._focus_checks import focus_problems
 from optisense.design.addressing import get_value
 from optisense.design.arrangement import overlaps
 from optisense.design.cage_checks import cage_problems, half_caged
-from optisense.design.camera_checks import lens_problems, place_problems, view_problems
-from optisense.design.lens_checks import fold_problems
+from optisense.design.camera_checks import (
+    distortion_problems,
+    lens_problems,
+    place_problems,
+    view_problems,
+)
 from optisense.design.limits import placed_things, unit_slips
 from optisense.design.material_checks import absorption_problems, index_problems
 from optisense.design.part_faces import finished_faces
@@ -65,7 +69,7 @@ def check_design(
         problems += _check_mesh(design, name, meshes)
     problems += unit_slips(design)
     problems += lens_problems(design.camera, design.where("camera", "fov"))
-    problems += fold_problems(design.camera, design.where("camera", "distortion"))
+    problems += distortion_problems(design.camera, design.where("camera", "distortion"))
     of_kinds = _check_kinds(design)
     problems += [] if of_kinds else index_problems(design)  # which calls methods of kinds
     problems += _check_finishes(design, meshes)

@@ -14,7 +14,7 @@ LARGEST = 1000.0
 numbers come from a wrong unit.
 """
 
-MILLIMETRES = "Give positions in millimetres"
+PLACE_HINT = "Give positions in millimetres"
 """Remedy for places that are too far away."""
 
 SMALLEST = 0.5
@@ -58,7 +58,7 @@ def unit_slips(design: SensorDesign) -> list[Diagnostic]:
     for label, position, path in placed_things(design):
         slip = place_slip(position)
         if slip is not None:
-            problems.append(Diagnostic(f"{label} {slip}", design.where(*path), MILLIMETRES))
+            problems.append(Diagnostic(f"{label} {slip}", design.where(*path), PLACE_HINT))
     return problems
 
 
@@ -74,7 +74,7 @@ def refuse_far(label: str, position: ArrayLike) -> None:
     """
     slip = place_slip(position)
     if slip is not None:
-        raise DesignError(f"{label} {slip}", hint=MILLIMETRES)
+        raise DesignError(f"{label} {slip}", hint=PLACE_HINT)
 
 
 def place_slip(position: ArrayLike) -> str | None:

@@ -26,7 +26,7 @@ from optisense.objectives._unexposed import (
     box_around,
     radiance_in,
 )
-from optisense.objectives.frames import frame_of, nearest_press
+from optisense.objectives.frames import nearest_press, press_frame
 from optisense.objectives.settings import ACROSS, VIEW_ACROSS, Settings
 from optisense.objectives.view import View, view_of
 from optisense.quality import SCORE_PHOTONS
@@ -221,10 +221,10 @@ class Evaluation(CachedValues):
         contacts, surface = self.contacts, self.model.surface
         before = self.model.chief_rays(self.resolution).normals
         dark = np.broadcast_to(np.float32(0.0), before.shape)
-        frames = [frame_of(contact, surface) for contact in contacts]
-        centres = [frame["centre"] for frame in frames]
+        frames = [press_frame(contact, surface) for contact in contacts]
+        centres = [frame.centre for frame in frames]
         together = self.settings.together and are_apart(
-            [each["place"] for each in frames], self.settings.radius, self.settings.depth
+            [each.place for each in frames], self.settings.radius, self.settings.depth
         )
         groups = [contacts] if together else [[contact] for contact in contacts]
         part = (1.0 - FIRST_IMAGE) / len(groups)
@@ -241,7 +241,7 @@ class Evaluation(CachedValues):
                 points=seen.points,
                 before=before,
                 camera=self.model.picture_chain,
-                **frames[number],
+                **frames[number]._asdict(),
             )
 
         image: TactileImage | None = None

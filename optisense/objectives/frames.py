@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,18 +10,30 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.geometry import Contact, SensingSurface, Sphere, locate
 
 
-def frame_of(contact: Contact, surface: SensingSurface) -> dict[str, Any]:
-    """Return the frame of a press: place, inward normal, compass directions, the ball's centre."""
+class PressFrame(NamedTuple):
+    """Frame of a press: place (3,), mm, on the untouched surface, inward normal (3,), compass
+    directions (3,), and the ball's centre (3,), mm.
+    """
+
+    place: NDArray[np.float64]
+    inward: NDArray[np.float64]
+    east: NDArray[np.float64]
+    north: NDArray[np.float64]
+    centre: NDArray[np.float64]
+
+
+def press_frame(contact: Contact, surface: SensingSurface) -> PressFrame:
+    """Return the frame of a press of a ball."""
     assert isinstance(contact.indenter, Sphere)
     spot = locate(contact, surface)
     east, _ = surface.tangents(spot.inward)
-    return {
-        "place": spot.point,
-        "inward": spot.inward,
-        "east": east,
-        "north": np.cross(spot.inward, east),
-        "centre": spot.point + (contact.depth - contact.indenter.radius) * spot.inward,
-    }
+    return PressFrame(
+        place=spot.point,
+        inward=spot.inward,
+        east=east,
+        north=np.cross(spot.inward, east),
+        centre=spot.point + (contact.depth - contact.indenter.radius) * spot.inward,
+    )
 
 
 def nearest_press(

@@ -16,7 +16,7 @@ import numpy as np
 from optisense.design import SensorDesign
 from optisense.errors import OptiSenseError, SetupError
 from optisense.objectives import Evaluation, Settings
-from optisense.objectives.frames import frame_of
+from optisense.objectives.frames import press_frame
 from optisense.objectives.run import split_settings
 from optisense.objectives.settings import ACROSS
 from optisense.quality import PHOTONS, SCORE_PHOTONS, photons_of
@@ -118,5 +118,5 @@ def _smallest_contact(evaluation: Evaluation) -> int:
     rays = evaluation.model.chief_rays(evaluation.resolution)
     points = rays.points[rays.hit]
     surface = evaluation.model.surface
-    places = [frame_of(contact, surface)["place"] for contact in evaluation.contacts]
+    places = [press_frame(contact, surface).place for contact in evaluation.contacts]
     return min(int((np.linalg.norm(points - each, axis=1) < reach).sum()) for each in places)
