@@ -11,9 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from optisense.design import SensorDesign
+from optisense.design.lights import frame_of
 from optisense.library import typical_colour
 from optisense.text import cell
-from optisense.workshop._boards import axes_at_rest, boards_of
+from optisense.workshop._boards import boards_of
 from optisense.workshop._dxf import closed, dxf
 from optisense.workshop._placement import (
     Placement,
@@ -48,7 +49,7 @@ def _turns_on_board(design: SensorDesign) -> dict[str, float]:
     lights = [light for group in design.lights.values() for light in group.lights]
     turns = {}
     for number, (light, place) in enumerate(zip(lights, boards_of(lights), strict=True), start=1):
-        up = axes_at_rest(light)[1] if light.up is None else np.array(light.up)
+        up = frame_of(light.direction, None)[1] if light.up is None else np.array(light.up)
         angle = np.degrees(np.arctan2(-(up @ place.right), up @ place.up))
         turns[f"D{number}"] = float(angle % 360.0)
     return turns

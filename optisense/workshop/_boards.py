@@ -10,6 +10,7 @@ from scipy.cluster.hierarchy import fcluster, linkage
 
 from optisense.array_types import FloatArray
 from optisense.design import Light
+from optisense.design.lights import frame_of
 
 SAME_PLANE = 0.01
 """Largest distance of LEDs' windows from one plane for which they may share a board, mm, if they
@@ -80,21 +81,11 @@ def boards_of(lights: Sequence[Light]) -> list[BoardPosition]:
     return [found[index] for index in range(len(lights))]
 
 
-def axes_at_rest(light: Light) -> FloatArray:
-    """Return rows (3, 3): right and up of the window from in front, and the light's direction."""
-    forward = np.array(light.direction) / np.linalg.norm(light.direction)
-    right = np.cross((0.0, 0.0, 1.0), forward)
-    if np.linalg.norm(right) < 1e-6:
-        right = np.cross((1.0, 0.0, 0.0), forward)
-    right /= np.linalg.norm(right)
-    return np.array([right, np.cross(forward, right), forward])
-
-
 def _planes(lights: Sequence[Light]) -> list[list[int]]:
     """Return the LEDs that face in one direction and lie in one plane, by plane."""
     planes: list[tuple[FloatArray, float, list[int]]] = []
     for index, light in enumerate(lights):
-        forward = axes_at_rest(light)[2]
+        forward = frame_of(light.direction, None)[2]
         height = float(np.array(light.position) @ forward)
         for normal, distance, members in planes:
             turned = np.linalg.norm(np.cross(normal, forward)) > SAME_DIRECTION
@@ -108,7 +99,7 @@ def _planes(lights: Sequence[Light]) -> list[list[int]]:
 
 def _split(lights: Sequence[Light], plane: list[int]) -> list[_Side]:
     """Return a plane's LEDs by the boards that they can be on."""
-    frame = axes_at_rest(lights[plane[0]])
+    frame = frame_of(lights[plane[0]].direction, None)
     places = np.array([lights[index].position for index in plane])
     labels = np.ones(1, dtype=np.int64)
     if len(plane) > 1:

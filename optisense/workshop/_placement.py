@@ -12,9 +12,10 @@ import numpy as np
 from optisense import library
 from optisense.array_types import FloatArray
 from optisense.design import Light, LightGroup, SensorDesign
+from optisense.design.lights import frame_of
 from optisense.errors import LibraryError
 from optisense.library import AnyEntry, LightEntry
-from optisense.workshop._boards import axes_at_rest, boards_of
+from optisense.workshop._boards import boards_of
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def placements(design: SensorDesign) -> list[Placement]:
     boards = boards_of([light for _, _, light in leds])
     found: list[Placement] = []
     for number, (name, group, light) in enumerate(leds):
-        right, up, forward = axes_at_rest(light)
+        right, up, forward = frame_of(light.direction, None)
         place = boards[number]
         position = np.array(light.position)
         found.append(

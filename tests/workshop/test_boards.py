@@ -10,11 +10,12 @@ import pytest
 
 from optisense import sensors
 from optisense.design import Light, SensorDesign
+from optisense.design.lights import frame_of
 from optisense.sensors.from_meshes._pick_and_place import read_pick_and_place
 from optisense.sensors.from_meshes._strips import from_table
 from optisense.sensors.from_meshes.recipe_lights import FromTable
 from optisense.workshop import bill_of_materials, export, placements
-from optisense.workshop._boards import axes_at_rest, boards_of
+from optisense.workshop._boards import boards_of
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +56,7 @@ def test_position_files_give_places_and_directions_back(name: str, tmp_path: Pat
     lights = [light for group in design.lights.values() for light in group.lights]
     for board in {led.board for led in leds}:
         first = next(led for led in leds if led.board == board)
-        right, _, forward = axes_at_rest(lights[int(first.designator[1:]) - 1])
+        right, _, forward = frame_of(lights[int(first.designator[1:]) - 1].direction, None)
         height = float(np.dot(first.position, forward))
         frame = FromTable(
             file="f",
@@ -71,7 +72,7 @@ def test_position_files_give_places_and_directions_back(name: str, tmp_path: Pat
             for read, led in zip(from_table(frame, table), own, strict=True):
                 np.testing.assert_allclose(read.direction, led.direction, atol=1e-5)
                 light = lights[int(led.designator[1:]) - 1]
-                turned = axes_at_rest(light)[1] if light.up is None else light.up
+                turned = frame_of(light.direction, None)[1] if light.up is None else light.up
                 np.testing.assert_allclose(np.cross(read.up or (0, 0, 0), turned), 0.0, atol=1e-3)
                 # The bottom's windows are a board and two LEDs below the top's.
                 across = np.array(read.position) - np.array(led.position)

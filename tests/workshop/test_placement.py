@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from optisense.design import Light, LightGroup, SensorDesign
+from optisense.design.lights import frame_of
 from optisense.workshop import placements
-from optisense.workshop._boards import axes_at_rest
 from optisense.workshop._placement import placement_csv
 
 DIRECTIONS = [
@@ -33,23 +33,12 @@ def with_lights(design: SensorDesign, *lights: Light, **changes: object) -> Sens
 
 
 @pytest.mark.parametrize("direction", DIRECTIONS)
-def test_rest_is_how_the_simulation_holds_a_light_without_up(
-    direction: tuple[float, float, float],
-) -> None:
-    from optisense.optics.scene.emitters import Emitter
-
-    light = Light(position=(0, 0, 0), direction=direction)
-    simulated = Emitter(0, (0.0, 0.0, 0.0), direction).frame
-    np.testing.assert_allclose(axes_at_rest(light), simulated, atol=1e-12)
-
-
-@pytest.mark.parametrize("direction", DIRECTIONS)
 @pytest.mark.parametrize("angle", [-170.0, -90.0, 0.0, 33.0, 180.0])
 def test_rotation_is_how_far_up_is_turned(
     flat: SensorDesign, direction: tuple[float, float, float], angle: float
 ) -> None:
     """Counter-clockwise from in front: a quarter turn brings up to where left was."""
-    right, up, forward = axes_at_rest(Light(position=(0, 0, 0), direction=direction))
+    right, up, forward = frame_of(direction, None)
     turn = np.radians(angle)
     turned = 3.0 * (np.cos(turn) * up - np.sin(turn) * right) + 0.5 * forward
     light = Light(position=(1, 2, 3), direction=direction, up=tuple(turned.tolist()))
@@ -60,7 +49,7 @@ def test_rotation_is_how_far_up_is_turned(
 def test_a_camera_in_front_sees_right_to_the_right() -> None:
     """The viewer looks against the light: right = looking direction x up."""
     for direction in DIRECTIONS:
-        right, up, forward = axes_at_rest(Light(position=(0, 0, 0), direction=direction))
+        right, up, forward = frame_of(direction, None)
         np.testing.assert_allclose(np.cross(-forward, up), right, atol=1e-12)
 
 
@@ -69,7 +58,7 @@ def test_boards_and_what_lies_on_them_give_the_positions_back(flat: SensorDesign
     heights: dict[int, float] = {}
     for led, light in zip(placements(flat), lights, strict=True):
         assert led.position == light.position
-        right, up, forward = axes_at_rest(light)
+        right, up, forward = frame_of(light.direction, None)
         height = heights.setdefault(led.board, float(np.dot(light.position, forward)))
         back = led.on_board[0] * right + led.on_board[1] * up + height * forward
         np.testing.assert_allclose(back, light.position, atol=1e-9)
