@@ -17,6 +17,7 @@ from optisense.design.emitters import AreaEmitter, LightModel, SpotEmitter
 from optisense.design.parts import FaceFinish, Role
 from optisense.errors import CalibrationError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.patches import mean_normal
 from optisense.geometry.rotations import rotation
 
 FLAT = 0.2
@@ -224,8 +225,8 @@ def _is_bent(design: SensorDesign) -> bool:
 
 def _outward(skin: TriangleMesh) -> FloatArray:
     """Return the outward direction of a flat skin, whose normals point into the sensor."""
-    mean = -(skin.face_normals * skin.face_areas[:, None]).sum(axis=0)
-    return np.asarray(mean / np.linalg.norm(mean))
+    mean = mean_normal(skin)
+    return np.asarray(-mean / np.linalg.norm(mean))
 
 
 def with_gel_thickness(design: SensorDesign, thickness: float) -> SensorDesign:

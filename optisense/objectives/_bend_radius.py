@@ -95,10 +95,14 @@ def radius_of(curvature: NDArray[np.float64], area: NDArray[np.float64]) -> floa
     """
     if not len(curvature):
         return MOST_RADIUS
-    order = np.argsort(-curvature)
-    above = np.cumsum(area[order])
-    place = int(np.searchsorted(above, SHARE * above[-1]))
-    return float(1.0 / max(curvature[order[place]], 1.0 / MOST_RADIUS))
+    return 1.0 / max(-mostly_above(-curvature, area), 1.0 / MOST_RADIUS)
+
+
+def mostly_above(values: NDArray[np.float64], areas: NDArray[np.float64]) -> float:
+    """Return the value that all but `SHARE` of an area exceed; values (n,), areas (n,) mm²."""
+    order = np.argsort(values)
+    reached = np.cumsum(areas[order])
+    return float(values[order[int(np.searchsorted(reached, SHARE * reached[-1]))]])
 
 
 def _angles(mesh: TriangleMesh, pairs: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
-from optisense.objectives._bend_radius import SHARE
+from optisense.objectives._bend_radius import mostly_above
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -52,6 +52,4 @@ def draft_of(mesh: TriangleMesh) -> float:
     if length <= 0.0:  # a closed ring: half of it is undercut for any direction of removal
         return -90.0
     angles = np.degrees(np.arcsin(np.clip(normals @ pull / length, -1.0, 1.0)))
-    order = np.argsort(angles)
-    reached = np.cumsum(areas[order])
-    return float(angles[order[int(np.searchsorted(reached, SHARE * reached[-1]))]])
+    return mostly_above(angles, areas)
