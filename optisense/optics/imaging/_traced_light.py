@@ -323,8 +323,9 @@ def _add_light(
         return
     points = dr.gather(VisiblePoints, seen, dr.gather(mi.UInt32, rays.owner, lit))
     coating = coating_of(table, points.surface, points.valid)
-    way, whole = dr.gather(mi.Vector3f, rays.way, lit), dr.gather(mi.Bool, rays.whole, lit)
-    value = _reflected(points, coating, way, whole) * points.weight
+    direction = dr.gather(mi.Vector3f, rays.direction, lit)
+    whole = dr.gather(mi.Bool, rays.whole, lit)
+    value = _reflected(points, coating, direction, whole) * points.weight
     value *= dr.opaque(mi.Float, share) / dr.gather(mi.Float, rays.density, lit)
     groups = len(film.sums)
     for g in range(groups):
@@ -334,11 +335,11 @@ def _add_light(
 
 
 def _reflected(
-    points: VisiblePoints, coating: CoatingBsdf, way: mi.Vector3f, whole: mi.Bool
+    points: VisiblePoints, coating: CoatingBsdf, direction: mi.Vector3f, whole: mi.Bool
 ) -> mi.Color3f:
     """Return the BSDF times the cosine (3, n) of the peak of the lobe alone, or of the ``whole``
     coating, for light that arrives from unit directions.
     """
-    peak = evaluate_peak(coating, points.normal, way, points.towards_eye)
-    every = evaluate_coating(coating, points.normal, way, points.towards_eye)
+    peak = evaluate_peak(coating, points.normal, direction, points.towards_eye)
+    every = evaluate_coating(coating, points.normal, direction, points.towards_eye)
     return dr.select(whole, every, peak)

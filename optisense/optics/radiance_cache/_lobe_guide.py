@@ -97,21 +97,21 @@ class LobeGuide:
         return dr.normalize(beam.towards + radius * aside)
 
     @dr.syntax
-    def density(self, point: mi.UInt32, way: mi.Vector3f) -> mi.Float:
+    def density(self, point: mi.UInt32, direction: mi.Vector3f) -> mi.Float:
         """Return the density (n,), 1/sr, of the directions that `sample` draws.
 
         Args:
             point: numbers (n,) of the points.
-            way: unit directions.
+            direction: unit directions.
         """
         total = mi.Float(0)
         slot = mi.UInt32(0)
-        while dr.hint(slot < SLOTS, exclude=[self, point, way]):
+        while dr.hint(slot < SLOTS, exclude=[self, point, direction]):
             beam = self._beam(point, slot)
             # The ellipse lies in the plane at distance 1, of which a solid angle sees its area
             # over the cube of the cosine.
-            cosine = dr.dot(way, beam.towards)
-            x, y = dr.dot(way, beam.along), dr.dot(way, beam.up)
+            cosine = dr.dot(direction, beam.towards)
+            x, y = dr.dot(direction, beam.along), dr.dot(direction, beam.up)
             square = x * x / beam.variance_along + y * y / beam.variance_up
             inside = (cosine > 0) & (square < dr.square(ELLIPSE_RADIUS * cosine))
             area = dr.pi * ELLIPSE_RADIUS**2 * dr.sqrt(beam.variance_along * beam.variance_up)

@@ -123,12 +123,12 @@ def below_crossing(
     return there, exists
 
 
-def sampled_plane(points: VisiblePoints, rise: mi.Float, raised: mi.Bool) -> mi.Bool:
+def sampled_plane(points: VisiblePoints, height: mi.Float, raised: mi.Bool) -> mi.Bool:
     """Return whether each camera sample looks up the raised plane instead of the surface, (n,).
 
     Args:
-        rise: heights (mm) of the points above the undeformed surface.
+        height: height (mm) of each point above the undeformed surface.
         raised: mask of the points that lie on an indenter.
     """
     shift = mi.sample_tea_32(points.series, mi.UInt32(5), 4)[0]
-    return raised & (unit_float(points.number * GOLDEN_BITS + shift) * RAISED_HEIGHT < rise)
+    return raised & (unit_float(points.number * GOLDEN_BITS + shift) * RAISED_HEIGHT < height)

@@ -88,14 +88,15 @@ def sum_bins(
         steps.append(dr.maximum(expected / shadow_rays, MIN_STEP))
         # Each sample of a pixel begins at another fraction of a step.
         running.append(richtmyer(points.series + (g + 1), points.number, 0))
-    upright, offset = plane_of(light.cells, at.cell, active)
-    up = dr.select(raised, (dr.dot(upright, points.point) - offset) / (LAYER_HEIGHT / 2), 0)
-    up = dr.clip(up, 0, MAX_EXTRAPOLATION)
-    rise = dr.dot(upright, points.point) - offset
+    surface_normal, offset = plane_of(light.cells, at.cell, active)
+    point_height = dr.dot(surface_normal, points.point) - offset
+    # Share of the upper light: 0 on the surface, 1 at the middle of the flux layer.
+    interpolation = dr.select(raised, point_height / (LAYER_HEIGHT / 2), 0)
+    interpolation = dr.clip(interpolation, 0, MAX_EXTRAPOLATION)
     axis = bin_axis(light.cells, 2)
     level, first = mi.Float(0), mi.UInt32(0)
     if dr.hint(light.planes > 1, mode="scalar"):
-        above = sampled_plane(points, rise, raised)
+        above = sampled_plane(points, point_height, raised)
         level = dr.select(above, RAISED_HEIGHT, 0)
         first = dr.select(above, dr.opaque(mi.UInt32, light.cells.cells), 0)
 
@@ -116,27 +117,29 @@ def sum_bins(
                     above_it = dr.gather(mi.Vector4f, upper[0], entry, active & raised)
                     # Extrapolation never turns positive light negative.
                     negative = dr.minimum(value.w, above_it.w) < 0
-                    value = dr.lerp(value, above_it, up)
+                    value = dr.lerp(value, above_it, interpolation)
                     counts = (value.w > 0) | (negative & (value.w < 0))
                 if counts:
                     towards, cosine = mean_direction(value)
                     height = dr.gather(mi.Float, heights, entry)
                     if dr.hint(upper is not None, mode="scalar"):
                         assert upper is not None
-                        height = dr.lerp(height, dr.gather(mi.Float, upper[1], entry, raised), up)
+                        height = dr.lerp(
+                            height, dr.gather(mi.Float, upper[1], entry, raised), interpolation
+                        )
                     height = dr.maximum(height / value.w, 0)
                     beam = angular_variance(axis, towards, cosine, height)
                     # On the undeformed surface the sum over bins already has the right mean cosine.
                     half_width = dr.select(
-                        raised, cosine_half_width(beam, points.normal, upright), 0
+                        raised, cosine_half_width(beam, points.normal, surface_normal), 0
                     )
                     reflected = _reflected(light, at, beam, cosine, half_width)
-                    sine = dr.dot(upright, towards)
-                    doubtful = sine - dr.sqrt(squared_radius(cosine)) < horizon
-                    weight = dr.select(doubtful, mi.Float(0), 1)
+                    sine = dr.dot(surface_normal, towards)
+                    may_be_occluded = sine - dr.sqrt(squared_radius(cosine)) < horizon
+                    weight = dr.select(may_be_occluded, mi.Float(0), 1)
                     share = dr.abs(value.w) * grey(reflected) / steps[g]
                     before = dr.floor(running[g])
-                    running[g] += dr.select(doubtful, share, 0)
+                    running[g] += dr.select(may_be_occluded, share, 0)
                     times = dr.floor(running[g]) - before
                     if times > 0:
                         # Each bin has random bits of its own, so that a ray or a bin added or
@@ -145,21 +148,23 @@ def sum_bins(
                             mi.UInt32, dr.gather(mi.Float, light.centres, k * 4 + 3)
                         )
                         state = next_random(points.random + (number * groups + g) * GOLDEN_BITS)
-                        way = mirrored_above(sample_direction(beam, state), points.face_normal)
-                        blocked = indenters.occluded(at.start, way, mi.Bool(True))
+                        direction = mirrored_above(
+                            sample_direction(beam, state), points.face_normal
+                        )
+                        blocked = indenters.occluded(at.start, direction, mi.Bool(True))
                         weight = dr.select(blocked, 0.0, times / share)
                     if dr.hint(light.coloured, mode="scalar"):
                         flux = dr.gather(mi.Vector4f, colours, entry)
                         if dr.hint(upper is not None, mode="scalar"):
                             assert upper is not None
                             flux = dr.lerp(
-                                flux, dr.gather(mi.Vector4f, upper[2], entry, raised), up
+                                flux, dr.gather(mi.Vector4f, upper[2], entry, raised), interpolation
                             )
                         reflected *= mi.Color3f(flux.x, flux.y, flux.z)
                     else:
                         reflected *= value.w
                     if dr.hint(scenes.absorption is not None and upper is None, mode="scalar"):
-                        reflected *= _shorter_path_factor(scenes, rise, dr.dot(upright, towards))
+                        reflected *= _shorter_path_factor(scenes, point_height, sine)
                     totals[g] += reflected * weight
             k += 1
         return totals
@@ -198,17 +203,17 @@ def _reflected(
     return evaluate_coating(coating, points.normal, beam.towards, points.towards_eye, half_width)
 
 
-def _shorter_path_factor(scenes: ContactScenes, rise: mi.Float, sine: mi.Float) -> mi.Color3f:
+def _shorter_path_factor(scenes: ContactScenes, height: mi.Float, sine: mi.Float) -> mi.Color3f:
     """Return the factor by which light is stronger on an indenter, as its path through the gel is
     shorter.
 
     Args:
         scenes: the scenes, in a gel that absorbs.
-        rise: height (mm) of the point above the undeformed surface; values up to 0 have no effect.
+        height: height (mm) of the point above the undeformed surface; up to 0, it has no effect.
         sine: sine of the light's elevation above that surface.
     """
-    way = dr.maximum(rise, 0) / dr.maximum(sine, MIN_SINE)
-    return dr.exp(scenes.absorption * way)
+    shortened = dr.maximum(height, 0) / dr.maximum(sine, MIN_SINE)
+    return dr.exp(scenes.absorption * shortened)
 
 
 @dr.syntax

@@ -131,22 +131,22 @@ def _secondary_hits(
     # The samples of a pixel share their lobes evenly.
     pick = unit_float(points.series * 69069 + points.number * GOLDEN_BITS)
     state = (points.random ^ (points.number * GOLDEN_BITS)) * 69069
-    way, weight = sample_coating(
+    direction, weight = sample_coating(
         at.coating, points.normal, -points.towards_eye, pick, mi.Point2f(u, v)
     )
     weight = weight * points.weight
-    start = leave(points.point, points.face_normal, way)
-    looks = at.active & (dr.dot(way, points.face_normal) > 0) & (dr.max(weight) > 0)
-    pressed = indenters.intersect(Ray(start, way, looks))
-    skin = fixed.intersect(Ray(start, way, looks & at.raised))
+    start = leave(points.point, points.face_normal, direction)
+    looks = at.active & (dr.dot(direction, points.face_normal) > 0) & (dr.max(weight) > 0)
+    pressed = indenters.intersect(Ray(start, direction, looks))
+    skin = fixed.intersect(Ray(start, direction, looks & at.raised))
     raised = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
     # The cache already holds the light along a line that comes from the skin behind.
-    cached = may_be_cached(cache.binned, at.cell, way, skin.valid)
-    behind = fixed.occluded(start, -way, cached)
+    cached = may_be_cached(cache.binned, at.cell, direction, skin.valid)
+    behind = fixed.occluded(start, -direction, cached)
     valid = raised | (skin.valid & ~behind)
     facing = dr.select(raised, pressed.normal, skin.normal)
     shading = dr.select(raised, pressed.shading_normal, skin.shading_normal)
-    side = -dr.sign(dr.dot(way, facing))
+    side = -dr.sign(dr.dot(direction, facing))
     random = next_random(state)
     found = VisiblePoints(
         valid=valid,
@@ -154,7 +154,7 @@ def _secondary_hits(
         point=dr.select(raised, pressed.point, skin.point),
         normal=shading * side,
         face_normal=facing * side,
-        towards_eye=-way,
+        towards_eye=-direction,
         surface=dr.select(raised, pressed.surface, skin.surface),
         light=mi.UInt32(0),
         pixel=points.pixel,

@@ -53,26 +53,26 @@ def _sample(
         u = unit_float(series + (first + k) * STEPS_2D[0])
         v = unit_float(series * 277803737 + (first + k) * STEPS_2D[1])
         state = (points.random ^ (k * 0x9E3779B9)) * 69069
-        way, weight = sample_coating(
+        direction, weight = sample_coating(
             at.coating, points.normal, -points.towards_eye, unit_float(state), mi.Point2f(u, v)
         )
         weight *= albedo
         above = mi.Bool(at.raised)
-        start = leave(points.point, points.face_normal, way)
-        walking = (dr.dot(way, points.face_normal) > 0) & (dr.max(weight) > 0)
+        start = leave(points.point, points.face_normal, direction)
+        walking = (dr.dot(direction, points.face_normal) > 0) & (dr.max(weight) > 0)
         places, home = mi.UInt32(0), mi.UInt32(at.cell)
         while walking:
-            pressed = indenters.intersect(Ray(start, way, mi.Bool(True)))
-            skin = fixed.intersect(Ray(start, way, above))
+            pressed = indenters.intersect(Ray(start, direction, mi.Bool(True)))
+            skin = fixed.intersect(Ray(start, direction, above))
             on_indenter = pressed.valid & (~skin.valid | (pressed.distance < skin.distance))
             # The cache already holds the light along a line that comes from the skin behind.
-            cached = may_be_cached(light, home, way, above)
-            behind = fixed.occluded(start, -way, cached)
+            cached = may_be_cached(light, home, direction, above)
+            behind = fixed.occluded(start, -direction, cached)
             walking = on_indenter | (skin.valid & ~behind)
             if walking:
                 seen = dr.select(on_indenter, pressed.point, skin.point)
                 facing = dr.select(on_indenter, pressed.shading_normal, skin.shading_normal)
-                facing *= -dr.sign(dr.dot(way, facing))
+                facing *= -dr.sign(dr.dot(direction, facing))
                 there, exists = cell_at(cells, skin.point, ~on_indenter)
                 # A place on an indenter is lit like the cell of the point that sees it.
                 there = dr.select(exists, there, at.cell)
@@ -90,7 +90,7 @@ def _sample(
                 weight *= albedo / survival
                 u = unit_float(state * 277803737)
                 v = unit_float((state ^ 0x9E3779B9) * 69069)
-                way = mi.Frame3f(facing).to_world(
+                direction = mi.Frame3f(facing).to_world(
                     mi.warp.square_to_cosine_hemisphere(mi.Point2f(u, v))
                 )
                 start, home = lift, mi.UInt32(there)

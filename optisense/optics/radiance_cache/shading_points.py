@@ -66,7 +66,7 @@ def foot_of(cells: SurfaceCells, cell: mi.UInt32, point: mi.Point3f, active: mi.
 
 
 def may_be_cached(
-    light: BinnedLight, cell: mi.UInt32, way: mi.Vector3f, active: mi.Bool
+    light: BinnedLight, cell: mi.UInt32, direction: mi.Vector3f, active: mi.Bool
 ) -> mi.Bool:
     """Return whether the cache may hold the light that arrives straight from other opaque places.
 
@@ -74,9 +74,9 @@ def may_be_cached(
 
     Args:
         cell: the cell below each point that the light arrives at.
-        way: unit directions from the points to the places that the light comes from.
+        direction: unit directions from the points to the places that the light comes from.
         active: mask of the points that count.
     """
     if light.above is None:
         return active
-    return active & (dr.dot(plane_of(light.cells, cell, active)[0], way) > 0)
+    return active & (dr.dot(plane_of(light.cells, cell, active)[0], direction) > 0)

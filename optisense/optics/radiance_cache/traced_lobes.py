@@ -82,7 +82,7 @@ class LobeRays:
 
     Attributes:
         owner: (n,) number of the visible point that each ray starts from.
-        way: (3, n) unit directions of the rays.
+        direction: (3, n) unit directions of the rays.
         density: (n,) density (1/sr) with which each direction was drawn; 0 for rays that carry no
             light.
         whole: (n,) mask of the rays that the whole coating reflects, as the cache does not hold
@@ -93,7 +93,7 @@ class LobeRays:
     """
 
     owner: mi.UInt32
-    way: mi.Vector3f
+    direction: mi.Vector3f
     density: mi.Float
     whole: mi.Bool
     light: mi.Float
@@ -143,28 +143,30 @@ class LobeTracer:
             share = dr.select(dr.gather(mi.Bool, guide.found, sharing), GUIDED_SHARE, 0)
         guided = pick < share
         pick = dr.select(guided, pick / GUIDED_SHARE, (pick - share) / (1 - share))
-        way, _ = sample_coating(coating, first.normal, -first.towards_eye, pick, mi.Point2f(u, v))
+        spot = mi.Point2f(u, v)
+        direction, _ = sample_coating(coating, first.normal, -first.towards_eye, pick, spot)
         if guide is not None:
-            way = dr.select(guided, guide.sample(sharing, pick, mi.Point2f(u, v)), way)
-        density = (1 - share) * coating_density(coating, first.normal, way, first.towards_eye)
+            direction = dr.select(guided, guide.sample(sharing, pick, spot), direction)
+        density = (1 - share) * coating_density(coating, first.normal, direction, first.towards_eye)
         if guide is not None:
-            density += share * guide.density(sharing, way)
-        ray = Ray(leave(first.point, first.face_normal, way), way, first.valid)
+            density += share * guide.density(sharing, direction)
+        ray = Ray(leave(first.point, first.face_normal, direction), direction, first.valid)
         ray.active &= (coating.specularity > 0) & (density > 0)
-        ray.active &= (dr.dot(way, first.face_normal) > 0) & (dr.dot(way, first.normal) > 0)
+        ray.active &= dr.dot(direction, first.face_normal) > 0
+        ray.active &= dr.dot(direction, first.normal) > 0
         whole = self._is_uncached(first, ray)
         traced = None
         if gathers and self.scenes.indenters is not None:
-            every = evaluate_coating(coating, first.normal, way, first.towards_eye)
-            peak = evaluate_peak(coating, first.normal, way, first.towards_eye)
+            every = evaluate_coating(coating, first.normal, direction, first.towards_eye)
+            peak = evaluate_peak(coating, first.normal, direction, first.towards_eye)
             traced = dr.select(whole, 1, dr.select(every > 0, peak / every, 0))
             whole = dr.full(mi.Bool, True, count)
         else:
-            cos_m = half_vector_cosine(first.normal, way, first.towards_eye)
+            cos_m = half_vector_cosine(first.normal, direction, first.towards_eye)
             ray.active &= whole | (peak_share(cos_m) > 0)
         found = LobeRays(
             owner,
-            way,
+            direction,
             dr.select(ray.active, density, 0),
             whole,
             dr.zeros(mi.Float, 3 * self.cache.binned.groups * count),
@@ -417,9 +419,9 @@ def _reflected(
         place: points of the unit square that choose the directions.
     """
     coating = coating_of(table, end.surface, end.valid)
-    way, share = sample_coating(coating, end.normal, -end.towards_eye, mi.Float(0), place)
+    direction, share = sample_coating(coating, end.normal, -end.towards_eye, mi.Float(0), place)
     weight = end.weight * share * coating.specularity
-    cos_m = half_vector_cosine(end.normal, way, end.towards_eye)
+    cos_m = half_vector_cosine(end.normal, direction, end.towards_eye)
     weight *= dr.select(only_peak, peak_share(cos_m), 1)
-    goes_on = (dr.max(weight) > 0) & (dr.dot(way, end.face_normal) > 0)
-    return Ray(leave(end.point, end.face_normal, way), way, goes_on), weight
+    goes_on = (dr.max(weight) > 0) & (dr.dot(direction, end.face_normal) > 0)
+    return Ray(leave(end.point, end.face_normal, direction), direction, goes_on), weight
