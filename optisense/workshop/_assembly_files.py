@@ -16,13 +16,8 @@ from optisense.library import typical_colour
 from optisense.text import cell
 from optisense.workshop._boards import boards_of
 from optisense.workshop._dxf import closed, dxf
-from optisense.workshop._placement import (
-    Placement,
-    csv_table,
-    digits,
-    light_entry,
-    what_to_order,
-)
+from optisense.workshop._placement import Placement, what_to_order
+from optisense.workshop._tables import csv_table, digits, light_entry
 
 MARGIN = 1.0
 """Width of the board around the bodies of its LEDs in the outline, mm; an assumption."""

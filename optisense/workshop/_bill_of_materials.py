@@ -9,12 +9,8 @@ from optisense.design import Role, SensorDesign, Status
 from optisense.library import OVERDRIVEN, AnyEntry, typical_colour
 from optisense.library.facts import summary
 from optisense.text import cell, markdown
-from optisense.workshop._placement import (
-    csv_table,
-    entry_or_none,
-    light_entry,
-    what_to_order,
-)
+from optisense.workshop._placement import what_to_order
+from optisense.workshop._tables import csv_table, entry_or_none, light_entry
 from optisense.workshop.shapes import Shape, shapes
 
 MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from optisense.workshop._placement import digits
+from optisense.workshop._tables import digits
 
 Pair = tuple[int, str | float]
 """Group code of DXF and its value; lengths are in mm and angles in degrees."""

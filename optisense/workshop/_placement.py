@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,9 +11,8 @@ from optisense import library
 from optisense.array_types import FloatArray
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.design.lights import frame_of
-from optisense.errors import LibraryError
-from optisense.library import AnyEntry, LightEntry
 from optisense.workshop._boards import boards_of
+from optisense.workshop._tables import csv_table, digits, light_entry
 
 
 @dataclass(frozen=True)
@@ -105,21 +102,6 @@ def what_to_order(group: LightGroup) -> str:
     return " ".join(words)
 
 
-def light_entry(group: LightGroup) -> LightEntry | None:
-    """Return the library's entry of a group's light, or None if there is none that can be read."""
-    entry = entry_or_none("light", group.model)
-    assert entry is None or isinstance(entry, LightEntry)
-    return entry
-
-
-def entry_or_none(kind: str, name: str) -> AnyEntry | None:
-    """Return an entry of the library, or None if there is none that can be read."""
-    try:
-        return library.entry(kind, name)
-    except LibraryError:
-        return None
-
-
 COLUMNS = (
     "designator", "x_mm", "y_mm", "z_mm", "direction_x", "direction_y", "direction_z",
     "rotation_deg", "board", "layer", "board_x_mm", "board_y_mm", "model", "part", "group",
@@ -149,13 +131,6 @@ def placement_csv(placed: Sequence[Placement]) -> str:
     return csv_table(COLUMNS, rows)
 
 
-def csv_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table (RFC 4180) with a line of headings."""
-    text = io.StringIO()
-    csv.writer(text).writerows([head, *rows])
-    return text.getvalue()
-
-
 def _rotation(light: Light, right: FloatArray, up: FloatArray) -> float:
     """Return the rotation in degrees, from -180 (excluded) to 180."""
     if light.up is None:
@@ -169,9 +144,3 @@ def _rotation(light: Light, right: FloatArray, up: FloatArray) -> float:
 
 def _triple(vector: FloatArray) -> tuple[float, float, float]:
     return float(vector[0]), float(vector[1]), float(vector[2])
-
-
-def digits(value: float, places: int) -> str:
-    """Format a number with fixed digits, without a minus before zero."""
-    text = f"{value:.{places}f}"
-    return text.removeprefix("-") if float(text) == 0.0 else text

@@ -1,0 +1,40 @@
+"""Tables of the workshop's files: their text, and the entries of the library that they name."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+
+from optisense import library
+from optisense.design import LightGroup
+from optisense.errors import LibraryError
+from optisense.library import AnyEntry, LightEntry
+
+
+def csv_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table (RFC 4180) with a line of headings."""
+    text = io.StringIO()
+    csv.writer(text).writerows([head, *rows])
+    return text.getvalue()
+
+
+def digits(value: float, places: int) -> str:
+    """Format a number with fixed digits, without a minus before zero."""
+    text = f"{value:.{places}f}"
+    return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def light_entry(group: LightGroup) -> LightEntry | None:
+    """Return the library's entry of a group's light, or None if there is none that can be read."""
+    entry = entry_or_none("light", group.model)
+    assert entry is None or isinstance(entry, LightEntry)
+    return entry
+
+
+def entry_or_none(kind: str, name: str) -> AnyEntry | None:
+    """Return an entry of the library, or None if there is none that can be read."""
+    try:
+        return library.entry(kind, name)
+    except LibraryError:
+        return None
