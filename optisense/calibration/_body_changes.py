@@ -7,6 +7,7 @@ changed.
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from optisense.array_types import FloatArray
 from optisense.design import Cage, Light, SensorDesign
 from optisense.design.emitters import AreaEmitter, LightModel, SpotEmitter
 from optisense.design.parts import FaceFinish, Role
+from optisense.design.posing import moved, triple, with_lights
 from optisense.errors import CalibrationError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.patches import mean_normal
@@ -42,13 +44,7 @@ WIDEST_ANGLE = 89.0
 
 def with_lights_moved(design: SensorDesign, group: str, along: float) -> SensorDesign:
     """Return a design with the lights of a group moved by `along` mm along the camera's axis."""
-    offset = along * design.camera.axes()[2]
-
-    def moved(light: Light) -> Light:
-        place = np.array(light.position) + offset
-        return light.model_copy(update={"position": tuple(place.tolist())})
-
-    return _with_lights(design, group, moved)
+    return with_lights(design, group, partial(moved, shift=along * design.camera.axes()[2]))
 
 
 def with_lights_tilted(design: SensorDesign, group: str, angle: float) -> SensorDesign:
@@ -65,12 +61,10 @@ def with_lights_tilted(design: SensorDesign, group: str, angle: float) -> Sensor
         if np.linalg.norm(axis) < 1e-6:
             return light
         turn = rotation(axis, angle)
-        update = {"direction": tuple((turn @ direction).tolist())}
-        if light.up is not None:
-            update["up"] = tuple((turn @ np.array(light.up)).tolist())
-        return light.model_copy(update=update)
+        up = None if light.up is None else triple(turn @ np.array(light.up))
+        return light.model_copy(update={"direction": triple(turn @ direction), "up": up})
 
-    return _with_lights(design, group, tilted)
+    return with_lights(design, group, tilted)
 
 
 def row_length(design: SensorDesign, group: str) -> float | None:
@@ -95,18 +89,11 @@ def with_row_length(design: SensorDesign, group: str, length: float) -> SensorDe
     before = row_length(design, group)
     assert before is not None  # only rows have this number
 
-    def moved(light: Light) -> Light:
+    def spread(light: Light) -> Light:
         place = middle + length / before * (np.array(light.position) - middle)
-        return light.model_copy(update={"position": tuple(place.tolist())})
+        return light.model_copy(update={"position": triple(place)})
 
-    return _with_lights(design, group, moved)
-
-
-def _with_lights(design: SensorDesign, group: str, change) -> SensorDesign:  # type: ignore[no-untyped-def]
-    found = design.copy()
-    own = found.lights[group]
-    found.lights[group] = own.model_copy(update={"lights": [change(each) for each in own.lights]})
-    return found
+    return with_lights(design, group, spread)
 
 
 def with_single_lights(design: SensorDesign) -> SensorDesign:

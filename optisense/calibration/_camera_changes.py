@@ -1,4 +1,4 @@
-"""Changes of a sensor's camera that a calibration tries: its place, its turn and its lens.
+"""Changes of a sensor's camera that a calibration tries: its place and its lens.
 
 Each function returns a changed design; the given one is not changed.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from optisense.design import SensorDesign, set_value
-from optisense.geometry.rotations import rotation
 
 
 def with_camera_moved(axis: int, design: SensorDesign, amount: float) -> SensorDesign:
@@ -17,16 +16,6 @@ def with_camera_moved(axis: int, design: SensorDesign, amount: float) -> SensorD
     """
     moved = np.array(design.camera.position) + amount * design.camera.axes()[axis]
     return set_value(design, "camera.position", tuple(moved.tolist()))
-
-
-def with_camera_turned(axis: int, design: SensorDesign, angle: float) -> SensorDesign:
-    """Return a design whose camera is turned by `angle` degrees about one of its axes: upwards
-    about its right (0), to the left about its top (1) or clockwise about its viewing direction (2).
-    """
-    axes = design.camera.axes()
-    direction, up = (rotation(axes[axis], angle) @ each for each in (axes[2], axes[1]))
-    changed = set_value(design, "camera.direction", tuple(direction.tolist()))
-    return set_value(changed, "camera.up", tuple(up.tolist()))
 
 
 def with_distortion(design: SensorDesign, k1: float) -> SensorDesign:

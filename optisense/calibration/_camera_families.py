@@ -10,6 +10,7 @@ from optisense.calibration import _camera_changes
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
 from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design.posing import with_camera_turned
 from optisense.design.responses.gamma_curve import GammaCurve
 
 MIX_RANGE = 0.5
@@ -161,7 +162,7 @@ def pose(design: SensorDesign) -> list[FitQuantity]:
         FitQuantity(
             f"camera.turn.{name}", f"turn of the camera {words}", "degrees", 0.0, -20.0, 20.0,
             TURN_RANGE, renders=True, views=True,
-            change=partial(_camera_changes.with_camera_turned, number), home="camera.direction",
+            change=partial(with_camera_turned, number), home="camera.direction",
         )
         for number, (name, words) in enumerate(
             (("pitch", "up"), ("yaw", "to the left"), ("roll", "clockwise"))

@@ -11,6 +11,7 @@ from optisense import library
 from optisense.array_types import FloatArray
 from optisense.design import Light, LightGroup, SensorDesign
 from optisense.design.lights import frame_of
+from optisense.design.posing import triple
 from optisense.workshop._boards import boards_of
 from optisense.workshop._tables import csv_table, digits, light_entry
 
@@ -68,7 +69,7 @@ def placements(design: SensorDesign) -> list[Placement]:
                 model=group.model,
                 part=part_number(group),
                 position=light.position,
-                direction=_triple(forward),
+                direction=triple(forward),
                 rotation=_rotation(light, right, up),
                 board=place.board,
                 layer="bottom" if place.bottom else "top",
@@ -140,7 +141,3 @@ def _rotation(light: Light, right: FloatArray, up: FloatArray) -> float:
         return 0.0  # `up` is parallel to the direction and gives no rotation
     angle = float(np.degrees(np.arctan2(-across, along)))
     return 180.0 if angle <= -180.0 + 1e-9 else angle + 0.0
-
-
-def _triple(vector: FloatArray) -> tuple[float, float, float]:
-    return float(vector[0]), float(vector[1]), float(vector[2])

@@ -10,7 +10,6 @@ import pytest
 
 import optisense as ots
 from optisense.calibration import photograph_model
-from optisense.calibration._camera_changes import with_camera_turned
 from optisense.calibration._covered_view import CoveredView, with_smooth_outline
 from optisense.calibration._fit_rounds import FitRounds
 from optisense.calibration._layered_pictures import LayeredPictures
@@ -19,6 +18,7 @@ from optisense.calibration.kept_renderings import KEPT_NOWHERE
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
+from optisense.design.posing import with_camera_turned
 
 from .conftest import PHOTONS, PLACES, SIZE, SMALL, numbers_of_fit
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
+from optisense.design.posing import moved, with_camera_turned, with_lights
 from optisense.geometry import TriangleMesh
 from optisense.geometry.rotations import rotation
 from optisense.search.space.design_variables import DesignVariable
@@ -42,7 +44,7 @@ class GroupShift(_GroupMove):
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the group shifted by `value` mm."""
-        return _with_poses(design, self.name, np.eye(3), _along(self.axis, value))
+        return with_lights(design, self.name, partial(moved, shift=_along(self.axis, value)))
 
 
 class GroupTurn(_GroupMove):
@@ -53,7 +55,8 @@ class GroupTurn(_GroupMove):
         lights = design.lights[self.name].lights
         middle = np.mean([light.position for light in lights], axis=0)
         turn = rotation(_along(self.axis, 1.0), value)
-        return _with_poses(design, self.name, turn, middle - turn @ middle)
+        move = partial(moved, shift=middle - turn @ middle, turn=turn)
+        return with_lights(design, self.name, move)
 
 
 class GroupAim(_GroupMove):
@@ -79,8 +82,8 @@ class LightShift(_Move):
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the light shifted by `value` mm."""
-        shift = _along(self.axis, value)
-        return _with_poses(design, self.name, np.eye(3), shift, only=self.index)
+        move = partial(moved, shift=_along(self.axis, value))
+        return with_lights(design, self.name, move, only=self.index)
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,8 @@ class LightTurn(_Move):
         """Return the design with the light turned by `value` degrees."""
         place = np.array(design.lights[self.name].lights[self.index].position)
         turn = rotation(_along(self.axis, 1.0), value)
-        return _with_poses(design, self.name, turn, place - turn @ place, only=self.index)
+        move = partial(moved, shift=place - turn @ place, turn=turn)
+        return with_lights(design, self.name, move, only=self.index)
 
 
 class CameraTurn(_Move):
@@ -111,14 +115,7 @@ class CameraTurn(_Move):
 
     def apply(self, design: SensorDesign, value: Any) -> SensorDesign:
         """Return the design with the camera turned by `value` degrees."""
-        turn = rotation(design.camera.axes()[self.axis], value)
-        camera = design.camera.model_copy(
-            update={
-                "direction": _triple(turn @ np.array(design.camera.direction)),
-                "up": _triple(turn @ np.array(design.camera.up)),
-            }
-        )
-        return design.model_copy(update={"camera": camera})
+        return with_camera_turned(self.axis, design, value)
 
 
 @dataclass(frozen=True)
@@ -179,24 +176,6 @@ class PartTurn(_PartMove):
         return _with_mesh(design, self.name, turn, middle - turn @ middle)
 
 
-def _with_poses(
-    design: SensorDesign, group: str, turn: FloatArray, shift: FloatArray, only: int | None = None
-) -> SensorDesign:
-    """Return a design with lights of a group, or one, turned about the origin and then shifted."""
-    moved = list(design.lights[group].lights)
-    for index in range(len(moved)) if only is None else (only,):
-        light = moved[index]
-        moved[index] = light.model_copy(
-            update={
-                "position": _triple(turn @ np.array(light.position) + shift),
-                "direction": _triple(turn @ np.array(light.direction)),
-                "up": None if light.up is None else _triple(turn @ np.array(light.up)),
-            }
-        )
-    changed = design.lights[group].model_copy(update={"lights": moved})
-    return design.model_copy(update={"lights": {**design.lights, group: changed}})
-
-
 def _with_mesh(
     design: SensorDesign, part: str, turn: FloatArray, shift: FloatArray
 ) -> SensorDesign:
@@ -212,8 +191,3 @@ def _along(axis: int, length: float) -> FloatArray:
     vector = np.zeros(3)
     vector[axis] = length
     return vector
-
-
-def _triple(vector: FloatArray) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z
