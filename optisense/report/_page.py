@@ -78,6 +78,7 @@ def render_page(
     """Return the page of `write_report` as text."""
     height, width = image.contact_mask.shape
     assumed, sourced = tables.provenance_rows(design)
+    factor, camera = _exposure(design, image, exposure)
     return page(
         "report",
         title=design.name,
@@ -86,10 +87,10 @@ def render_page(
         interrupted=image.interrupted,
         width=width,
         height=height,
-        pictures=_pictures(design, image, exposure),
+        pictures=_pictures(design, image, exposure, factor, camera),
         cross_at=_place_to_look_at(image.contact_mask),
         groups=[_group(name, group) for name, group in design.lights.items()],
-        mixing=as_json(_mixing(design, image, exposure)),
+        mixing=as_json(mixing_data(image.layers, factor, camera)),
         contacts=tables.contact_rows(contacts, image.settings.get("presses") or ()),
         settings=tables.setting_rows(image.settings),
         real=None if real is None else _real(real),
@@ -113,18 +114,19 @@ def _exposure(
     return factor, camera
 
 
-def _mixing(
-    design: SensorDesign, image: TactileImage, exposure: float | Literal["auto"]
-) -> dict[str, Any]:
-    return mixing_data(image.layers, *_exposure(design, image, exposure))
-
-
 def _pictures(
-    design: SensorDesign, image: TactileImage, exposure: float | Literal["auto"]
+    design: SensorDesign,
+    image: TactileImage,
+    exposure: float | Literal["auto"],
+    factor: float,
+    camera: PictureChain,
 ) -> list[dict[str, str]]:
-    """Return the pictures with their captions; the tactile image comes first."""
+    """Return the pictures with their captions; the tactile image comes first.
+
+    Args:
+        factor, camera: factor on the radiance, and camera without noise (see `_exposure`).
+    """
     picture = image.picture(exposure)
-    factor, camera = _exposure(design, image, exposure)
     shown: list[tuple[str, Callable[[], NDArray[np.uint8]], str, str]]
     shown = [("picture", lambda: picture, "tactile image", "")]
     for name, layer in image.layers.items():
