@@ -14,7 +14,6 @@ from optisense.design.projection import directions, picture_places
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import common_space
-from optisense.geometry.overlaps import CONTACT
 from optisense.geometry.rays import ray_hits
 
 EQUAL_INDEX = 1e-6
@@ -57,7 +56,7 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
     for name, other in combinations(solids, 2):
         if may_overlap(design, name, other):
             continue
-        place = common_space(meshes[name], meshes[other], CONTACT)
+        place = common_space(meshes[name], meshes[other])
         if place is not None:
             problems.append(
                 Diagnostic(

@@ -280,7 +280,7 @@ def _partings(
 
 def _shares_space(one: TriangleMesh, other: TriangleMesh) -> bool:
     """Return whether two solids share more space than parts that touch."""
-    return one.is_closed and other.is_closed and without(one, other, CONTACT) is not one
+    return one.is_closed and other.is_closed and without(one, other) is not one
 
 
 def _outer_face_hint(design: SensorDesign, name: str, other: str) -> str:

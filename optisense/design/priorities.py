@@ -6,7 +6,6 @@ from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import without
-from optisense.geometry.overlaps import CONTACT
 
 
 def carved(design: SensorDesign, meshes: dict[str, TriangleMesh], name: str) -> TriangleMesh:
@@ -25,5 +24,5 @@ def carved(design: SensorDesign, meshes: dict[str, TriangleMesh], name: str) -> 
             and part.priority > design.parts[name].priority
             and other in meshes
         ):
-            mesh = without(mesh, meshes[other], CONTACT)
+            mesh = without(mesh, meshes[other])
     return mesh

@@ -9,7 +9,7 @@ import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.geometry.mesh import TriangleMesh
-from optisense.geometry.overlaps import find_overlap
+from optisense.geometry.overlaps import CONTACT, find_overlap
 
 Places = weakref.WeakKeyDictionary[TriangleMesh, FloatArray | None]
 
@@ -20,33 +20,32 @@ Rests = weakref.WeakKeyDictionary[TriangleMesh, TriangleMesh | None]
 _rests: weakref.WeakKeyDictionary[TriangleMesh, Rests] = weakref.WeakKeyDictionary()
 
 
-def common_space(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> FloatArray | None:
+def common_space(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
     """Return the middle of a space that two solids share; cached for the next call with the same
     solids.
 
     Facets of two parts that touch overlap slightly. A common space counts if its mean thickness,
-    twice its volume over its surface, is larger than that.
+    twice its volume over its surface, is larger than `CONTACT`.
 
     Args:
         first, second: closed meshes, mm.
-        thinnest: smallest mean thickness that counts, mm.
 
     Returns:
         The middle (3,), mm; None if they share no space, or if a mesh is not a valid volume.
     """
     beside = _known.setdefault(first, weakref.WeakKeyDictionary())
     if second not in beside:
-        beside[second] = _found(first, second, thinnest)
+        beside[second] = _found(first, second)
     return beside[second]
 
 
-def _found(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> FloatArray | None:
+def _found(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
     if find_overlap(first, second) is None:
         return None
-    return thick_place(as_manifold(first) ^ as_manifold(second), thinnest)
+    return thick_place(as_manifold(first) ^ as_manifold(second), CONTACT)
 
 
-def without(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> TriangleMesh:
+def without(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh:
     """Return a solid without the space that it shares with another one, or the solid itself if they
     share none or nothing would be left; cached for the next call with the same solids.
 
@@ -55,20 +54,19 @@ def without(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> Trian
 
     Args:
         first, second: closed meshes, mm.
-        thinnest: smallest mean thickness of a shared space that counts, mm.
     """
     beside = _rests.setdefault(first, weakref.WeakKeyDictionary())
     if second not in beside:
-        beside[second] = _carved(first, second, thinnest)
+        beside[second] = _carved(first, second)
     rest = beside[second]
     return first if rest is None else rest
 
 
-def _carved(first: TriangleMesh, second: TriangleMesh, thinnest: float) -> TriangleMesh | None:
+def _carved(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh | None:
     if ((first.bounds[0] >= second.bounds[1]) | (first.bounds[1] <= second.bounds[0])).any():
         return None
     one, other = as_manifold(first), as_manifold(second)
-    if thick_place(one ^ other, thinnest) is None:
+    if thick_place(one ^ other, CONTACT) is None:
         return None
     rest = one - other
     return None if rest.is_empty() else of_manifold(rest)

@@ -34,7 +34,6 @@ def ranges_in_boxes(
     theta: ArrayLike,
     phi: ArrayLike,
     has_azimuth: ArrayLike,
-    block: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return the ranges of both angles over the points in each point's colour box.
 
@@ -44,7 +43,6 @@ def ranges_in_boxes(
         theta: (n,) polar angles, degrees.
         phi: (n,) azimuths, degrees.
         has_azimuth: (n,) mask of the points whose azimuth counts; others have a range of 0.
-        block: number of points of a block; by default chosen for speed.
 
     Returns:
         The largest minus the smallest polar angle (n,), degrees, and the arc (n,), degrees, of the
@@ -59,7 +57,7 @@ def ranges_in_boxes(
     polar = np.asarray(theta, dtype=np.float64)[order]
     azimuth = np.asarray(phi, dtype=np.float64)[order] % 360.0
     counts = np.asarray(has_azimuth, dtype=bool)[order]
-    blocks = _blocks(c, block or (BLOCK if len(c) > ONE_BLOCK else ONE_BLOCK))
+    blocks = _blocks(c, BLOCK if len(c) > ONE_BLOCK else ONE_BLOCK)
     least = np.array([c[rows].min(axis=0) for rows in blocks])
     most = np.array([c[rows].max(axis=0) for rows in blocks])
     extremes = cache(lambda k: _extremes(blocks[k], polar, azimuth, counts))

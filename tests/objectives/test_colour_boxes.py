@@ -7,6 +7,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
+from optisense.objectives import _colour_boxes
 from optisense.objectives._colour_boxes import ranges_in_boxes
 
 Points = tuple[np.ndarray, ...]
@@ -54,10 +55,14 @@ def ball_points(count: int, seed: int) -> Points:
 
 @pytest.mark.parametrize("block", [1, 7, 64, 5000])
 @pytest.mark.parametrize("points", [random_points, ball_points])
-def test_ranges_are_those_of_all_pairs(points: object, block: int) -> None:
+def test_ranges_are_those_of_all_pairs(
+    points: object, block: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert callable(points)
+    monkeypatch.setattr(_colour_boxes, "BLOCK", block)
+    monkeypatch.setattr(_colour_boxes, "ONE_BLOCK", block)
     given = points(1500, seed=block)
-    tilts, arcs = ranges_in_boxes(*given, block=block)
+    tilts, arcs = ranges_in_boxes(*given)
     right_tilts, right_arcs = all_pairs(*given)
     assert np.allclose(tilts, right_tilts, atol=1e-9)
     assert np.allclose(arcs, right_arcs, atol=1e-9)

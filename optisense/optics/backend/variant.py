@@ -149,12 +149,15 @@ def one_scene_per_kernel() -> bool:
     return str(import_renderer("mitsuba").variant()).startswith("cuda")
 
 
-def run_test_kernel(variant: str = "auto", timeout: float = 120.0) -> KernelTest:
+TEST_SECONDS = 120.0
+"""Time after which the process of a test kernel is ended, s; a usual one takes some seconds."""
+
+
+def run_test_kernel(variant: str = "auto") -> KernelTest:
     """Compile and run a tiny kernel and trace a few rays, in a child process.
 
     Args:
         variant: the variant, as in :func:`select_variant`.
-        timeout: time (s) after which the child process is ended.
     """
     command = (
         f"from optisense.optics.backend.variant import _kernel_child; _kernel_child({variant!r})"
@@ -164,11 +167,11 @@ def run_test_kernel(variant: str = "auto", timeout: float = 120.0) -> KernelTest
             [sys.executable, "-c", command],
             capture_output=True,
             text=True,
-            timeout=timeout,
+            timeout=TEST_SECONDS,
             check=False,
         )
     except subprocess.TimeoutExpired:
-        return KernelTest(variant, False, timeout, f"no answer within {timeout:.0f} s")
+        return KernelTest(variant, False, TEST_SECONDS, f"no answer within {TEST_SECONDS:.0f} s")
     try:
         return KernelTest(**json.loads(child.stdout.strip().splitlines()[-1]))
     except (IndexError, ValueError, TypeError):

@@ -120,27 +120,20 @@ class Media:
         bent: whether the interfaces were moved along with solids that bend; see `bend`.
     """
 
-    def __init__(
-        self,
-        solids: Sequence[Solid],
-        sheets: Sequence[Sheet] = (),
-        tolerance: float = COINCIDENCE_TOLERANCE,
-    ) -> None:
+    def __init__(self, solids: Sequence[Solid], sheets: Sequence[Sheet] = ()) -> None:
         """Find every refracting boundary of a set of solids in air.
 
         Args:
             solids: closed parts; they may touch with any tessellation, nest and overlap.
             sheets: opaque surfaces; solid faces that lie on one are left out.
-            tolerance: distance (mm) below which faces touch.
 
         Raises:
             MeshError: a mesh is not closed or cuts through itself.
             DesignError: solids of different index overlap and have the same priority.
         """
         self._solids = list(solids)
-        self._tolerance = tolerance
         closed = [replace(s, mesh=s.mesh.validate(s.name, closed=True)) for s in solids]
-        self._parted = _disjoint(closed, tolerance)
+        self._parted = _disjoint(closed)
         self._lying: list[Sheet] = []
         self._loose: list[Sheet] = []
         self._faces = self._resolve(list(sheets))
@@ -149,13 +142,14 @@ class Media:
         self._bending: Bending | None = None
 
     def _resolve(self, sheets: list[Sheet]) -> list[Interface]:
-        solids, tolerance = self._parted, self._tolerance
-        contacts = _contacts(solids, tolerance)
+        solids = self._parted
+        contacts = _contacts(solids)
         interfaces = []
         lying = np.zeros(len(sheets), dtype=bool)
         for i, solid in enumerate(solids):
             overlays = [
-                find_coincident(solid.mesh, sheet.mesh, tolerance, facing=False) for sheet in sheets
+                find_coincident(solid.mesh, sheet.mesh, COINCIDENCE_TOLERANCE, facing=False)
+                for sheet in sheets
             ]
             lying |= np.array([len(overlay.pairs) > 0 for overlay in overlays], dtype=bool)
             partners = [j for j in range(len(solids)) if (i, j) in contacts]
@@ -199,7 +193,7 @@ class Media:
         if len(others) + len(self._lying) != len(sheets):
             return False
         return not any(
-            len(find_coincident(solid.mesh, sheet.mesh, self._tolerance, facing=False).pairs)
+            len(find_coincident(solid.mesh, sheet.mesh, COINCIDENCE_TOLERANCE, facing=False).pairs)
             for sheet in others
             if sheet not in self._loose
             for solid in self._parted
@@ -270,26 +264,28 @@ def _refracts(interface: Interface) -> bool:
     return len(interface.mesh.faces) > 0 and differs
 
 
-def _contacts(solids: list[Solid], tolerance: float) -> dict[tuple[int, int], Overlay]:
+def _contacts(solids: list[Solid]) -> dict[tuple[int, int], Overlay]:
     """Return the faces of each solid that lie against another one, for both orders of each pair."""
     contacts = {}
     for i, j in combinations(range(len(solids)), 2):
-        overlay = find_coincident(solids[i].mesh, solids[j].mesh, tolerance, facing=True)
+        overlay = find_coincident(
+            solids[i].mesh, solids[j].mesh, COINCIDENCE_TOLERANCE, facing=True
+        )
         if len(overlay.pairs):
             contacts[i, j] = overlay
             contacts[j, i] = overlay.reversed()
     return contacts
 
 
-def _disjoint(solids: list[Solid], tolerance: float) -> list[Solid]:
+def _disjoint(solids: list[Solid]) -> list[Solid]:
     """Cut each solid out of those of lower priority that it overlaps; highest priority first."""
     result = sorted(solids, key=lambda solid: -solid.priority)
     for i, j in combinations(range(len(solids)), 2):
-        if not boxes_overlap(result[i].mesh, result[j].mesh, tolerance):
+        if not boxes_overlap(result[i].mesh, result[j].mesh, COINCIDENCE_TOLERANCE):
             continue
         # A cut along coincident faces takes ten times as long; a small clearance separates them.
         smaller = _manifold(_grown(result[j], -CUT_CLEARANCE))
-        place = thick_place(_manifold(result[i]) ^ smaller, tolerance - CUT_CLEARANCE)
+        place = thick_place(_manifold(result[i]) ^ smaller, COINCIDENCE_TOLERANCE - CUT_CLEARANCE)
         if place is None:
             continue
         same_index = _alike(result[i], result[j])
