@@ -16,6 +16,11 @@ from scipy.fft import irfft2, next_fast_len, rfft2
 
 from optisense.array_types import FloatArray
 
+HUBER = 2.0
+"""Residual, in units of the usual error, beyond which it counts linearly instead of quadratically
+(Huber 1964): 5 % of normally distributed residuals are larger.
+"""
+
 UNCORRELATED = 0.1
 """Correlation below which errors at a distance are regarded as independent: the estimate from one
 picture scatters by about as much.
@@ -100,20 +105,20 @@ def correlated_pixels(errors: Sequence[FloatArray], masks: Sequence[NDArray[np.b
 def error_scale(
     errors: Sequence[FloatArray],
     masks: Sequence[NDArray[np.bool_]],
-    limit: float,
     pixels: float | None = None,
 ) -> ErrorScale:
     """Return the scale of errors, unaffected by dust.
 
+    Errors above `HUBER` are reduced to it in the estimate of their correlation.
+
     Args:
         errors: errors (h, w, 3) of each picture, relative to the expected ones.
         masks: pixels (h, w) of each picture that count.
-        limit: largest error, in standard deviations, in the estimate of their correlation.
         pixels: number of pixels for which there is one independent error; estimated if None.
     """
     inside = np.concatenate([error[mask] for error, mask in zip(errors, masks, strict=True)])
     size = max(TO_DEVIATION * float(np.median(np.abs(inside))), 1.0)
     if pixels is None:
-        limited = [np.clip(error, -limit * size, limit * size) for error in errors]
+        limited = [np.clip(error, -HUBER * size, HUBER * size) for error in errors]
         pixels = max(correlated_pixels(limited, masks), LEAST_PIXELS)
     return ErrorScale(size, pixels)

@@ -13,11 +13,6 @@ from optisense.array_types import FloatArray
 from optisense.calibration._correlated_errors import PHOTOGRAPH_NOISE, ErrorScale, error_scale
 from optisense.calibration._covered_view import SkinOutline
 
-HUBER = 2.0
-"""Residual, in units of the usual error, beyond which it counts linearly instead of quadratically
-(Huber 1964): 5 % of normally distributed residuals are larger.
-"""
-
 OUTLINE_ERROR = 0.08
 """Expected error of a pixel at the outline of the skin, relative to the difference between skin and
 rest there: the RMS of simulated GelSight360 and GelSight Svelte, whose true designs were known."""
@@ -69,8 +64,8 @@ class Scales:
         everywhere = np.ones(ground.shape[:2], dtype=bool)
         return Scales(
             list(expected),
-            error_scale([ground], [everywhere], HUBER, pixels),
-            error_scale(pressed, masks, HUBER, pixels),
+            error_scale([ground], [everywhere], pixels),
+            error_scale(pressed, masks, pixels),
         )
 
 

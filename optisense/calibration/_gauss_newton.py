@@ -21,8 +21,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 
 from optisense.array_types import FloatArray
+from optisense.calibration._correlated_errors import HUBER
 from optisense.calibration._covered_view import outline_of, with_smooth_outline
-from optisense.calibration._expected_errors import HUBER, Scales, expected_errors
+from optisense.calibration._expected_errors import Scales, expected_errors
 from optisense.calibration._far_field import without_drift
 from optisense.calibration._layered_pictures import (
     LayeredPictures,
