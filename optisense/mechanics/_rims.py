@@ -20,12 +20,11 @@ STEEP_RIM = 2.0
 reliable: on DIGIT, the skin at the foot of its rim moves by 0.3 mm at 2.4 mm, where a real gel is
 held."""
 FREE_SIDE = 1.0
-"""Distance (mm) of the middle of a contact from a free side of the gel, below which the force is
-more than 3 % too small; measured with a ball of radius 1.5 mm on the pad of GelSight Mini."""
-TOO_SMALL = 32
-"""Largest error (%) of that force, at less than 0.2 mm from the side, where no column fits between
-the middle of the contact and the side; farther away it is at most 22 %. Measured as above, against
-columns a third as far apart."""
+"""Distance (mm) of the middle of a contact from a free side of the gel, below which the error of
+the force is more than 4 %; measured with a ball of radius 1.5 mm on the pad of GelSight Mini."""
+AT_SIDE = 20
+"""Largest error (%) of that force, at the side, where it is too small. Measured as above, against
+columns a fifth as far apart."""
 STEEP = "skin that is steeper than 60 degrees against it"
 """Description of the skin for which there are no elements (`gel_columns.LEAST_UPRIGHT`)."""
 
@@ -58,7 +57,7 @@ class Rims:
         if side < FREE_SIDE:
             return (
                 f"{at} is {side:.1f} mm from the side of the gel; within {FREE_SIDE:g} mm of it, "
-                f"forces are up to {TOO_SMALL} % too small"
+                f"forces are up to {AT_SIDE} % too small"
             )
         return ""
 
@@ -68,7 +67,7 @@ class Rims:
             return f"forces within {STEEP_RIM:g} mm of the steep rim of the gel are not reliable"
         if len(self._border):
             return (
-                f"forces within {FREE_SIDE:g} mm of the side of the gel are up to {TOO_SMALL} % "
+                f"forces within {FREE_SIDE:g} mm of the side of the gel are up to {AT_SIDE} % "
                 "too small"
             )
         return ""

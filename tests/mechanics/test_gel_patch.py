@@ -187,7 +187,7 @@ def test_mirrored_places_whose_columns_stand_on_the_sides_of_a_pad_take_equal_fo
     pad = layer(25.25, 20.75, 4.25)
     signs = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
     forces = [pressed(*pad, at=(10.5 * a, 8.25 * b), depth=0.5).force for a, b in signs]
-    inside = pressed(*pad, at=(10.49, 8.24), depth=0.5).force
+    inside = pressed(*pad, at=(10.499, 8.249), depth=0.5).force
     assert forces == pytest.approx([inside] * 4, rel=1e-3)
 
 
@@ -197,6 +197,15 @@ def test_forces_fall_evenly_towards_the_side_of_a_pad():
     falls = -np.diff(forces) / forces[0]
     assert (falls > 0.0).all()
     assert falls.max() < 0.13
+
+
+def test_forces_change_evenly_with_the_distance_from_a_side():
+    # A border that is known to an eighth of a pitch makes steps of 2 % between equal forces.
+    pad = layer(25.25, 20.75, 4.25)
+    forces = [pressed(*pad, at=(x, 0.3), depth=0.5).force for x in np.arange(9.9, 10.51, 0.06)]
+    falls = -np.diff(forces) / forces[0]
+    assert falls.min() > 0.001
+    assert falls.max() < 0.007
 
 
 def pad_under_a_plate(half, thickness, counts):
