@@ -127,7 +127,7 @@ def gel_columns(
     pose[:3, 3] = -place.axes.T @ place.origin
     local = skin.vertex_normals().transformed(pose)
     fine = heights(outer_faces(local, fine_x, fine_y), fine_x, fine_y, highest=True)
-    fine[~np.isfinite(fine)] = np.nan
+    fine[~np.isfinite(fine) | _walls(fine, step)] = np.nan
     inward = _inward(fine, at_x, at_y, pitch)
     there = np.asarray(np.isfinite(inward).all(axis=2))
     edges = np.zeros((0, 2, 3)) if there.all() else _border(skin, place)
@@ -180,6 +180,28 @@ def _graded(near: float, outer: float) -> IntArray:
     half = np.concatenate([np.arange(inside + 1), inside + beyond])
     half = np.round(FINER * half).astype(np.int64)
     return np.concatenate([-half[:0:-1], half])
+
+
+def _walls(fine: FloatArray, step: float) -> BoolArray:
+    """Return a mask (rows, columns) of the points of a fine grid on steep skin that ends within a
+    pitch, as at the side of a tray; the gel ends where such skin begins.
+
+    Args:
+        fine: heights (mm), minus infinity where there is no skin.
+        step: distance (mm) of the points.
+    """
+    found = np.zeros(fine.shape, dtype=bool)
+    known = np.isfinite(fine)
+    if known.all():
+        return found
+    steepest = step * math.sqrt(LEAST_UPRIGHT**-2 - 1.0)
+    heights_there = np.where(known, fine, np.nan)
+    for axis in (0, 1):
+        rise = np.abs(np.diff(heights_there, axis=axis, prepend=np.nan, append=np.nan))
+        before, after = np.delete(rise, -1, axis), np.delete(rise, 0, axis)
+        steep = (before > steepest) | (after > steepest)
+        found |= steep & ~((before <= steepest) | (after <= steepest))
+    return found & (ndimage.minimum_filter(known, 2 * FINER + 1, mode="nearest") == 0)
 
 
 @lru_cache(maxsize=8)

@@ -16,6 +16,7 @@ from optisense.mechanics import _point_load as point_load
 from optisense.mechanics._gel_columns import gel_columns
 from optisense.mechanics._gel_patch import GelPatch
 from optisense.mechanics._hexahedra import CORNERS, stiffnesses
+from optisense.optics._ray_model import RayModel
 from optisense.sensors import load
 from optisense.sensors._shapes import revolve
 
@@ -299,6 +300,17 @@ def test_a_gel_that_ends_in_a_round_rim_is_pressed_beside_its_middle(at):
         for spot in ((0.0, 0.0), at)
     ]
     assert forces[1] == pytest.approx(forces[0], rel=0.1)
+
+
+def test_forces_beside_the_steep_side_of_a_tray_are_even():
+    # Slopes of the skin that reach over the edge of DIGIT's rim leave out elements there.
+    model = RayModel(load("digit"))
+    forces = [
+        model.pressed([Contact(Sphere(1.5), at=(0.0, v), depth=0.5)]).contacts[0].force
+        for v in np.arange(-9.0, -10.55, -0.15)
+    ]
+    assert np.abs(np.diff(forces) / forces[0]).max() < 0.03
+    assert max(forces) < 1.05 * min(forces)
 
 
 def test_a_dome_is_softer_than_a_flat_gel_of_its_thickness(monkeypatch):
