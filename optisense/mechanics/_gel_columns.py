@@ -80,8 +80,8 @@ class GelColumns:
         inward: (rows, columns, 3) unit normals of the skin, into the gel.
         length: (rows, columns) lengths of the columns along these normals.
         uneven: deviation of the gel from a flat layer near the contact, as a share of its
-            thickness: the larger of the skin's height and the change of thickness; infinite if the
-            gel ends there.
+            thickness: the larger of the skin's height and the change of thickness.
+        room: distance (mm) of the loads from where the gel ends, or the model of it does.
     """
 
     x: FloatArray
@@ -93,6 +93,7 @@ class GelColumns:
     inward: FloatArray
     length: FloatArray
     uneven: float
+    room: float
 
     @property
     def pitch(self) -> float:
@@ -160,7 +161,7 @@ def gel_columns(
         top,
         inward,
         length,
-        _uneven(thickness, loaded, top, length, solid, held),
+        *_shape(thickness, loaded, top, length, solid, held),
     )
 
 
@@ -415,22 +416,21 @@ def _around_the_middle(cells: BoolArray) -> tuple[BoolArray, BoolArray] | None:
     return solid, chosen
 
 
-def _uneven(
+def _shape(
     thickness: float,
     loaded: tuple[float, float],
     top: FloatArray,
     length: FloatArray,
     solid: BoolArray,
     held: BoolArray,
-) -> float:
-    """Return the deviation of the gel from a flat layer within a thickness of the loads (see
-    `GelColumns.uneven`).
+) -> tuple[float, float]:
+    """Return the deviation of the gel from a flat layer within a thickness of the loads, and the
+    distance (mm) of the loads from its border (see `GelColumns`).
     """
-    near = np.ones(solid.shape, dtype=bool)
-    for axis, half in enumerate(loaded):
-        near &= np.abs(top[:, :, axis]) <= half + thickness
-    if not (solid[near].all() and near.any()) or (held & near).any():
-        return np.inf
-    height = np.abs(top[near][:, 2]).max()
-    change = np.abs(length[near] - thickness).max()
-    return float(max(height, change) / thickness)
+    away = (np.abs(top[:, :, :2]) - loaded).max(axis=2)
+    inner = ndimage.binary_erosion(solid, np.ones((3, 3)), border_value=1)
+    room = float(away[held | (solid & ~inner)].min(initial=np.inf))
+    near = solid & (away <= thickness)
+    height = np.abs(top[near][:, 2]).max(initial=0.0)
+    change = np.abs(length[near] - thickness).max(initial=0.0)
+    return float(max(height, change) / thickness), room

@@ -75,6 +75,7 @@ class GelPatch:
         loaded: tuple[float, float],
         thickness: float,
         poisson_ratio: float,
+        share: float = 1.0,
     ) -> None:
         """Set up the elements.
 
@@ -82,8 +83,10 @@ class GelPatch:
             loaded: half sides (mm) of the rectangle in which loads lie.
             thickness: thickness (mm) of the flat layer to which the response is compared.
             poisson_ratio: Poisson's ratio of the gel.
+            share: share of the difference that is returned, 0 for a flat layer to 1.
         """
         self.columns, self.thickness, self._nu = columns, thickness, poisson_ratio
+        self._share = share
         self._elements = GelElements(columns, poisson_ratio)
         self._top, self._inward = self._elements.top, self._elements.inward
         self.x, self.y = (
@@ -246,14 +249,16 @@ class GelPatch:
 
     @cached_property
     def _fade(self) -> FloatArray:
-        """Return weights (rows, columns), 1 inside and falling to 0 at the rim of the grid."""
+        """Return weights (rows, columns), the share of the difference inside and falling to 0 at
+        the rim of the grid.
+        """
         width = max(TAPER * self.thickness / self.columns.pitch, 1.0)
         shares = [
             np.clip(np.minimum(np.arange(n), n - 1 - np.arange(n)) / width, 0.0, 1.0)
             for n in self.shape
         ]
         smooth = [s * s * (3.0 - 2.0 * s) for s in shares]
-        return np.asarray(smooth[0][:, None] * smooth[1])
+        return np.asarray(self._share * smooth[0][:, None] * smooth[1])
 
     def _beside_into(self, new: IntArray) -> FloatArray:
         """Return the normal displacement (columns, new) by new sources, minus the flat layer's."""

@@ -18,6 +18,10 @@ from optisense.mechanics._gel_patch import GelPatch
 FLAT = 0.02
 """Largest deviation from a flat layer (see `GelColumns.uneven`) at which a gel is treated as one.
 Forces change by less than half of this share."""
+NEAR, NEARER = 0.75, 0.5
+"""Distances of the loaded rectangle from the border of a flat gel, in thicknesses, between which
+the response changes from that of a flat layer to that of the elements. On GelSight Mini, their
+forces differ by 1.2 % at the farther one; nearer ones do not cost contacts more time."""
 MOST_KEPT = 12
 """Number of patches that are kept: nine places and some more. Each takes about 20 MB, and three
 times as much after a drag."""
@@ -74,11 +78,18 @@ class GelPatches:
 
     def _made(self, place: Footprint, loaded: tuple[float, float]) -> GelPatch | None:
         columns = gel_columns(place, loaded, self._skin, self._elastomers)
-        if columns is None or columns.uneven <= FLAT:
+        if columns is None:
             return None
-        octaves = math.ceil(THICKNESSES_PER_OCTAVE * math.log2(place.thickness))
-        thickness = 2.0 ** (octaves / THICKNESSES_PER_OCTAVE)
-        return GelPatch(columns, loaded, thickness, self._nu)
+        share = 1.0
+        if columns.uneven <= FLAT:
+            share = (NEAR - columns.room / place.thickness) / (NEAR - NEARER)
+        if share <= 0.0:
+            return None
+        thickness = place.thickness
+        if share >= 1.0:
+            octaves = math.ceil(THICKNESSES_PER_OCTAVE * math.log2(thickness))
+            thickness = 2.0 ** (octaves / THICKNESSES_PER_OCTAVE)
+        return GelPatch(columns, loaded, thickness, self._nu, min(share, 1.0))
 
 
 def _key(place: Footprint) -> tuple[float, ...]:

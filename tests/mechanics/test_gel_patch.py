@@ -165,7 +165,8 @@ def test_a_gel_that_is_curved_or_ends_resists_a_drag_less(monkeypatch, shape):
     body = dome(14.0, 3.0) if shape == "dome" else layer(25.25, 20.75, 4.25)
     at = (0.0, 0.0) if shape == "dome" else (10.5, 0.0)
     elements = pressed(*body, at=at, shift=(0.2, 0.0))
-    monkeypatch.setattr(gel_patches, "FLAT", math.inf)
+    for name, value in (("FLAT", math.inf), ("NEAR", -1.0), ("NEARER", -2.0)):
+        monkeypatch.setattr(gel_patches, name, value)
     flat = pressed(*body, at=at, shift=(0.2, 0.0))
     # With columns less than half as far apart the dome takes 0.85 of the shear.
     low, high = (0.83, 0.87) if shape == "dome" else (0.7, 0.9)
@@ -207,6 +208,15 @@ def test_forces_change_evenly_with_the_distance_from_a_side():
     falls = -np.diff(forces) / forces[0]
     assert falls.min() > 0.001
     assert falls.max() < 0.007
+
+
+def test_forces_change_evenly_from_the_flat_layer_to_the_elements():
+    pad = layer(25.25, 20.75, 4.25)
+    forces = [pressed(*pad, at=(x, 0.3), depth=0.5).force for x in np.arange(7.1, 8.6, 0.15)]
+    falls = -np.diff(forces) / forces[0]
+    assert falls.min() >= -1e-4
+    assert falls.max() < 0.004
+    assert forces[0] == pytest.approx(pressed(*pad, depth=0.5).force, rel=1e-6)
 
 
 def pad_under_a_plate(half, thickness, counts):
