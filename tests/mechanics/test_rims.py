@@ -14,6 +14,7 @@ BALL = Sphere(1.5)
     ("name", "near", "far", "word"),
     [
         ("digit", (9.0, 0.0), (6.0, 0.0), "not reliable"),
+        ("digit", (9.4, 0.0), (0.0, 10.0), "not reliable"),  # on the edge of the rim
         ("gelsight-mini-ideal", (0.0, 9.8), (0.0, 9.0), "too small"),
     ],
 )
