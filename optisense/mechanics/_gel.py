@@ -208,7 +208,8 @@ class Gel:
             ]
             pressed = press(places, self._elasticity, patches, drags)
             warned = tuple(
-                replace(each, warning=self._rims.warning(each.place)) for each in pressed.contacts
+                replace(each, warning=self._rims.warning(each.place, patch))
+                for each, patch in zip(pressed.contacts, patches, strict=True)
             )
             self._last = asked, replace(pressed, contacts=warned)
         return self._last[1]

@@ -61,6 +61,9 @@ ASIDE = 1e-6
 """Distance by which the lines of columns at the border of the gel start inside of it, over the
 thickness: far above the rounding of double precision, which puts lines in the plane of a side on
 either side of it, and far below any distance that matters."""
+LACKING = 4
+"""Number of columns on skin whose lack of elements counts. Fewer are left out at some corners, such
+as those of the spherical GelSight Mini, where forces are smooth."""
 THINNEST, THICKEST = 0.15, 3.0
 """Smallest and largest length of a column, over the thickness under the contact; columns of other
 lengths miss the base, as at the side of a gel."""
@@ -82,6 +85,9 @@ class GelColumns:
         uneven: deviation of the gel from a flat layer near the contact, as a share of its
             thickness: the larger of the skin's height and the change of thickness.
         room: distance (mm) of the loads from where the gel ends, or the model of it does.
+        left_out: distance (mm) of the loads from skin on which `LACKING` columns have no
+            elements, as they cross others or leave the gel through a side that leans under the
+            skin; infinite if there are not as many.
     """
 
     x: FloatArray
@@ -94,6 +100,7 @@ class GelColumns:
     length: FloatArray
     uneven: float
     room: float
+    left_out: float
 
     @property
     def pitch(self) -> float:
@@ -152,6 +159,7 @@ def gel_columns(
     goes_on = np.pad(np.zeros_like(solid), 1, constant_values=True)
     goes_on[1:-1, 1:-1] = fits & steep
     held = solid & ndimage.binary_dilation(goes_on, np.ones((3, 3)))[1:-1, 1:-1]
+    lacking = np.sort(_away(top, loaded)[there & ~steep & ~solid])
     return GelColumns(
         fine_x[at_x],
         fine_y[at_y],
@@ -162,6 +170,7 @@ def gel_columns(
         inward,
         length,
         *_shape(thickness, loaded, top, length, solid, held),
+        float(lacking[LACKING - 1]) if len(lacking) >= LACKING else np.inf,
     )
 
 
@@ -416,6 +425,13 @@ def _around_the_middle(cells: BoolArray) -> tuple[BoolArray, BoolArray] | None:
     return solid, chosen
 
 
+def _away(top: FloatArray, loaded: tuple[float, float]) -> FloatArray:
+    """Return the distances (rows, columns), mm, of columns from the loaded rectangle along the
+    farther axis; negative inside of it.
+    """
+    return np.asarray((np.abs(top[:, :, :2]) - loaded).max(axis=2))
+
+
 def _shape(
     thickness: float,
     loaded: tuple[float, float],
@@ -427,7 +443,7 @@ def _shape(
     """Return the deviation of the gel from a flat layer within a thickness of the loads, and the
     distance (mm) of the loads from its border (see `GelColumns`).
     """
-    away = (np.abs(top[:, :, :2]) - loaded).max(axis=2)
+    away = _away(top, loaded)
     inner = ndimage.binary_erosion(solid, np.ones((3, 3)), border_value=1)
     room = float(away[held | (solid & ~inner)].min(initial=np.inf))
     near = solid & (away <= thickness)

@@ -14,11 +14,16 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.surface import closest_points
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._gel_columns import LEAST_UPRIGHT
+from optisense.mechanics._gel_patch import GelPatch
 
 STEEP_RIM = 2.0
 """Distance (mm) of a contact from skin that is too steep for elements, below which forces are not
 reliable: on DIGIT, they change by up to 5 % in 0.1 mm at 1.8 mm, and the foot of the rim, where a
 real gel is held, moves by 0.4 mm at 1.5 mm."""
+LEFT_OUT = 0.85
+"""Distance of the loads from skin without elements, in thicknesses, below which forces are not
+reliable: at the end of GelSight Svelte's skin, whose side leans under it, steps of 6 % in 0.25 mm
+begin at 0.81."""
 FREE_SIDE = 1.0
 """Distance (mm) of the middle of a contact from a free side of the gel, below which the error of
 the force is more than 4 %; measured with a ball of radius 1.5 mm on the pad of GelSight Mini."""
@@ -43,8 +48,12 @@ class Rims:
         """Set the sensing surface, mm; its faces share vertices."""
         self._skin = skin
 
-    def warning(self, place: Footprint) -> str:
-        """Return a sentence about the error of a contact's force; empty if there is none."""
+    def warning(self, place: Footprint, patch: GelPatch | None) -> str:
+        """Return a sentence about the error of a contact's force; empty if there is none.
+
+        Args:
+            patch: the elements around the contact, if there are any.
+        """
         at = "the contact at ({:.2f}, {:.2f}, {:.2f}) mm".format(*place.origin)
         upright = -(self._skin.face_normals @ place.axes[:, 2])
         steep = self._distance(np.flatnonzero(upright < LEAST_UPRIGHT), place.origin, STEEP_RIM)
@@ -56,6 +65,11 @@ class Rims:
         if self._turns_beside(place):
             return (
                 f"{at} is on skin that turns by more than 60 degrees within {STEEP_RIM:g} mm; "
+                "forces there are not reliable"
+            )
+        if patch is not None and patch.columns.left_out < LEFT_OUT * patch.thickness:
+            return (
+                f"{at} is beside gel that has no elements, as its side leans under the skin; "
                 "forces there are not reliable"
             )
         side = _distance_from_edges(place.origin, self._border)

@@ -32,3 +32,11 @@ def test_contacts_near_a_rim_are_warned_of(name, near, far, word):
 def test_a_dome_has_no_steep_rim():
     model = RayModel(load("gelsight360"))
     assert model.pressed([Contact(BALL, at=(9.0, 0.0), depth=0.3)]).warnings == []
+
+
+def test_contacts_beside_a_side_that_leans_under_the_skin_are_warned_of():
+    model = RayModel(load("gelsight-svelte"))
+    contacts = [Contact(BALL, at=(u, 0.0), depth=0.3) for u in (34.0, 30.0)]
+    near, far = (model.pressed([contact]).warnings for contact in contacts)
+    assert "leans under the skin" in near[0]
+    assert far == []
