@@ -188,6 +188,23 @@ def test_bad_errors_are_told(
         tolerance(mini, linear, errors)
 
 
+@pytest.mark.parametrize(
+    "paths",
+    [
+        ("camera.position", "camera.position.x"),
+        ("lights.position", "lights.red.position"),
+        ("lights.*.shift.x", "lights.red.shift"),
+    ],
+)
+def test_a_number_has_one_error_also_within_a_vector(
+    mini: SensorDesign, paths: tuple[str, str]
+) -> None:
+    for given in (paths, paths[::-1]):
+        with pytest.raises(SearchError, match="has two manufacturing errors") as caught:
+            ManufacturingErrors(dict.fromkeys(given, 0.1)).bind(mini)
+        assert caught.value.where == given[1]
+
+
 def test_a_design_without_a_score_is_told(mini: SensorDesign) -> None:
     def broken(design: SensorDesign) -> float:
         raise ValueError("no such sensor")

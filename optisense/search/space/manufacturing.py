@@ -133,7 +133,7 @@ class ManufacturingErrors:
 
         Raises:
             DesignError: a path names nothing in the design; the message suggests a similar name.
-            SearchError: the value at a path takes no error.
+            SearchError: the value at a path takes no error, or has two.
         """
         return BoundManufacturingErrors(self, design)
 
@@ -170,10 +170,13 @@ class BoundManufacturingErrors:
         prepared = design
         for number, (source, spread) in enumerate(errors.distributions.items()):
             for path in _paths(design, source):
-                if path in ranges:
-                    raise SearchError(f"'{path}' has two manufacturing errors", where=source)
                 prepared, found = expand(prepared, path, _all_points(path, spread))
-                ranges |= {each.name: _limits(prepared, each, source) for each in found}
+                for each in found:
+                    if each.name in ranges:
+                        raise SearchError(
+                            f"'{each.name}' has two manufacturing errors", where=source
+                        )
+                    ranges[each.name] = _limits(prepared, each, source)
                 owner += [number] * len(found)
         self.owner = np.array(owner)
         self.space = _ErrorSpace(SearchSpace(ranges), prepared)
