@@ -79,8 +79,11 @@ def change_figure(found: Verification) -> Figure:
     axes.plot(change.mean(axis=1), range(len(names)), "D", ms=6, color=BLUE, label="object")
     mean = found.normal_change
     colour = {BETTER: "#2e8b57", WORSE: RED, INCONCLUSIVE: AMBER}[mean.verdict]
-    axes.plot([mean.low, mean.high], [len(names)] * 2, color=colour, lw=3)
-    axes.plot(mean.change, len(names), "D", ms=8, color=colour, label="mean and 95 % interval")
+    label = "mean"
+    if mean.ends is not None:
+        axes.plot(mean.ends, [len(names)] * 2, color=colour, lw=3)
+        label = "mean and 95 % interval"
+    axes.plot(mean.change, len(names), "D", ms=8, color=colour, label=label)
     axes.axvline(0.0, color=GREY, lw=1.2, ls="--")
     axes.set_yticks(range(len(names) + 1), [*(OBJECTS[name].title for name in names), "all"])
     axes.invert_yaxis()

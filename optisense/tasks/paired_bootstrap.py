@@ -52,18 +52,27 @@ class ErrorChange:
             return BETTER
         return WORSE if self.low > 0.0 else INCONCLUSIVE
 
-    def interval(self, digits: int) -> str:
-        """Return the interval with a number of digits after the point, as text; "unknown" for one
-        object, as only the differences between objects tell it.
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """The ends of the interval; None for one object, as only the differences between objects
+        tell them.
         """
-        if self.objects < 2:
-            return "unknown"
-        return f"{self.low:+.{digits}f} to {self.high:+.{digits}f}"
+        return None if self.objects < 2 else (self.low, self.high)
 
-    def to_dict(self) -> dict[str, float | str | int]:
-        """Return all values, ready for JSON."""
+    def interval(self, digits: int) -> str:
+        """Return the interval with a number of digits after the point, as text, or "unknown"."""
+        if self.ends is None:
+            return "unknown"
+        low, high = self.ends
+        return f"{low:+.{digits}f} to {high:+.{digits}f}"
+
+    def to_dict(self) -> dict[str, float | str | int | None]:
+        """Return all values, ready for JSON; an unknown interval has the ends None."""
+        low, high = self.ends or (None, None)
         return {
             **asdict(self),
+            "low": low,
+            "high": high,
             "change": self.change,
             "confidence": CONFIDENCE,
             "verdict": self.verdict,

@@ -98,3 +98,15 @@ def test_the_figure_marks_the_mean_change(found: Verification) -> None:
     axes = change_figure(found).axes[0]
     assert [line.get_xdata()[0] for line in axes.lines[-2:-1]] == pytest.approx([-4.0])
     assert axes.get_yticklabels()[-1].get_text() == "all"
+
+
+def test_the_figure_draws_no_interval_of_one_object(found: Verification) -> None:
+    one = replace(
+        found,
+        settings=replace(found.settings, objects=NAMES[:1]),
+        normals=(found.normals[0][:1], found.normals[1][:1]),
+    )
+    axes = change_figure(one).axes[0]
+    assert not [line for line in axes.lines if line.get_linewidth() == 3]
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["object", "mean"]

@@ -29,6 +29,14 @@ def test_few_objects_tell_nothing_however_different() -> None:
     assert error_change(before, before / 2).verdict == INCONCLUSIVE
 
 
+def test_the_interval_of_one_object_is_unknown_also_in_files() -> None:
+    before = np.random.default_rng(3).uniform(5.0, 20.0, (1, 4, 1))
+    found = error_change(before, before - np.arange(4.0)[:, None])
+    assert found.interval(1) == "unknown"
+    assert found.to_dict()["low"] is None
+    assert found.to_dict()["high"] is None
+
+
 def test_the_luck_of_readers_widens_the_interval() -> None:
     errors = np.tile(np.linspace(5.0, 20.0, 8)[:, None, None], (1, 3, 3))
     lucky = errors + np.array([-1.0, 0.0, 1.0])
