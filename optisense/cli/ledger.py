@@ -12,6 +12,7 @@ from optisense.cli.options import DesignArgument, VariantOption, json_option, ou
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import progress_line
 from optisense.commands.rendering import LedgerOptions
+from optisense.percentages import bound_percent
 from optisense.writing import write_json, write_text
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ def _print(found: LightLedger, seen: CameraLight) -> None:
         table.add_row(title, *(values[group] for group in groups))
     output.print(table)
     worst = max((entry.noise for entry in found.entries), default=0.0)
-    output.print(f"noise of a line: at most {100 * worst:.2g} %", style="dim")
+    output.print(f"noise of a line: at most {bound_percent(worst)}", style="dim")
     if faces := found.faces(LEAST_EXIT):
         output.print()
         table = table_of("escaped through the face", *groups)
@@ -131,7 +132,7 @@ def _print_place(place: PlaceLight) -> None:
     output.print(table)
     worst = max(each.noise for each in groups)
     output.print(
-        f"noise of the irradiance: at most {100 * worst:.2g} %; azimuths are 0 at the right of the "
-        "image and 90 at its top",
+        f"noise of the irradiance: at most {bound_percent(worst)}; azimuths are 0 at the right of "
+        "the image and 90 at its top",
         style="dim",
     )

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
+from optisense.percentages import bound_percent
 from optisense.report._drawing import swatch_of
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def _place(place: PlaceLight, design: SensorDesign) -> dict[str, Any]:
         "groups": [_group(name, each, design) for name, each in place.groups.items()],
         "legend": met,
         "photons": f"{place.photons:,}",
-        "noise": f"{100 * noise:.1g}",
+        "noise": bound_percent(noise),
     }
 
 

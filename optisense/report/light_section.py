@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from optisense.design import SensorDesign
+from optisense.percentages import bound_percent
 from optisense.quality import photons_of
 from optisense.report._drawing import encoded, swatch_of
 from optisense.report._files import as_json, page, script
@@ -132,7 +133,7 @@ class LightSection:
                 for face, shares in self.ledger.faces(LEAST_DRAWN).items()
             },
             "photons": f"{self.ledger.photons:,}",
-            "noise": f"{100 * noise:.1g}",
+            "noise": bound_percent(noise),
             "drawn": max(len(paths) for paths in self.paths.values()) if self.paths else 0,
         }
 
