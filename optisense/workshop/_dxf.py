@@ -11,12 +11,21 @@ Pair = tuple[int, str | float]
 """Group code of DXF and its value; lengths are in mm and angles in degrees."""
 
 
+HEADER = {"$ACADVER": (1, "AC1009"), "$INSUNITS": (70, "4"), "$MEASUREMENT": (70, "1")}
+"""Variables of the header: the format of release 12, lengths in mm, and metric patterns. The last
+two are of later releases; those of release 12, which has no units, skip unknown variables.
+"""
+
+
 def dxf(entities: Iterable[Sequence[Pair]]) -> str:
-    """Return the text of a DXF file with these entities."""
-    lines = ["0", "SECTION", "2", "ENTITIES"]
+    """Return the text of a DXF file with these entities, whose header states the unit mm."""
+    lines = ["0", "SECTION", "2", "HEADER"]
+    for name, (code, value) in HEADER.items():
+        lines += ["9", name, str(code), value]
+    lines += ["0", "ENDSEC", "0", "SECTION", "2", "ENTITIES"]
     for entity in entities:
-        for code, value in entity:
-            lines += [str(code), value if isinstance(value, str) else digits(float(value), 4)]
+        for code, given in entity:
+            lines += [str(code), given if isinstance(given, str) else digits(float(given), 4)]
     return "\n".join([*lines, "0", "ENDSEC", "0", "EOF", ""])
 
 

@@ -71,6 +71,18 @@ def test_the_acrylic_of_digit_is_cut_along_its_arcs(files: dict[str, Path]) -> N
     assert enclosed(found) == pytest.approx(area, rel=1e-4)
 
 
+def test_the_cut_file_states_its_unit(files: dict[str, Path]) -> None:
+    """4 are millimetres, and 1 is metric; without them, readers guess the unit."""
+    lines = files["acrylic-cut.dxf"].read_text().split("\n")
+    pairs = list(zip(lines[::2], lines[1::2], strict=False))
+    header = pairs[pairs.index(("2", "HEADER")) + 1 : pairs.index(("0", "ENDSEC"))]
+    names = [value for code, value in header if code == "9"]
+    values = dict(zip(names, header[1::2], strict=True))
+    assert values == {
+        "$ACADVER": ("1", "AC1009"), "$INSUNITS": ("70", "4"), "$MEASUREMENT": ("70", "1"),
+    }  # fmt: skip
+
+
 def test_the_sheet_has_three_views_and_all_dimensions(files: dict[str, Path]) -> None:
     svg = files["acrylic-drawing.svg"].read_text(encoding="utf-8")
     assert {"25", "18.3", "6.15", "R9.15", "R0.5"} <= set(texts(svg))
