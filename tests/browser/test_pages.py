@@ -78,3 +78,16 @@ def test_no_page_scrolls_sideways(opened: Visit) -> None:
                 each.evaluate("(each, open) => { each.open = open; }", unfolded)
             opened.drawn()
             assert not opened.is_scrolled_sideways()
+
+
+def test_paper_is_white_also_in_dark_mode(opened: Visit) -> None:
+    page = opened.page
+    page.emulate_media(media="print", color_scheme="dark")
+    colour = page.evaluate("() => getComputedStyle(document.body).color")
+    keys = page.evaluate(
+        """() => [...document.querySelectorAll(".swatch, .scale")].filter(
+             (each) => getComputedStyle(each).printColorAdjust !== "exact").length"""
+    )
+    page.emulate_media(media=None, color_scheme=None)
+    assert colour == "rgb(28, 35, 43)"
+    assert keys == 0

@@ -167,3 +167,19 @@ def test_the_buttons_look_from_other_sides(view: Visit) -> None:
         after = view.pixels(canvas(view))
         assert changed(before, after) > 0.02, name
         before = after
+
+
+def test_the_drawing_is_kept_for_printing(view: Visit) -> None:
+    """Browsers print what the buffer of a canvas holds, long after it was shown."""
+    view.drawn()
+    opaque = canvas(view).evaluate(
+        """(shown) => {
+          const copy = document.createElement("canvas");
+          copy.width = shown.width; copy.height = shown.height;
+          const flat = copy.getContext("2d");
+          flat.drawImage(shown, 0, 0);
+          const bytes = flat.getImageData(0, 0, copy.width, copy.height).data;
+          return bytes.filter((value, at) => at % 4 === 3 && value > 0).length / bytes.length;
+        }"""
+    )
+    assert opaque > 0.01

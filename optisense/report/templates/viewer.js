@@ -4,7 +4,9 @@ function view3d(root, data) {
   "use strict";
   const stage = root.querySelector(".stage"), withWays = root.hasAttribute("data-ways");
   const canvas = stage.querySelector("canvas");
-  const gl = canvas.getContext("webgl2", { antialias: true, alpha: true });
+  // Without its drawing buffer, a view would be blank on paper.
+  const options = { antialias: true, alpha: true, preserveDrawingBuffer: true };
+  const gl = canvas.getContext("webgl2", options);
   if (!gl) {
     stage.querySelector(".failed").hidden = false;
     canvas.hidden = true;
