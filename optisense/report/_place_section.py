@@ -79,7 +79,7 @@ def _group(name: str, light: GroupLight, design: SensorDesign) -> dict[str, Any]
 
 
 def _sky(sky: NDArray[np.float64]) -> list[dict[str, str]]:
-    """Return the sectors of the rings, darker for more light per solid angle."""
+    """Return the sectors of the rings, more opaque for more light per solid angle."""
     tilts, turns = sky.shape
     edges = np.linspace(0.0, np.pi / 2, tilts + 1)
     solid = (np.cos(edges[:-1]) - np.cos(edges[1:])) * 2 * np.pi / turns

@@ -6,6 +6,7 @@ import base64
 import json
 import re
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from typer.testing import CliRunner
 
 import optisense as ots
 from optisense.cli import app
-from optisense.optics import OpticalModel
+from optisense.optics import OpticalModel, light_at
 from optisense.report._page import render_page
 from optisense.report.light_section import LEAST_DRAWN, OTHER, LightSection, ledger_page
 
@@ -94,6 +95,15 @@ def test_the_page_asks_the_network_for_nothing(section: LightSection) -> None:
     page = ledger_page(ots.load("gelsight-mini-ideal"), section)
     assert not re.search(r'(src|href)\s*=\s*"(?!data:)', page)
     assert "default-src 'none'" in page
+
+
+def test_directions_are_told_for_light_and_dark_pages(section: LightSection) -> None:
+    """Sectors have the colour of the text, which is bright in dark mode."""
+    design = ots.load("gelsight-mini-ideal")
+    place = light_at(OpticalModel(design), (0.0, 0.0), 20_000)
+    page = ledger_page(design, replace(section, places=(place,)))
+    assert "the more a sector stands out from the background" in page
+    assert "dark sectors" not in page
 
 
 def test_the_command_writes_the_section(tmp_path: Path) -> None:
