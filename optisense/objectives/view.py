@@ -9,6 +9,7 @@ from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
 from optisense.objectives._seen_area import seen_area
 from optisense.objectives.settings import Settings
+from optisense.percentages import told_apart
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays
@@ -50,8 +51,9 @@ class View:
             ),
         ):
             if seen < least:
+                shown, needed = told_apart(seen, least)
                 raise ObjectiveError(
-                    f"only {100 * seen:.2g} % {what}, and a score needs {100 * least:g} %",
+                    f"only {shown} {what}, and a score needs {needed}",
                     hint="Check the camera's position, direction and field of view, or lower the "
                     f"setting '{name}'",
                 )
