@@ -19,6 +19,9 @@ from optisense.report._files import page
 from optisense.report.camera_rays import CameraRays
 from optisense.writing import write_text
 
+SHARES = frozenset({"pixels_that_see_the_surface"})
+"""Parts of scores that are shares, 0 to 1, but have a name like that of a count."""
+
 Table = tuple[list[str], list[list[str]]]
 """Column heads and rows."""
 
@@ -104,7 +107,7 @@ def _score(scored: Scored, name: str, score: Score, summary: str) -> dict[str, A
     """
     row = _row(scored, name, score)
     numbers = [
-        (key.replace("_", " "), _text(value))
+        (key.replace("_", " "), _percent(value) if key in SHARES else _text(value))
         for key, value in score.parts.items()
         if not isinstance(value, list | Mapping)
     ]
@@ -145,6 +148,11 @@ def _table(value: Any) -> Table | None:
     heads = list(value[0])
     rows = [[_text(row.get(head)) for head in heads] for row in value]
     return [head.replace("_", " ") for head in heads], rows
+
+
+def _percent(value: Any) -> str:
+    """Return a share as text; a user's part of that name may be anything."""
+    return f"{100.0 * value:.4g} %" if isinstance(value, float) else _text(value)
 
 
 def _text(value: Any) -> str:

@@ -47,6 +47,13 @@ def test_values_parts_and_summary_are_on_the_page(evaluation: Evaluation) -> Non
         assert words in text, words
 
 
+def test_a_share_among_counts_is_a_percentage(evaluation: Evaluation) -> None:
+    parts = {"pixels_that_see_the_surface": 1.0, "pixels": 320}
+    text = page(evaluation, Score("mine", 0.5, parts=parts))
+    assert "<th>pixels that see the surface</th><td>100 %</td>" in text
+    assert "<th>pixels</th><td>320</td>" in text
+
+
 def test_a_failure_is_shown_as_text(evaluation: Evaluation) -> None:
     text = page(evaluation, Score(EVIL, math.nan, EVIL, {EVIL: EVIL}))
     assert "<img src=x" not in text
