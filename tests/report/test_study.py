@@ -86,11 +86,16 @@ def test_trials_and_failures_are_listed(result: SearchResult, page: str) -> None
             assert f">{trial.scores['steep']:.4g}<" in page
     assert f'<td class="tight">{len(failed)}</td>' in page
     assert f"trial {failed[0].number}: " in page
+    shown = len(result.trials) - len(failed)
+    assert result.trials[0].is_start
+    assert f"has the best {shown} of {len(result.trials) - 1} trials and the start." in page
 
 
 def test_it_says_which_balls_can_be_made_out(page: str) -> None:
     assert "1 of the 2 are in view; 2 is hidden, or too small to make out." in page
     assert page.count("<polygon") == 1
+    caption = "a number may be at another place of the skin before than after"
+    assert caption in " ".join(page.split())
 
 
 def test_what_got_worse_is_told_where_rays_may_move(page: str) -> None:
