@@ -119,15 +119,20 @@ class Mould:
     def _draft(self) -> str:
         if self.undercut > 0.0:
             return (
-                f"{self.name}-mould: {self.undercut:.3g} mm^2 of the gel are undercut, and only a "
+                f"{self.name}-mould: {_area(self.undercut)} of the gel are undercut, and only a "
                 "soft mould or a soft gel comes off there"
             )
         if self.upright > 0.0:
             return (
-                f"{self.name}-mould: {self.upright:.3g} mm^2 of the gel's sides have a draft of "
+                f"{self.name}-mould: {_area(self.upright)} of the gel's sides have a draft of "
                 f"less than {LEAST_DRAFT:g} degree: use a release agent"
             )
         return f"{self.name}-mould: all sides have a draft of {LEAST_DRAFT:g} degree or more"
+
+
+def _area(area: float) -> str:
+    """Return an area, mm^2, as text without an exponent."""
+    return f"{area:,.0f} mm^2" if area >= 100.0 else f"{area:.3g} mm^2"
 
 
 def moulds(made: list[Shape]) -> list[Mould]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -132,6 +133,13 @@ def test_upright_sides_and_undercuts_are_told() -> None:
     height = math.hypot(2.5, 2.0 * math.cos(math.pi / 64))
     assert made.undercut == pytest.approx(slope * height, rel=1e-6)
     assert "undercut" in made.notes()[0]
+
+
+def test_areas_have_no_exponent() -> None:
+    made = mould_of(cone(8.0, 8.0), UP)
+    for area, text in ((0.0123, "0.0123"), (31.42, "31.4"), (314.2, "314"), (3141.6, "3,142")):
+        assert f" {text} mm^2 of" in replace(made, upright=area).notes()[0]
+        assert f" {text} mm^2 of" in replace(made, undercut=area).notes()[0]
 
 
 @pytest.mark.parametrize("distance", [0.0, 0.3, 4.0, 12.0])
