@@ -18,6 +18,11 @@ from optisense.search.tolerance.sensitivity import Estimate
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PERCENTILE_LINES = {"p10": (RED, "-"), "p50": (AMBER, "-"), "p90": (AMBER, "-.")}
+"""Colour and dashes of the line of each percentile."""
+
+P10_INTERVAL = "90 % interval of P10"
+
 
 def render_tolerance(tolerance: Tolerance) -> str:
     """Return a tolerance analysis as one self-contained HTML page."""
@@ -53,10 +58,13 @@ def spread_figure(name: str, found: ScoreDistribution) -> Figure:
     left.axvline(found.nominal, color=GREY, lw=1.4, ls="--", label=f"nominal {found.nominal:.4g}")
     for key, each in found.percentiles.items():
         if math.isfinite(each.value):
-            colour = RED if key == "p10" else AMBER
-            if key == "p10":
-                left.axvspan(each.low, each.high, color=colour, alpha=0.12, lw=0)
-            left.axvline(each.value, color=colour, lw=1.5, label=f"{key.upper()} {each.value:.4g}")
+            colour, style = PERCENTILE_LINES[key]
+            label = f"{key.upper()} {each.value:.4g}"
+            left.axvline(each.value, color=colour, ls=style, lw=1.5, label=label)
+            if key == "p10" and math.isfinite(each.low):
+                left.axvspan(
+                    each.low, each.high, color=colour, alpha=0.12, lw=0, label=P10_INTERVAL
+                )
     left.set_xlabel(name)
     left.set_ylabel("sensors")
     legend_above(left)
@@ -99,14 +107,16 @@ def _objective(name: str, found: ScoreDistribution) -> dict[str, Any]:
     }
 
 
-def _shares(shares: Mapping[str, Estimate | None]) -> list[tuple[str, str, str]]:
-    return [
-        (
-            source,
-            *(("unknown", "") if each is None else (f"{each.value:.2f}", _interval(each, ".2f"))),
-        )
-        for source, each in shares.items()
-    ]
+def _shares(shares: Mapping[str, Estimate | None]) -> list[tuple[str, str, str, str]]:
+    """Return source, share, standard error and interval."""
+    return [(source, *_share(each)) for source, each in shares.items()]
+
+
+def _share(each: Estimate | None) -> tuple[str, str, str]:
+    if each is None:
+        return "unknown", "", ""
+    error = f"{each.error:.2f}" if math.isfinite(each.error) else ""
+    return f"{each.value:.2f}", error, _interval(each, ".2f")
 
 
 def _cells(each: Estimate) -> tuple[str, str]:

@@ -45,7 +45,10 @@ def test_percentiles_and_shares_are_on_the_page(found: Tolerance) -> None:
         assert f"<b>{spread.percentiles[key].value:.4g}</b>" in page
     for source, share in spread.shares.items():
         assert share is not None
-        assert f'<code>{source}</code></td><td class="tight"><b>{share.value:.2f}</b>' in page
+        assert (
+            f'<code>{source}</code></td><td class="tight"><b>{share.value:.2f}</b></td>'
+            f'<td class="tight">{share.error:.2f}</td>' in page
+        )
     assert "limit of a uniform distribution" in page
     assert len(re.findall(r'<img [^>]*src="data:image/png', page)) == 1
 
@@ -124,3 +127,11 @@ def test_legends_stand_above_their_plots(found: Tolerance) -> None:
     figure.draw_without_rendering()
     for axes in figure.axes:
         assert axes.get_legend().get_window_extent().y0 >= axes.get_window_extent().y1 - 1.0
+
+
+def test_every_line_of_the_scores_has_its_own_look_and_entry(found: Tolerance) -> None:
+    axes = spread_figure("score", found.results["score"]).axes[0]
+    looks = {(line.get_color(), line.get_linestyle()) for line in axes.lines}
+    assert len(looks) == len(axes.lines) == 4
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert [label.split()[0] for label in labels] == ["nominal", "P10", "90", "P50", "P90"]
