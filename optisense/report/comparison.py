@@ -212,6 +212,7 @@ def profile_figure(
         for side in (-radius, radius):
             axes.axvline(side, color="#aaa", lw=0.8, ls=":")
         axes.set_xlabel(text, fontsize=8)
+        axes.set_ylabel("response, levels of 255", fontsize=8)
         axes.tick_params(labelsize=8)
     return figure
 
