@@ -77,8 +77,7 @@ def written_together(what: str, hint: str | None = None) -> Iterator[Callable[[P
 
     def stage(final: Path) -> Path:
         final.parent.mkdir(parents=True, exist_ok=True)
-        name = f".{final.stem}.{os.getpid()}-{uuid4().hex[:8]}{final.suffix}"
-        staged.append((final.with_name(name), final))
+        staged.append((_temporary(final), final))
         return staged[-1][0]
 
     try:
@@ -98,6 +97,42 @@ def written_together(what: str, hint: str | None = None) -> Iterator[Callable[[P
         for temporary, _ in staged:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def removed_together() -> Iterator[Callable[[Path], None]]:
+    """Context for files that are gone if the block ends without an error, and stay otherwise.
+
+    Yields:
+        A function that takes a file, which need not exist, and moves it to a temporary name in the
+        same folder.
+
+    Raises:
+        OSError: raised by that function if the file can't be moved.
+    """
+    moved: list[tuple[Path, Path]] = []
+
+    def remove(path: Path) -> None:
+        temporary = _temporary(path)
+        with contextlib.suppress(FileNotFoundError):
+            path.replace(temporary)
+            moved.append((temporary, path))
+
+    try:
+        yield remove
+    except BaseException:
+        for temporary, path in moved:
+            with contextlib.suppress(OSError):
+                temporary.replace(path)
+        raise
+    for temporary, _ in moved:
+        with contextlib.suppress(OSError):
+            temporary.unlink()
+
+
+def _temporary(path: Path) -> Path:
+    """Return a temporary path for a file, in the same folder and with the same suffix."""
+    return path.with_name(f".{path.stem}.{os.getpid()}-{uuid4().hex[:8]}{path.suffix}")
 
 
 @contextmanager

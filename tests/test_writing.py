@@ -12,6 +12,7 @@ from optisense.errors import OutputError
 from optisense.writing import (
     remedy,
     remove_own_page,
+    removed_together,
     write_json,
     write_text,
     written_together,
@@ -30,6 +31,20 @@ def test_files_appear_together_when_all_are_written(tmp_path: Path) -> None:
         assert one.read_text() == "before" and not other.exists()
     assert one.read_text() == "after" and other.read_bytes() == b"data"
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["deep", "one.txt", "other.npz"]
+
+
+def test_files_are_removed_together_or_not_at_all(tmp_path: Path) -> None:
+    one, other = tmp_path / "one.txt", tmp_path / "other.txt"
+    one.write_text("first")
+    other.write_text("second")
+    with pytest.raises(NotADirectoryError), removed_together() as remove:
+        remove(one)
+        remove(tmp_path / "missing.txt")
+        remove(other / "in a file.txt")
+    assert (one.read_text(), other.read_text()) == ("first", "second")
+    with removed_together() as remove:
+        remove(one)
+    assert list(tmp_path.iterdir()) == [other]
 
 
 @pytest.mark.parametrize("error", [ValueError("a defect"), KeyboardInterrupt()])

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import drjit as dr
 import numpy as np
+import pytest
 
+from optisense.errors import OutputError
 from optisense.optics import TactileImage
 from optisense.report import write_report
 from optisense.sensors import gelsight_mini_ideal
@@ -51,6 +53,20 @@ def test_another_image_takes_away_what_was_written_about_the_first(tmp_path: Pat
     assert "report.html" not in left
     assert "layers/green.exr" not in left
     assert {"notes.txt", "layers/blue.exr", "layers/red.exr", "image.png"} <= left
+
+
+def test_an_earlier_image_stays_whole_if_a_file_cannot_be_replaced(tmp_path: Path) -> None:
+    first = image("red", "green")
+    first.save(tmp_path)
+    write_report(tmp_path / "report.html", gelsight_mini_ideal(), first)
+    (tmp_path / "pressure.npy").write_bytes(b"of the first")
+    (tmp_path / "image.png").unlink()
+    (tmp_path / "image.png" / "a folder").mkdir(parents=True)
+    before = files(tmp_path)
+    with pytest.raises(OutputError, match="the results can't be written"):
+        image("red").save(tmp_path)
+    assert files(tmp_path) == before
+    assert (tmp_path / "pressure.npy").read_bytes() == b"of the first"
 
 
 def test_files_of_others_stay_whatever_run_json_says(tmp_path: Path) -> None:

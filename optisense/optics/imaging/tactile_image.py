@@ -23,7 +23,7 @@ from optisense.optics.backend.threads import threads_for_exr_files
 from optisense.optics.camera.response import picture
 from optisense.optics.imaging.markers import MarkerPlaces
 from optisense.untrusted_files import read_json
-from optisense.writing import inside, remove_own_page, written_together
+from optisense.writing import inside, is_own_page, removed_together, written_together
 
 RADIANCE_UNIT = "mW/(mm^2 sr)"
 """Unit of radiance in each of the three channels of radiance files and layers."""
@@ -162,7 +162,8 @@ class TactileImage:
         run.json, pressure.npy for an elastic skin with contacts, and markers.csv for a design with
         markers. They are written under temporary names and renamed when all are complete. The files
         of an earlier image that this one lacks are removed: its pressure, markers, layers of other
-        groups, and its page (report.html). Other files stay.
+        groups, and its page (report.html). Other files stay; if a file can't be written or
+        removed, these stay as well.
 
         Raises:
             OutputError: a file cannot be written, for instance because the disk is full.
@@ -172,7 +173,7 @@ class TactileImage:
         maps = self.skin_maps()
         bitmaps = {"image.png": self.picture(exposure), "radiance.exr": self.radiance}
         bitmaps |= {f"layers/{name}.exr": layer for name, layer in self.layers.items()}
-        with written_together("the results") as stage:
+        with removed_together() as remove, written_together("the results") as stage:
             paths = [stage(inside(out, name)) for name in bitmaps]
             # Files are compressed outside Python's lock.
             with threads_for_exr_files(), ThreadPoolExecutor() as pool:
@@ -187,12 +188,13 @@ class TactileImage:
             stage(out / "run.json").write_text(text, encoding="utf-8")
             before = _layers_before(out)
             for stale in before - set(self.layers):
-                (out / "layers" / f"{stale}.exr").unlink(missing_ok=True)
+                remove(out / "layers" / f"{stale}.exr")
             if before and maps is None:
-                (out / PRESSURE_FILE).unlink(missing_ok=True)
+                remove(out / PRESSURE_FILE)
             if before and self.markers is None:
-                (out / MARKERS_FILE).unlink(missing_ok=True)
-            remove_own_page(out / REPORT_FILE, "render")
+                remove(out / MARKERS_FILE)
+            if is_own_page(out / REPORT_FILE, "render"):
+                remove(out / REPORT_FILE)
 
 
 def _marker_table(markers: MarkerPlaces) -> str:
