@@ -34,6 +34,11 @@ BATCHES = 16
 """Number of independent parts of the photons, whose standard deviation gives the noise of the sums.
 With 16, the estimate of the noise is itself known to 18 % (1 / sqrt(2 * 15))."""
 
+LEAST_SHARE = 1e-5
+"""Share of a photon's power below which the opaque surface that it meets absorbs the rest. In
+DIGIT's white housing, photons would otherwise be followed for a thousand surfaces, which takes 35
+times as long."""
+
 
 class Fate(IntEnum):
     """The fate of light, in the order of a surface's rows in the ledger."""
@@ -188,6 +193,7 @@ def _follow(
     # The interface that bounds the medium, and the medium's side of it.
     bound = mi.UInt32(sums.surfaces - 1)
     side = mi.UInt32(int(Fate.BEFORE))
+    least = LEAST_SHARE * dr.max(power)
     while ray.active:
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
         step = interact(scene, ray, RayKind.PHOTON, sample)
@@ -200,6 +206,7 @@ def _follow(
         escaped = ray.active & ~hit.valid
         gone = dr.select(escaped, power, gone)
         kept = dr.select(step.goes_on, power * step.lobe.weight, 0)
+        kept = dr.select(step.opaque & (dr.max(kept) < least), 0, kept)
         cell, near = cell_at(seen.cells, hit.point, step.sensed)
         near &= dr.gather(mi.UInt32, seen.flags, cell, near) != 0
         fate = dr.select(near, mi.UInt32(int(Fate.SEEN)), int(Fate.ABSORBED))
@@ -209,6 +216,7 @@ def _follow(
         ahead = dr.sign(dr.dot(step.lobe.direction, hit.normal))
         outward = dr.select(step.goes_on, hit.normal * ahead, outward)
         ray = step.ray
+        ray.active &= dr.max(power) > 0
     return _End(gone, power, last, outward)
 
 
