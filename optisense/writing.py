@@ -202,10 +202,10 @@ def remove_own_page(path: Path, kind: str) -> None:
 def write_json(
     path: Path, values: Mapping[str, Any], what: str = "the file", hint: str | None = None
 ) -> None:
-    """Write a JSON file, whole.
+    """Write a JSON file, whole; NaN and infinity, which JSON does not have, are a defect.
 
     Raises:
         OutputError: see `written_together`.
     """
-    text = json.dumps(values, indent=2, ensure_ascii=False)
+    text = json.dumps(values, indent=2, ensure_ascii=False, allow_nan=False)
     write_text(path, text + "\n", what, hint)
