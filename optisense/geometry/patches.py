@@ -64,12 +64,18 @@ def patches(mesh: TriangleMesh, faces: Faces) -> list[Faces]:
     return sorted(groups, key=order)
 
 
+def sides_of_faces(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the vertices (3 m, 2) of the sides of all faces, in an order in which the sides of
+    faces that share an edge are successive, and the face (3 m,) of each.
+    """
+    sides = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
+    order = np.lexsort((sides[:, 1], sides[:, 0]))
+    return sides[order], np.repeat(np.arange(len(mesh.faces)), 3)[order]
+
+
 def inner_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], Faces]:
     """Return the vertices (k, 2) of the edges between two faces, and these faces (k, 2)."""
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
-    owner = np.repeat(np.arange(len(mesh.faces)), 3)
-    order = np.lexsort((edges[:, 1], edges[:, 0]))
-    edges, owner = edges[order], owner[order]
+    edges, owner = sides_of_faces(mesh)
     twin = (edges[1:] == edges[:-1]).all(axis=1)
     return edges[:-1][twin], np.column_stack([owner[:-1][twin], owner[1:][twin]])
 

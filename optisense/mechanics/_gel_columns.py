@@ -12,6 +12,7 @@ from scipy import ndimage
 
 from optisense.array_types import BoolArray, FloatArray, IntArray
 from optisense.geometry import TriangleMesh
+from optisense.geometry.patches import sides_of_faces
 from optisense.geometry.rays import ray_hits
 from optisense.mechanics._footprint import Footprint, outer_faces
 from optisense.mechanics._height_map import heights
@@ -220,10 +221,7 @@ def _edges(skin: TriangleMesh) -> tuple[TriangleMesh, IntArray, IntArray]:
     beside each; -1 where there is none.
     """
     whole = skin.welded()
-    count = len(whole.faces)
-    ends = np.sort(whole.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2).astype(np.int64), axis=1)
-    order = np.lexsort(ends.T)
-    ends, face = ends[order], np.repeat(np.arange(count), 3)[order]
+    ends, face = sides_of_faces(whole)
     again = np.zeros(len(ends), dtype=bool)
     again[1:] = (ends[1:] == ends[:-1]).all(axis=1)
     first = np.flatnonzero(~again)
