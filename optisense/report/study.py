@@ -27,9 +27,9 @@ from optisense.report._trial_marks import Marks, TrialFigure, page_data, selecta
 from optisense.report.before_after import DesignView
 from optisense.report.tolerance import shown_size
 from optisense.search.methods import find
-from optisense.search.study.best import best_of, nearest
+from optisense.search.study.best import best_of, front_among, nearest, newer_note
 from optisense.search.study.conditions import condition_note, worsened_note
-from optisense.search.study.study import Study, front_among
+from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 from optisense.writing import write_text
 
@@ -136,7 +136,7 @@ def render_study(
         conditions=tables.conditions(study, start, best or nearest(trials)),
         warnings=[
             note
-            for note in (condition_note(trials), worsened_note(best, start))
+            for note in (newer_note(trials), condition_note(trials), worsened_note(best, start))
             if note is not None
         ],
         no_fresh=tables.why_no_fresh(study, trials),

@@ -15,8 +15,7 @@ from optisense.design import SensorDesign
 from optisense.search import SearchResult, search
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.space.search_space import BoundSpace, SearchSpace
-from optisense.search.study.best import best_of, distance, tie_note, tied
-from optisense.search.study.study import front_among
+from optisense.search.study.best import best_of, distance, front_among, tie_note, tied
 from optisense.search.study.trial import Trial
 
 
@@ -97,6 +96,23 @@ def test_one_best_trial_is_no_tie(space: BoundSpace) -> None:
     assert tie_note(trials) is None
     assert tie_note([]) is None
     assert best_of([trial(space, 0, [0.0, 0.0, 0], math.nan)]) is None
+
+
+def test_a_newer_trial_is_the_best_if_no_fresh_score_tells_about_it(space: BoundSpace) -> None:
+    def found(number: int, score: float, newer: bool = False, fresh: float = math.nan) -> Trial:
+        again = {7: Outcome({"s": fresh})} if math.isfinite(fresh) else {}
+        made = trial(space, number, [0.1 * number, 0.0, 0], score)
+        return replace(made, is_newer=newer, fresh=again)
+
+    def best(*trials: Trial) -> int:
+        chosen = best_of(trials)
+        assert chosen is not None
+        return chosen.number
+
+    older = [found(0, 0.0, fresh=0.0), found(1, 2.0, fresh=1.0), found(2, 1.9)]
+    assert best(*older, found(3, 3.0, newer=True)) == 3
+    assert best(*older, found(3, 1.5, newer=True)) == 1
+    assert best(*older, found(3, 3.0, newer=True, fresh=0.5), found(4, 2.5, newer=True)) == 1
 
 
 def test_a_search_tells_its_ties_the_same_way_each_time(mini: SensorDesign) -> None:

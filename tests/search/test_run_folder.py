@@ -38,6 +38,31 @@ class TestFolder:
         assert study.best is not None
         assert study.best.fresh
 
+    def test_an_interrupted_continuation_names_the_newer_best(
+        self, folder: Path, goals: ModuleType
+    ) -> None:
+        """Only the best trials of the first run have fresh scores."""
+
+        calls = 0
+
+        def nearness(design: SensorDesign) -> float:
+            nonlocal calls
+            calls += 1
+            if calls == 60:
+                raise KeyboardInterrupt
+            return float(goals.nearness(design))
+
+        study = Study.open(folder, goals=[nearness])
+        first = study.best
+        stopped = run_study(study, limit=200)
+        assert stopped.interrupted and first is not None and first.fresh
+        assert stopped.best.score == max(trial.score for trial in stopped.trials) > first.score
+        assert not stopped.best.fresh
+        told = f"trial {stopped.best.number} has not been scored with fresh seeds yet"
+        assert any(told in note for note in stopped.notes)
+        ended = run_study(study, limit=70)
+        assert ended.best.fresh and not any("fresh seeds yet" in note for note in ended.notes)
+
     def test_a_study_is_not_begun_over_another(
         self, folder: Path, mini: SensorDesign, goals: ModuleType, tmp_path: Path
     ) -> None:

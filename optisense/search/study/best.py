@@ -4,10 +4,14 @@ A trial that breaks a condition of the study is never the best. If trials were s
 fresh seeds, the means over these decide whether it breaks one.
 
 The best trial has the highest score by fresh seeds if some trials were scored so, else the highest
-score by the study's seed. Scores that differ by rounding alone (`EQUAL`) are equal. Of trials with
-equal scores the one nearest to the start is the best, since it changes least, and of equally near
-ones the one that was proposed first. So the start itself wins every tie, and the same trials always
-have the same best one, in whatever order workers finished.
+score by the study's seed. A trial that was proposed after the last scoring with fresh seeds, as in
+a resumed search that was interrupted, is the best if its score by the study's seed is higher than
+that of each trial with fresh scores.
+
+Scores that differ by rounding alone (`EQUAL`) are equal. Of trials with equal scores the one
+nearest to the start is the best, since it changes least, and of equally near ones the one that was
+proposed first. So the start itself wins every tie, and the same trials always have the same best
+one, in whatever order workers finished.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from optisense.search.methods.dominance import front as front_of
 from optisense.search.space.parameters import Choice
 from optisense.search.study.trial import Trial
 
@@ -70,7 +75,14 @@ def start_of(trials: Iterable[Trial]) -> Trial | None:
 def best_of(trials: Sequence[Trial]) -> Trial | None:
     """Return the best trial by the rule above; None if none has a score and meets conditions."""
     fine = ranked(trials)
-    again = [trial for trial in fine if math.isfinite(trial.fresh_score())]
+    candidates = [
+        trial
+        for trial in fine
+        if math.isfinite(trial.fresh_score()) or (trial.is_newer and not trial.fresh)
+    ]
+    if candidates and not candidates[0].fresh:
+        return candidates[0]
+    again = [trial for trial in candidates if trial.fresh]
     if again:
         # `argmax` returns the first of equals, and `fine` is in the order of the rule.
         return again[int(without_rounding([trial.fresh_score() for trial in again]).argmax())]
@@ -87,6 +99,19 @@ def nearest(trials: Sequence[Trial]) -> Trial | None:
     if not scored or best_of(trials) is not None:
         return None
     return min(scored, key=lambda trial: (trial.violation, -trial.score, trial.number))
+
+
+def newer_note(trials: Sequence[Trial]) -> str | None:
+    """Return a note for the user if the best trial is newer than the fresh scores of others, else
+    None.
+    """
+    best = best_of(trials)
+    if best is None or best.fresh or not any(trial.fresh for trial in trials):
+        return None
+    return (
+        f"trial {best.number} has not been scored with fresh seeds yet, so chance may be a part of "
+        "its score; a search that is resumed does so at its end"
+    )
 
 
 def tied(trials: Sequence[Trial]) -> list[Trial]:
@@ -124,3 +149,17 @@ def tie_note(trials: Sequence[Trial]) -> str | None:
         f"{len(same)} trials share the best score; {named} named the best, as the nearest to the "
         "start"
     )
+
+
+def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:
+    """Return the trials that no other one dominates, the best in the first objective first.
+
+    Trials that break a condition are left out. Scores that differ by rounding alone are equal.
+    """
+    trials = [trial for trial in trials if trial.is_feasible]
+    if not trials:
+        return []
+    scores = [[trial.scores.get(name, np.nan) for trial in trials] for name in names]
+    values = np.stack([without_rounding(each) for each in scores], axis=1)
+    chosen = [trials[number] for number in front_of(values)]
+    return sorted(chosen, key=lambda trial: -trial.score)

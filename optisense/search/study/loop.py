@@ -23,7 +23,7 @@ from optisense.search.study._promotion import promote
 from optisense.search.study._reading_watch import ReadingWatch
 from optisense.search.study._tally import Tally
 from optisense.search.study.advice import moved_start_note
-from optisense.search.study.best import tie_note
+from optisense.search.study.best import newer_note, tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
 from optisense.search.study.progress import (
     FRESH,
@@ -36,7 +36,7 @@ from optisense.search.study.progress import (
 from optisense.search.study.rescoring import rescore
 from optisense.search.study.settings import package_versions
 from optisense.search.study.store import START, Row
-from optisense.search.study.study import Study
+from optisense.search.study.study import JUDGED, Study
 from optisense.search.study.trial import Trial
 from optisense.time_left import TimeLeft
 
@@ -126,6 +126,7 @@ class StudyRun:
                 with self._running(self._full) as runner:
                     self._begin(FRESH, 0)
                     promote(study, partial(self._score_fresh, runner))
+            study.store.set_fact(JUDGED, len(study.trials))
         except KeyboardInterrupt:
             interrupted, ended = True, "interrupted"
         study.store.set_fact("ended", ended)
@@ -133,8 +134,10 @@ class StudyRun:
         if not interrupted and self._tally.has_no_score:
             raise self._tally.all_failed()
         several = self.method.multi_objective  # the result is a front, not one best trial
-        tie = None if several else tie_note(study.trials)
-        found_notes = [moved_start_note(study.space), tie, condition_note(study.trials)]
+        trials = study.trials
+        tie = None if several else tie_note(trials)
+        found_notes = [moved_start_note(study.space), newer_note(trials), tie]
+        found_notes.append(condition_note(trials))
         found_notes += [] if several else [worsened_note(study.best, study.start)]
         notes = [
             *study.shape_notes,

@@ -11,12 +11,11 @@ STUDY/
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from optisense.design import SensorDesign
 from optisense.design.difference import (
@@ -30,10 +29,9 @@ from optisense.errors import ObjectiveError, SearchError
 from optisense.folders import FolderLock
 from optisense.library import with_own_lights
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
-from optisense.search.methods.dominance import front as front_of
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.search_space import BoundSpace, SearchSpace
-from optisense.search.study.best import best_of, nearest, start_of, without_rounding
+from optisense.search.study.best import best_of, front_among, nearest, start_of
 from optisense.search.study.folder import (
     STORE_FILE,
     lock_new_folder,
@@ -45,6 +43,11 @@ from optisense.search.study.settings import StudySettings
 from optisense.search.study.store import Row, Store
 from optisense.search.study.trial import Trial
 from optisense.search.study.trust import not_trusted, trust
+
+JUDGED = "judged"
+"""Name of the fact that holds how many trials there were when the best were last scored with fresh
+seeds.
+"""
 
 
 class Study:
@@ -253,9 +256,9 @@ class Study:
     @property
     def trials(self) -> list[Trial]:
         """Finished trials in the order in which they were proposed, the start first."""
-        fresh = self.store.fresh_scores()
+        fresh, judged = self.store.fresh_scores(), self._judged
         return [
-            self.trial_of(row, fresh.get(row.number, {}))
+            replace(self.trial_of(row, fresh.get(row.number)), is_newer=row.number >= judged)
             for row in self.store.rows()
             if row.outcome is not None
         ]
@@ -316,6 +319,16 @@ class Study:
             objective=self.objective,
             fresh=fresh or {},
         )
+
+    @property
+    def _judged(self) -> float:
+        """Number of trials that there were when the best were last scored with fresh seeds; of a
+        finished study of an earlier release, which did not store it, all.
+        """
+        found = self.store.fact(JUDGED)
+        if isinstance(found, int):
+            return found
+        return 0 if self.store.fact("ended") in (None, "interrupted") else math.inf
 
     def lock(self) -> None:
         """Take the lock against other processes that write, and open the store for writing.
@@ -397,17 +410,3 @@ def _shown(name: str, *, rays_only: bool) -> tuple[str, ...]:
         return measured.beside if measured and (measured.rays_only or not rays_only) else ()
     except ObjectiveError:  # an expression with an objective that is not installed
         return ()
-
-
-def front_among(trials: Sequence[Trial], names: Sequence[str]) -> list[Trial]:
-    """Return the trials that no other one dominates, the best in the first objective first.
-
-    Trials that break a condition are left out. Scores that differ by rounding alone are equal.
-    """
-    trials = [trial for trial in trials if trial.is_feasible]
-    if not trials:
-        return []
-    scores = [[trial.scores.get(name, np.nan) for trial in trials] for name in names]
-    values = np.stack([without_rounding(each) for each in scores], axis=1)
-    chosen = [trials[number] for number in front_of(values)]
-    return sorted(chosen, key=lambda trial: -trial.score)

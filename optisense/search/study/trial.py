@@ -29,6 +29,7 @@ class Trial:
         fresh: outcomes with other seeds, by seed; only for the best trials.
         space: space of the point.
         objective: first goal.
+        is_newer: whether it was proposed after the best trials were last scored with fresh seeds.
     """
 
     number: int
@@ -38,6 +39,7 @@ class Trial:
     space: BoundSpace = field(repr=False)
     objective: str = ""
     fresh: Mapping[int, Outcome] = field(default_factory=dict, repr=False)
+    is_newer: bool = False
 
     @property
     def is_start(self) -> bool:
