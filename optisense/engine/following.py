@@ -170,7 +170,7 @@ class Following:
 
     def _total(self, study: Study) -> int:
         """Return the total number of trials of the study."""
-        return study.settings.budget if self._budget is None else self._budget
+        return study.budget if self._budget is None else self._budget
 
     def _outcome(self, study: Study) -> dict[str, Any]:
         if self._child is not None and not self._left.is_set():

@@ -176,7 +176,7 @@ def about_study(session: Session, fields: StudyFields, job: Job) -> dict[str, An
             "objectives": settings.names,
             "requirements": settings.requirements,
             "method": settings.method,
-            "budget": settings.budget,
+            "budget": study.budget,
             "seed": settings.seed,
             "running": is_running(folder),
             "ended": study.store.fact("ended"),

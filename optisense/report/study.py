@@ -215,7 +215,7 @@ def _headline(study: Study, trials: Sequence[Trial], best: Trial | None) -> list
     settings = study.settings
     facts = [("method", settings.method), ("objectives", ", ".join(settings.names))]
     count = sum(not trial.is_start for trial in trials)
-    facts.append(("trials", f"{count:,} of {settings.budget:,}"))
+    facts.append(("trials", f"{count:,} of {study.budget:,}"))
     failed = sum(trial.failure is not None for trial in trials)
     if failed:
         facts.append(("failed", f"{failed:,}"))

@@ -129,7 +129,7 @@ def run_study(
     Args:
         study: new study, or one that was opened.
         workers: see `search`.
-        limit: total number of trials; the study's budget if None.
+        limit: total number of trials; the largest that was asked for so far if None.
         variant: variant of the renderer, see `search`.
         progress: function that is called a few times a second.
         on_wait: function that is called when Ctrl-C waits for a trial in this process to finish.

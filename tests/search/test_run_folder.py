@@ -60,6 +60,7 @@ class TestFolder:
         assert not stopped.best.fresh
         told = f"trial {stopped.best.number} has not been scored with fresh seeds yet"
         assert any(told in note for note in stopped.notes)
+        assert Study.open(folder).budget == 200  # which the next run goes on to by default
         ended = run_study(study, limit=70)
         assert ended.best.fresh and not any("fresh seeds yet" in note for note in ended.notes)
 

@@ -36,7 +36,7 @@ from optisense.search.study.progress import (
 from optisense.search.study.rescoring import rescore
 from optisense.search.study.settings import package_versions
 from optisense.search.study.store import START, Row
-from optisense.search.study.study import JUDGED, Study
+from optisense.search.study.study import BUDGET, JUDGED, Study
 from optisense.search.study.trial import Trial
 from optisense.time_left import TimeLeft
 
@@ -65,14 +65,14 @@ class StudyRun:
             study: new study, or one that was stopped.
             make_runner: function that returns the executor of the trials.
             progress: function that is called a few times a second.
-            limit: largest number of trials; the study's budget if None.
+            limit: largest number of trials; the largest that was asked for so far if None.
 
         Raises:
             OptiSenseError: the study can't be run here.
         """
         self.study = study
         settings = study.settings
-        self.limit = settings.budget if limit is None else limit
+        self.limit = study.budget if limit is None else limit
         usual = study.evaluator(variant)
         self._coarse = settings.coarse_first
         problem = Problem(
@@ -108,6 +108,8 @@ class StudyRun:
         study = self.study
         study.lock()
         interrupted, ended = False, ""
+        if self.limit > study.budget:
+            study.store.set_fact(BUDGET, self.limit)
         for row in study.store.rows():
             if row.outcome is not None:
                 self._tally.count(row, row.outcome)

@@ -44,6 +44,9 @@ from optisense.search.study.store import Row, Store
 from optisense.search.study.trial import Trial
 from optisense.search.study.trust import not_trusted, trust
 
+BUDGET = "budget"
+"""Name of the fact that holds the budget of a study that was resumed with a larger one."""
+
 JUDGED = "judged"
 """Name of the fact that holds how many trials there were when the best were last scored with fresh
 seeds.
@@ -319,6 +322,12 @@ class Study:
             objective=self.objective,
             fresh=fresh or {},
         )
+
+    @property
+    def budget(self) -> int:
+        """Largest number of trials that was asked for: when the study was begun, or resumed."""
+        found = self.store.fact(BUDGET)
+        return max(self.settings.budget, found if isinstance(found, int) else 0)
 
     @property
     def _judged(self) -> float:
