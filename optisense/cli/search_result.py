@@ -68,6 +68,8 @@ def print_result(result: SearchResult, out: Path) -> None:
 
     study = result.study
     print_notes(result.notes)
+    if not result.interrupted:
+        output.print(_end(result))
     best, start = study.best, study.start
     failed = [trial for trial in result.trials if trial.failure is not None]
     if failed:
@@ -100,6 +102,14 @@ def print_result(result: SearchResult, out: Path) -> None:
     elif not result.interrupted:
         output.print(f"Apply it:   optisense apply {out} --trial best --out better", style="dim")
         output.print(f"Verify it:  optisense verify {out}", style="dim")
+
+
+def _end(result: SearchResult) -> str:
+    """Return the number of trials, of how many if they are fewer, and why the search has ended."""
+    count = sum(not trial.is_start for trial in result.trials)
+    budget = result.study.budget
+    of = f" of {budget:,}" if count < budget else ""
+    return f"{count:,}{of} {'trial' if budget == 1 else 'trials'}: {result.ended}"
 
 
 def _print_nearest(trials: Sequence[Trial]) -> None:

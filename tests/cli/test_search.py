@@ -49,6 +49,7 @@ def study(mine: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
                  "-b", f"{mine}:near", "--method", "grid",
                  "--rule", f"{mine}:dull", "--out", folder)  # fmt: skip
     assert result.exit_code == 0, result.output
+    assert "11 trials: the method has finished" in result.output
     assert "best: trial 4, near 0 (start -0.09)" in result.output
     assert "coating.specularity = 0.3" in result.output
     assert "6 trials failed:\n  6  too shiny" in result.output

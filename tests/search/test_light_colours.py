@@ -125,14 +125,14 @@ class TestOrder:
 
     def test_else_it_climbs_to_the_best(self) -> None:
         method = LightColours(self.problem(120, steps=5))
-        points = list(self.drive(method))
+        points = list(islice(self.drive(method), 120))
         assert method.size == 3**3 * 5**3
         assert len(points) == len({tuple(point) for point in points}) == 120
         assert max(-np.abs(point - 2.0).sum() for point in points) == 0.0
 
     def test_a_new_one_told_the_same_goes_on_alike(self) -> None:
         problem = self.problem(90, steps=4)
-        one = np.array(list(self.drive(LightColours(problem))))
+        one = np.array(list(islice(self.drive(LightColours(problem)), 90)))
         other = np.array(list(islice(self.drive(LightColours(problem)), 60)))
         assert (one[:60] == other).all()
 

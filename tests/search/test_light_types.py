@@ -9,7 +9,7 @@ import pytest
 
 from optisense.design import SensorDesign
 from optisense.errors import SearchError
-from optisense.search import SearchSpace
+from optisense.search import SearchSpace, run_study, search
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.methods import Problem, find, make
 from optisense.search.methods._light_types import FOR_ALL, FOR_GROUPS, FOR_LIGHTS, LightTypes
@@ -34,10 +34,10 @@ def drive(
 ) -> list[tuple[str, np.ndarray]]:
     """The stage and the point of each trial, in order."""
     method = make("types", Problem(space, ("score",), budget, seed=1))
-    tried = []
-    while len(points := method.ask()):
+    tried: list[tuple[str, np.ndarray]] = []
+    while len(tried) < budget and len(points := method.ask()):
         stage = method.stage  # type: ignore[attr-defined]
-        tried += [(stage, point) for point in points]
+        tried += [(stage, point) for point in points[: budget - len(tried)]]
         method.tell(points, [Outcome({"score": score(point)}) for point in points])
     return tried
 
@@ -82,6 +82,18 @@ def test_a_small_space_is_tried_whole(mini: SensorDesign) -> None:
     lights = {f"lights.{name}.lights[{k}].model": TYPES[:2] for k in range(5)}
     small = SearchSpace(lights).bind(mini)
     assert len(drive(small, lambda point: -float(point.sum()), 1000)) == 2**5
+
+
+def test_a_larger_budget_goes_on_until_all_are_tried(mini: SensorDesign) -> None:
+    name = next(iter(mini.lights))
+    lights = {f"lights.{name}.lights[{k}].model": TYPES[:2] for k in range(5)}
+    result = search(mini, lights, lambda design: 1.0, method="types", budget=6)
+    assert len(result.trials) == 1 + 6
+    more = run_study(result.study, limit=20)
+    assert len(more.trials) == 1 + 20 and more.ended == "the budget is spent"
+    every = run_study(result.study, limit=100)
+    assert len({trial.vector.tobytes() for trial in every.trials}) == 2**5
+    assert len(every.trials) == 1 + 2**5 and every.ended == "the method has finished"
 
 
 def test_the_usual_budget_is_within_reason(space: BoundSpace) -> None:

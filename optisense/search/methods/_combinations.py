@@ -27,8 +27,7 @@ Stage = tuple[str, list[Combination]]
 
 
 class Combinations(Method):
-    """Base class of methods that try combinations of levels by a plan, each once, until the budget
-    is spent.
+    """Base class of methods that try combinations of levels by a plan, each once.
 
     Attributes:
         levels: coordinates that each parameter may take.
@@ -44,7 +43,6 @@ class Combinations(Method):
             self.size *= len(each)
         self._known: dict[Combination, Rank] = {}
         self._asked: list[Combination] = []
-        self._left = problem.budget
         self._random = problem.random(self.name)
         self._stages = self.plan()
         self.stage = ""
@@ -56,13 +54,11 @@ class Combinations(Method):
     def ask(self) -> FloatArray:
         """Return combinations that were not tried yet, (k, n)."""
         self._asked = []
-        if self._left > 0:
-            for stage, wanted in self._stages:
-                new = [each for each in dict.fromkeys(wanted) if each not in self._known]
-                if new:
-                    self.stage, self._asked = stage, new[: self._left]
-                    self._left -= len(self._asked)
-                    break
+        for stage, wanted in self._stages:
+            new = [each for each in dict.fromkeys(wanted) if each not in self._known]
+            if new:
+                self.stage, self._asked = stage, new
+                break
         return np.array(
             [
                 [levels[k] for levels, k in zip(self.levels, combination, strict=True)]
@@ -108,14 +104,13 @@ class Combinations(Method):
             here = best
 
     def climb_again(self, stage: str, movable: Sequence[Sequence[int]]) -> Iterator[Stage]:
-        """Climb from random changes of the best combination, until the budget is spent or all are
-        known.
+        """Climb from random changes of the best combination until half of all are known, and then
+        try the others in turn, since random changes would find the last ones hardly ever. All are
+        tried in turn if the budget allows it.
         """
-        if self.size <= self.problem.budget:
-            yield from self.everything(stage)
-            return
-        while True:
+        while self.size > self.problem.budget and 2 * len(self._known) < self.size:
             yield from self.climb(stage, movable, self._perturbed(self.best()))
+        yield from self.everything(stage)
 
     def best(self) -> Combination:
         """Return the best combination so far; before there is one, that nearest to the design."""

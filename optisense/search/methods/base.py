@@ -31,7 +31,8 @@ class Problem:
         space: space of the points that the method may propose.
         objectives: names of the goals; methods for one goal maximise the first.
         requirements: conditions that the best design must meet, as texts.
-        budget: largest number of trials; a method need not use them all.
+        budget: number of trials to plan for. A method need not use them all; the study ends at its
+            budget, and a resumed study may have a larger one than this.
         seed: seed of the method's random numbers.
     """
 
