@@ -319,6 +319,14 @@ def test_differences_of_trials_are_asked_for_together(mini: SensorDesign) -> Non
     assert len(first) == 5
 
 
+def test_scores_without_derivatives_of_rays_may_depend_on_other_numbers(
+    mini: SensorDesign,
+) -> None:
+    """The power is traced by no ray, as are functions of the design in a file."""
+    found = method(mini, "power", lights__red__flux=(1.0, 5.0))
+    assert found.source is GradientSource.TRIALS
+
+
 @pytest.mark.parametrize(
     ("space", "objective", "message"),
     [

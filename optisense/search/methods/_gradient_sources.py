@@ -51,7 +51,8 @@ def source_of(problem: Problem) -> tuple[GradientSource, list[str]]:
     that points move.
 
     Raises:
-        SearchError: a parameter is a choice or an integer, or no parameter changes the score.
+        SearchError: a parameter is a choice or an integer, or, for derivatives of rays, changes no
+            ray.
     """
     space, objective = problem.space, problem.objectives[0]
     for number in np.flatnonzero(space.discrete):
@@ -67,10 +68,9 @@ def source_of(problem: Problem) -> tuple[GradientSource, list[str]]:
     if not rays_only:
         relit = all(RELIGHTS.search(name) for name in space.names)
         return (GradientSource.LAYERS if relit else GradientSource.TRIALS), []
-    parts = moving_parts(space)  # raises an error for a parameter that changes no ray
     if SmoothScore.of(objective) is None:
         return GradientSource.TRIALS, []
-    return GradientSource.RAYS, parts
+    return GradientSource.RAYS, moving_parts(space)
 
 
 class TrialDifferences:
