@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
+from scipy.stats import qmc
 
 from optisense.errors import SearchError
 from optisense.search.evaluation.outcome import Outcome
@@ -136,6 +139,23 @@ def test_cma_es_starts_at_the_design(valley: BoundSpace) -> None:
     away = (points - valley.start) / (valley.upper - valley.lower)
     assert np.abs(away.mean(axis=0)).max() < 4 * 0.01 / 20
     assert np.allclose(away.std(axis=0), 0.01, rtol=0.2)
+
+
+def test_an_interrupt_while_the_tables_of_points_load_is_not_lost(
+    two_numbers: BoundSpace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """SciPy loads them in compiled code that drops exceptions."""
+    made = qmc.Sobol
+
+    def loading(*args: Any, **given: Any) -> Any:
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        return made(*args, **given)
+
+    monkeypatch.setattr(qmc, "Sobol", loading)
+    with pytest.raises(KeyboardInterrupt):
+        make("random", Problem(two_numbers, ("s",), 10))
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_cma_es_searches_a_single_number() -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from optisense.array_types import FloatArray
 from optisense.search.evaluation.outcome import Outcome
@@ -26,7 +29,8 @@ class Random(Method):
         from scipy.stats import qmc  # takes half a second to load
 
         super().__init__(problem)
-        self._points = qmc.Sobol(problem.space.size, seed=problem.random(self.name))
+        with _held_interrupts():
+            self._points = qmc.Sobol(problem.space.size, seed=problem.random(self.name))
 
     def ask(self) -> FloatArray:
         """Return the next points, (k, n)."""
@@ -34,3 +38,25 @@ class Random(Method):
 
     def tell(self, vectors: FloatArray, outcomes: Sequence[Outcome]) -> None:
         """Ignore the outcomes of a generation (k, n): random search does not learn."""
+
+
+@contextmanager
+def _held_interrupts() -> Iterator[None]:
+    """Hold Ctrl-C back until the end of the block, which is short.
+
+    SciPy loads the tables of Sobol's sequence in compiled code that drops exceptions: after a
+    KeyboardInterrupt there the search would go on, with tables that are not complete. Nothing
+    changes outside the main thread, where signals can't be handled, and where Ctrl-C is ignored.
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or not callable(before):
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if came:
+        before(came[0], None)

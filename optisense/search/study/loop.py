@@ -289,7 +289,7 @@ class StudyRun:
         changed = [
             f"{name} {then.get(name)} -> {now[name]}" for name in now if then.get(name) != now[name]
         ]
-        why = ", ".join(changed) or "another machine computes differently in the last digit"
+        why = ", ".join(changed) or "the versions of all packages are the same"
         self._notes.append(
             "the method would propose other points than when the study was begun "
             f"({why}): it continues from the stored trials"
