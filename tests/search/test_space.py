@@ -202,6 +202,13 @@ class TestTogether:
                 moved = np.subtract(after.position, before.position)
                 np.testing.assert_allclose(moved, [0.0, 0.0, -0.1], atol=1e-9)
 
+    def test_ranges_have_short_forms(self) -> None:
+        assert Together((1.0, 5.0, 4)) == Together(Continuous(1.0, 5.0, 4))
+        assert Together(["R", "G"]) == Together(Choice(["R", "G"]))
+        assert CagePoints((-1.0, 1.0), axes="x") == CagePoints(Continuous(-1.0, 1.0), axes="x")
+        with pytest.raises(SearchError, match="cage points need bounds or a reach"):
+            CagePoints(Choice(["R", "G"]))  # type: ignore[arg-type]
+
     def test_it_is_kept_with_a_study(self) -> None:
         space = SearchSpace({"lights.*.flux": Together(Continuous(1.0, 9.0, 3))})
         assert SearchSpace.from_plain(space.to_plain()).parameters == space.parameters

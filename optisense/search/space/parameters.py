@@ -134,7 +134,8 @@ class CagePoints:
     OptiSense paper, 0 to 1).
 
     Attributes:
-        range: bounds of each coordinate, or distance by which it may move.
+        range: bounds of each coordinate, or distance by which it may move; (low, high) and (low,
+            high, steps) are accepted too.
         points: indices of control points; None takes all.
         axes: letters of the coordinates that move.
         symmetry: "x", "y" or "z": mirror images across the middle of the cage's box along this axis
@@ -146,13 +147,24 @@ class CagePoints:
     axes: str = "xyz"
     symmetry: str | None = None
 
-    def __post_init__(self) -> None:
-        if self.points is not None:
-            object.__setattr__(self, "points", tuple(self.points))
-        if not self.axes or any(axis not in "xyz" for axis in self.axes):
-            raise SearchError(f"'{self.axes}' are not axes", hint="Give some of x, y, z: 'xz'")
-        if self.symmetry is not None and self.symmetry not in ("x", "y", "z"):
-            raise SearchError(f"there is no symmetry '{self.symmetry}'", hint="Give x, y or z")
+    def __init__(
+        self,
+        range: Continuous | Around | tuple[float, ...],
+        points: Iterable[int] | None = None,
+        axes: str = "xyz",
+        symmetry: str | None = None,
+    ) -> None:
+        spec = as_specification(range)
+        if not isinstance(spec, Continuous | Around):
+            raise SearchError("cage points need bounds or a reach")
+        if not axes or any(axis not in "xyz" for axis in axes):
+            raise SearchError(f"'{axes}' are not axes", hint="Give some of x, y, z: 'xz'")
+        if symmetry is not None and symmetry not in ("x", "y", "z"):
+            raise SearchError(f"there is no symmetry '{symmetry}'", hint="Give x, y or z")
+        object.__setattr__(self, "range", spec)
+        object.__setattr__(self, "points", None if points is None else tuple(points))
+        object.__setattr__(self, "axes", axes)
+        object.__setattr__(self, "symmetry", symmetry)
 
 
 Single = Continuous | Integer | Choice
@@ -164,10 +176,17 @@ class Together:
     """One parameter for all values that a path with a star stands for, as on a symmetric sensor.
 
     Attributes:
-        range: bounds or options that the values share, or the distance by which lights may move.
+        range: bounds or options that the values share, or the distance by which lights may move;
+            the short forms of `as_specification` are accepted too.
     """
 
     range: Single | Around
+
+    def __init__(self, range: Single | Around | tuple[float, ...] | list[Any]) -> None:
+        spec = as_specification(range)
+        if isinstance(spec, CagePoints | Together):
+            raise SearchError("what varies together needs bounds, options or a reach")
+        object.__setattr__(self, "range", spec)
 
 
 Specification = Single | Around | CagePoints | Together
@@ -243,10 +262,6 @@ def from_plain(data: Mapping[str, Any]) -> Specification:
         kind = _KINDS[given.pop("kind")]
         if kind in (Together, CagePoints):
             given["range"] = from_plain(given["range"])
-        if kind is Together and isinstance(given["range"], CagePoints | Together):
-            raise SearchError("what varies together needs bounds, options or a reach")
-        if kind is CagePoints and not isinstance(given["range"], Continuous | Around):
-            raise SearchError("cage points need bounds or a reach")
         return kind(**given)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise SearchError(f"a parameter can't be read: {error}", where=str(data)[:80]) from None
