@@ -11,7 +11,7 @@ from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import FolderInUseError, OptiSenseError, SearchError
 from optisense.search.evaluation.evaluator import Evaluator, Goal, as_goals
 from optisense.search.executors import Runner, Workers, create_runner
-from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors, ToleranceDistribution
+from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study.loop import StudyRun
 from optisense.search.study.plan import Plan
@@ -33,7 +33,7 @@ def search(
     options: Mapping[str, Any] | None = None,
     settings: Mapping[str, Any] | None = None,
     errors: ManufacturingErrors | Mapping[str, ToleranceDistribution | float] | None = None,
-    samples: int = SAMPLES,
+    samples: int | None = None,
     require: str | Sequence[str] = (),
     coarse_first: bool = False,
     apart: bool = True,
@@ -64,7 +64,7 @@ def search(
         settings: settings of the objectives (see `optisense.evaluate`).
         errors: manufacturing errors: if given, P10 over manufactured sensors is maximised instead
             of the plain score.
-        samples: number of manufactured sensors per trial.
+        samples: number of manufactured sensors per trial; 8 if None. It needs `errors`.
         require: conditions that the best design must meet, such as "coverage >= 0.55".
         coarse_first: whether trials get coarse scores (fewer photons and pixels, all presses in one
             image), and only the promising ones full scores.

@@ -244,6 +244,10 @@ class TestRobust:
         assert parts["p10"] < parts["p50"] < parts["p90"]
         assert len(parts["samples"]) == 101
 
+    def test_samples_without_errors_are_refused(self, grey: SensorDesign) -> None:
+        with pytest.raises(SearchError, match="without a manufacturing error"):
+            search(grey, {RED: (0.3, 0.9)}, "aoap", samples=8)
+
     def test_one_failure_in_ten_is_a_failure(self, grey: SensorDesign) -> None:
         def fragile(design: SensorDesign) -> float:
             if design.coating.reflectance[0] > 0.7:

@@ -48,7 +48,7 @@ class Plan:
     settings: Mapping[str, Any] | None = None
     apart: bool = True
     errors: ManufacturingErrors | None = None
-    samples: int = SAMPLES
+    samples: int | None = None
     requirements: Sequence[str] = ()
     coarse_first: bool = False
 
@@ -74,6 +74,7 @@ class Plan:
         evaluator = DesignEvaluator(
             bound, self.goals, settings, requirements=kept, apart=self.apart
         )
+        samples = self._samples()
         if self.errors is not None:
             self.errors.bind(design)
         if self.coarse_first:
@@ -107,10 +108,25 @@ class Plan:
             rules=rules,
             files=file_prints([*objectives, *rules]),
             errors=None if self.errors is None else self.errors.to_plain(),
-            samples=0 if self.errors is None else self.samples,
+            samples=samples,
             requirements=kept,
             coarse_first=self.coarse_first,
         )
+
+    def _samples(self) -> int:
+        """Return the number of manufactured sensors per trial; 0 without manufacturing errors.
+
+        Raises:
+            SearchError: the number is given without manufacturing errors.
+        """
+        if self.errors is not None:
+            return SAMPLES if self.samples is None else self.samples
+        if self.samples is not None:
+            raise SearchError(
+                "a number of manufactured sensors is given without a manufacturing error",
+                hint="Give an error, such as --error camera.position.z=0.1, or leave --samples out",
+            )
+        return 0
 
     def _refuse_coarse(
         self,
