@@ -1,4 +1,4 @@
-"""Escaping of text from untrusted files for a terminal, Markdown, HTML and spreadsheets.
+"""Escaping of text from untrusted files for a terminal, a shell, Markdown, HTML and spreadsheets.
 
 A design, a study or a library entry may come from a stranger. Its names and descriptions may hold
 characters that move the cursor or clear the screen, reverse the direction of the text after them,
@@ -10,6 +10,7 @@ from __future__ import annotations
 import html
 import json
 import re
+import shlex
 import unicodedata
 
 LINE_BREAKS = "\n\t"
@@ -44,6 +45,14 @@ def brief(text: str) -> str:
 def one_line(text: str) -> str:
     """Return a visible text with single spaces for all white space."""
     return visible(" ".join(text.split()))
+
+
+def argument(name: object) -> str:
+    """Return the name of a file or folder as an argument of a command that users copy to a shell:
+    quoted if it has spaces or other special characters, and behind ``./`` if it begins with a dash.
+    """
+    text = str(name)
+    return shlex.quote(f"./{text}" if text.startswith("-") else text)
 
 
 def markdown(text: str) -> str:

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 import optisense as ots
 from optisense.cli import app
-from optisense.text import cell, markdown, one_line, to_html, visible
+from optisense.text import argument, cell, markdown, one_line, to_html, visible
 
 EVIL = "a\x1b[2J\x1b]0;title\x07b\x00\x9bc\u202ed <script>alert(1)</script> | [x](http://x) =1+1"
 
@@ -83,3 +83,9 @@ def test_a_path_with_control_characters_is_refused(evil: Path) -> None:
     assert result.exit_code == 2
     assert "without control characters" in result.output
     assert "\x1b" not in result.output
+
+
+def test_a_name_in_a_command_is_one_argument_of_a_shell() -> None:
+    assert argument(Path("studies/one")) == "studies/one"
+    assert argument("my study's; rm") == """'my study'"'"'s; rm'"""
+    assert argument("-dash") == "./-dash"

@@ -13,6 +13,7 @@ from optisense.cli.console import handles_errors, messages, output
 from optisense.cli.options import DesignArgument, out_option
 from optisense.commands.options import MOST_MARGIN
 from optisense.errors import DesignError
+from optisense.text import argument
 
 if TYPE_CHECKING:
     from optisense.design import SensorDesign
@@ -230,7 +231,7 @@ def blend(
     if entry.c_min is None or entry.c_max is None:
         raise DesignError(
             f"cage '{cage}' has no c_min and c_max",
-            hint=f"Set them with: optisense cage range {design} {cage} ...",
+            hint=f"Set them with: optisense cage range {argument(design)} {cage} ...",
         )
     from optisense.design.cage import as_array
 

@@ -11,6 +11,7 @@ import typer
 
 from optisense.cli.console import handles_errors, messages, output
 from optisense.commands.adding import IesOptions, TuningOptions, above_0
+from optisense.text import argument
 
 if TYPE_CHECKING:
     from optisense.library import Added
@@ -165,7 +166,8 @@ def _from_tuning(
 
     if str(what) not in ("camera", "cameras"):
         raise typer.BadParameter(
-            f"a tuning file describes a camera: optisense library add camera --tuning {tuning}",
+            "a tuning file describes a camera: optisense library add camera --tuning "
+            f"{argument(tuning)}",
             param_hint="FILE",
         )
     if given.like is None:

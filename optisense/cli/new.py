@@ -13,6 +13,7 @@ from optisense.cli.output_folder import take_folder
 from optisense.errors import DesignError, OptiSenseError, OutputError
 from optisense.folders import is_empty
 from optisense.length_units import MM_PER, Units
+from optisense.text import argument
 
 if TYPE_CHECKING:
     from optisense.sensors.from_meshes import Recipe
@@ -157,9 +158,10 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
             save_recipe(recipe, folder / RECIPE_FILE)
             _print_guesses(recipe, guessed)
             what = "Your answers are" if asked else "The guessed recipe is"
+            named = f"{argument(folder / RECIPE_FILE)} {argument(folder)}"
             messages.print(
                 f"{what} saved in {folder / RECIPE_FILE}. Correct it or the CAD files, then:\n"
-                f"  optisense new --from-meshes {folder / RECIPE_FILE} {folder} --overwrite"
+                f"  optisense new --from-meshes {named} --overwrite"
             )
         raise
     save_design(made.design, folder, new=is_new)
@@ -256,12 +258,13 @@ def _print_guesses(recipe: Recipe, guessed: bool) -> None:
 
 def _print_next_steps(folder: Path, recipe: Path | None = None) -> None:
     output.print(f"{folder / 'design.yaml'}")
+    named = argument(folder)
     if recipe is not None:
         output.print(f"{recipe}")
         messages.print(
-            f"Change it:   edit the recipe, then optisense new --from-meshes {recipe} {folder} "
-            "--overwrite",
+            "Change it:   edit the recipe, then optisense new --from-meshes "
+            f"{argument(recipe)} {named} --overwrite",
             style="dim",
         )
-    messages.print(f"Look at it:  optisense check {folder}", style="dim")
-    messages.print(f"Render it:   optisense render {folder} --out picture", style="dim")
+    messages.print(f"Look at it:  optisense check {named}", style="dim")
+    messages.print(f"Render it:   optisense render {named} --out picture", style="dim")

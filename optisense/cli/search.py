@@ -31,6 +31,7 @@ from optisense.cli.search_result import print_result, summary
 from optisense.cli.searching import search_progress
 from optisense.commands.searching import SearchOptions
 from optisense.errors import OptiSenseError
+from optisense.text import argument
 
 if TYPE_CHECKING:
     from optisense.search import Study
@@ -127,7 +128,8 @@ def search(
             print_result(result, out)
     if result.interrupted:
         messages.print(
-            f"interrupted: all trials are kept; continue with optisense search --resume --out {out}"
+            "interrupted: all trials are kept; continue with optisense search --resume --out "
+            f"{argument(out)}"
         )
         raise typer.Exit(EXIT_INTERRUPTED)
     long = time.monotonic() - began >= VERIFIED_FROM
@@ -145,7 +147,8 @@ def _verify(study: Path, variant: str) -> None:
     from optisense.commands.sampling import VerifyOptions
 
     folder = study / VERIFY_FOLDER
-    output.print(f"Quick verification of the best design (in full: optisense verify {study}):")
+    full = f"optisense verify {argument(study)}"
+    output.print(f"Quick verification of the best design (in full: {full}):")
     try:
         print_comparison(
             compare(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from optisense.cli.console import output, print_notes, table_of
+from optisense.text import argument
 
 if TYPE_CHECKING:
     from optisense.search import SearchResult, Study, Trial
@@ -100,8 +101,9 @@ def print_result(result: SearchResult, out: Path) -> None:
         by = f" by {name}, the first objective" if _several(result) else ""
         output.print(f"no trial is better than the start{by}")
     elif not result.interrupted:
-        output.print(f"Apply it:   optisense apply {out} --trial best --out better", style="dim")
-        output.print(f"Verify it:  optisense verify {out}", style="dim")
+        named = argument(out)
+        output.print(f"Apply it:   optisense apply {named} --trial best --out better", style="dim")
+        output.print(f"Verify it:  optisense verify {named}", style="dim")
 
 
 def _end(result: SearchResult) -> str:

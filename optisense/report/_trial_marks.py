@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -16,7 +15,7 @@ from optisense.report._drawing import figure_uri
 from optisense.report._pictures import data_uri
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
-from optisense.text import visible
+from optisense.text import argument, visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -126,7 +125,7 @@ def page_data(
     names = study.space.names
     shown = list(strongest[:MOST_VALUES]) or list(range(min(len(names), MOST_VALUES)))
     return {
-        "command": f"optisense apply {shlex.quote(folder)} --trial",
+        "command": f"optisense apply {argument(folder)} --trial",
         "objectives": list(study.settings.names),
         "parameters": [names[number] for number in shown],
         "trials": {

@@ -17,6 +17,7 @@ from optisense.search.study.loop import StudyRun
 from optisense.search.study.plan import Plan
 from optisense.search.study.progress import SearchProgressCallback, SearchResult
 from optisense.search.study.study import Study
+from optisense.text import argument
 
 
 def search(
@@ -163,7 +164,8 @@ def _hint_after(error: OptiSenseError, study: Study) -> str | None:
     trials = study.trials
     if trials or not study.is_new:
         kept = f"{len(trials)} finished trial{'' if len(trials) == 1 else 's'}"
-        advice = f"The study keeps its {kept}: continue with --resume --out {study.folder}"
+        named = argument(study.folder)
+        advice = f"The study keeps its {kept}: continue with --resume --out {named}"
     else:
         study.discard()
         advice = "No trial was finished, so the study was removed"

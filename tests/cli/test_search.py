@@ -144,6 +144,14 @@ def test_json(study: Path) -> None:
     assert not found["interrupted"]
 
 
+def test_commands_can_be_copied_to_a_shell(study: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "my study"
+    shutil.copytree(study, copy)
+    result = run("--resume", "--out", copy)
+    assert f"optisense apply '{copy}' --trial best" in result.output
+    assert f"optisense verify '{copy}'" in result.output
+
+
 def test_a_start_that_is_not_beaten(mine: Path, tmp_path: Path) -> None:
     result = run("gelsight-mini-ideal", "--vary", "coating.specularity=0.7:1:2",
                  "-b", f"{mine}:near", "--method", "grid",
