@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from optisense.calibration import _camera_changes
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
+from optisense.design.kinds import KindModel
 from optisense.design.lenses.radial_shading import RadialShading
 from optisense.design.posing import with_camera_turned
 from optisense.design.responses.gamma_curve import GammaCurve
@@ -54,6 +56,28 @@ DISTORTION_RANGE = 0.1
 _LETTERS = "RGB"
 
 
+def notes_on_kinds(design: SensorDesign, families: Sequence[str]) -> list[str]:
+    """Return a note on each component of the camera that is not fitted, as it is of another kind
+    than its family fits.
+
+    Args:
+        families: names of the families that are fitted.
+    """
+    fitted: dict[str, tuple[str, type[KindModel], str]] = {
+        "tone": ("tone_curve", GammaCurve, "gamma"),
+        "shading": ("shading", RadialShading, "radial"),
+    }
+    notes = []
+    for family, (name, kind, word) in fitted.items():
+        own = getattr(design.camera, name)
+        if family in families and own is not None and not isinstance(own, kind):
+            notes.append(
+                f"'{family}' is not fitted, as the camera's {name} is of kind '{own.kind}'; "
+                f"a fit changes kind '{word}' only, so set that in the design to fit it"
+            )
+    return notes
+
+
 def lit_channels(design: SensorDesign) -> list[int]:
     """Return the channels 0 to 2 (R, G, B) in which a light of the design emits."""
     return [
@@ -82,9 +106,11 @@ def colours(design: SensorDesign) -> list[FitQuantity]:
 
 
 def tone(design: SensorDesign) -> list[FitQuantity]:
-    """Return the exponent of the tone curve."""
+    """Return the exponent of the tone curve; a curve of another kind has none."""
     curve = design.camera.tone_curve
-    start = curve.gamma if isinstance(curve, GammaCurve) else GAMMA_START
+    if curve is not None and not isinstance(curve, GammaCurve):
+        return []
+    start = GAMMA_START if curve is None else curve.gamma
     return [
         FitQuantity(
             "camera.tone_curve.gamma", "exponent of the tone curve", "", start, 0.5, 5.0,
@@ -106,10 +132,14 @@ def black(design: SensorDesign) -> list[FitQuantity]:
 
 
 def shading(design: SensorDesign) -> list[FitQuantity]:
-    """Return strength of the lens shading in each channel in which a light emits, and its power."""
+    """Return strength of the lens shading in each channel in which a light emits, and its power; a
+    shading of another kind has neither.
+    """
     own, lit = design.camera.shading, lit_channels(design)
     green, red, blue, power = FALLOFF_START, FALLOFF_START, FALLOFF_START, SHADING_POWER
-    if isinstance(own, RadialShading):
+    if own is not None:
+        if not isinstance(own, RadialShading):
+            return []
         green, power = own.falloff, own.power
         red = green if own.red_falloff is None else own.red_falloff
         blue = green if own.blue_falloff is None else own.blue_falloff

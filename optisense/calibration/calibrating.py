@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from optisense.array_types import FloatArray
 from optisense.calibration._body_changes import with_single_lights
+from optisense.calibration._camera_families import notes_on_kinds
 from optisense.calibration._cross_readings import realism_and_readings
 from optisense.calibration._fit_rounds import FitRounds, Progress
 from optisense.calibration._fitted_numbers import (
@@ -70,6 +71,7 @@ def calibrate(
     full, seen, notes = usable(photographs, refine=chosen_settings.refine)
     chosen = quantities_of(design, chosen_settings.families, chosen_settings.asked)
     held_out = chosen_settings.indices_held_out(full)
+    notes += notes_on_kinds(design, chosen_settings.families)
     notes += _refuse_too_few(full, chosen, held_out)
     model = OpticalModel(design, variant)
     check_shape(full, model)

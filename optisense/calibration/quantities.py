@@ -23,6 +23,15 @@ from optisense.design.responses import PictureChain
 from optisense.design.responses.gamma_curve import GammaCurve
 from optisense.errors import CalibrationError
 
+STARTS: dict[str, Any] = {
+    "colour_matrix": np.eye(3).tolist(),
+    "tone_curve": {"kind": "gamma"},
+    "stray_light": (0.0, 0.0, 0.0),
+    "shading": {"kind": "radial"},
+}
+"""Components that a camera without them gets before its numbers are set; these have no effect, or
+their numbers are all set."""
+
 
 def quantities_of(
     design: SensorDesign, families: Sequence[str], asked: Sequence[tuple[str, float, float]] = ()
@@ -82,7 +91,7 @@ def designed(
         DesignError: the numbers do not fit together.
     """
     values = {each.path: each.value(float(step)) for each, step in zip(chosen, steps, strict=True)}
-    found = _prepared(design, values)
+    found = _prepared(design, [each.path for each in chosen])
     for each in chosen:
         value = values[each.path]
         change = each.change
@@ -90,26 +99,16 @@ def designed(
     return found
 
 
-def _prepared(design: SensorDesign, values: dict[str, float]) -> SensorDesign:
-    """Return the design with the components of the camera whose numbers are set."""
-    camera: dict[str, Any] = {}
-    if any(path.startswith("camera.colour_matrix") for path in values):
-        own = design.camera.colour_matrix
-        camera["colour_matrix"] = np.eye(3).tolist() if own is None else own
-    if "camera.tone_curve.gamma" in values:
-        camera["tone_curve"] = {"kind": "gamma", "gamma": values["camera.tone_curve.gamma"]}
-    if any(path.startswith("camera.stray_light") for path in values):
-        camera["stray_light"] = design.camera.stray_light or (0.0, 0.0, 0.0)
-    shading = {
-        path.rpartition(".")[2]: value
-        for path, value in values.items()
-        if path.startswith("camera.shading.")
-    }
-    if shading:
-        camera["shading"] = {"kind": "radial", **shading}
+def _prepared(design: SensorDesign, paths: Sequence[str]) -> SensorDesign:
+    """Return the design with the components of the camera that numbers at these paths belong to.
+
+    Those that the design has stay as they are, with all of their other numbers.
+    """
     found = design
-    for name, value in camera.items():
-        found = set_value(found, f"camera.{name}", value)
+    for name, start in STARTS.items():
+        belongs = any(path.startswith((f"camera.{name}.", f"camera.{name}[")) for path in paths)
+        if belongs and getattr(design.camera, name) is None:
+            found = set_value(found, f"camera.{name}", start)
     return found
 
 
@@ -139,7 +138,7 @@ def chain_with(
         elif each.path.startswith("camera.shading."):
             shading[each.path.rpartition(".")[2]] = value
     if shading:
-        changed["shading"] = RadialShading(**shading)
+        changed["shading"] = (chain.shading or RadialShading()).model_copy(update=shading)
     if stray:
         own = chain.stray_light or (0.0, 0.0, 0.0)
         changed["stray_light"] = tuple(stray.get(channel, own[channel]) for channel in range(3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,12 +23,14 @@ from optisense.calibration.calibrating import calibrate
 from optisense.calibration.families import chosen_families
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.quantities import designed, quantities_of
-from optisense.calibration.realism import distances
+from optisense.calibration.realism import Realism, distances
+from optisense.calibration.result import Calibration
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.cli import app
 from optisense.design import Status, get_value, set_value
 from optisense.errors import CalibrationError
+from optisense.sensors import gelsight_mini_ideal
 
 from .conftest import PHOTONS, PLACES, SMALLER, numbers_of_fit
 
@@ -241,6 +244,36 @@ def test_a_design_is_fitted_and_marked(small_photographs: Photographs, tmp_path:
     assert "press-03.png" in page
     assert "<script" not in page
     assert CalibrationSettings().rounds >= 1
+
+
+@pytest.mark.parametrize(
+    ("unexplained", "ratio", "words"),
+    [
+        (0.0101, 36.5, "as well as before: 0.010 of their energy is unexplained, 0.010 before."),
+        (0.0101, 23.1, "; but the untouched sensor worse: 23.1 dB, 37.0 before. Keep the design"),
+        (0.005, 37.0, "better: 0.005"),
+        (0.02, 37.0, "worse: 0.020 of their energy is unexplained, 0.010 before. Keep the design"),
+    ],
+)
+def test_a_verdict_is_about_the_background_too(
+    unexplained: float, ratio: float, words: str
+) -> None:
+    def side(unexplained: float, ratio: float) -> SimpleNamespace:
+        press = SimpleNamespace(name="a", unexplained=unexplained)
+        background = SimpleNamespace(ratio=ratio)
+        return SimpleNamespace(realism=Realism(background, (press,), 1.0))  # type: ignore[arg-type]
+
+    found = Calibration(
+        gelsight_mini_ideal(),
+        1.0,
+        (),
+        (),
+        side(0.01, 37.0),
+        side(unexplained, ratio),
+        ("a",),
+        (),  # type: ignore[arg-type]
+    )
+    assert words in found.verdict()
 
 
 def test_an_interrupted_calibration_goes_on_where_it_was(

@@ -7,8 +7,9 @@ import pytest
 
 import optisense as ots
 from optisense.calibration._body_changes import with_single_lights
+from optisense.calibration._camera_families import notes_on_kinds
 from optisense.calibration.families import FAMILIES, LEDS, USUAL, chosen_families
-from optisense.calibration.quantities import designed, quantities_of
+from optisense.calibration.quantities import chain_with, designed, quantities_of
 from optisense.design import SensorDesign, get_value, set_value
 from optisense.sensors import check, gelsight_mini, gelsight_mini_ideal
 
@@ -103,6 +104,33 @@ def test_channels_without_light_have_no_share_and_no_dimming() -> None:
         "camera.shading.red_falloff",
         "camera.shading.power",
     }
+
+
+def test_curves_and_shadings_of_other_kinds_stay_as_they_are() -> None:
+    """Those of the library's cameras have no exponent, and no strength."""
+    other = set_value(
+        gelsight_mini_ideal(),
+        "camera.tone_curve",
+        {"kind": "points", "points": [[0.0, 0.0], [0.1, 0.3], [1.0, 1.0]]},
+    )
+    other = set_value(other, "camera.shading", {"kind": "table", "gain": [[1.0, 1.2], [1.3, 1.1]]})
+    assert quantities_of(other, ["tone", "shading"]) == []
+    notes = notes_on_kinds(other, USUAL)
+    assert ["'tone'" in note or "'shading'" in note for note in notes] == [True, True]
+    assert "'points'" in notes[0] and "'table'" in notes[1]
+    assert notes_on_kinds(other, ["powers"]) == notes_on_kinds(gelsight_mini_ideal(), USUAL) == []
+
+
+def test_a_fitted_shading_is_corrected_as_before() -> None:
+    shading = {"kind": "radial", "falloff": 0.6, "power": 2.0, "corrected": 0.8}
+    design = set_value(gelsight_mini_ideal(), "camera.shading", shading)
+    chosen = quantities_of(design, ["shading"])
+    steps = np.full(len(chosen), 0.3)
+    made = designed(design, chosen, steps).camera
+    assert made.shading is not None and made.shading.corrected == 0.8
+    assert made.shading.falloff == pytest.approx(0.6 + 0.3 * 0.3)  # type: ignore[attr-defined]
+    chain = chain_with(design.camera.picture_chain(), chosen, steps)
+    assert chain.shading == made.shading
 
 
 def test_single_lights_together_are_the_group() -> None:
