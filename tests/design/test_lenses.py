@@ -18,7 +18,7 @@ from optisense.design.lenses.blur import blurred
 from optisense.design.lenses.defocus import Defocus
 from optisense.design.lenses.film import film_places
 from optisense.design.lenses.radial_shading import RadialShading
-from optisense.design.projection import directions, folding_angle, picture_places
+from optisense.design.projection import directions, folding_angle, ideal_places, picture_places
 from optisense.errors import DesignError
 
 BARREL = BrownConrady(k1=-0.28, k2=0.07, p1=1e-3, p2=-2e-3, k3=-0.008)
@@ -120,6 +120,17 @@ def test_a_lens_that_folds_is_found_where_it_folds() -> None:
     assert folding_angle(design.camera) == pytest.approx(45.0, abs=0.2)
     problems = [each for each in check_design(design) if each.severity == "error"]
     assert len(problems) == 1 and "folds 45 degrees off its axis" in problems[0].message
+
+
+def test_a_lens_that_is_nearly_flat_on_the_way_to_the_corners_does_not_fold() -> None:
+    """The slope of its radial function is 0.094 at 1.41 and larger elsewhere: the corner, shown at
+    1.55, is seen at 2.176."""
+    numbers = {"k1": -0.2598991426334218, "k2": 0.019080160189376538, "k3": 0.0048554078895102545}
+    lens = {"kind": "brown-conrady", **numbers}
+    camera = mini(fov=102.2463429033123, distortion=lens).camera
+    assert folding_angle(camera) is None
+    corner = ideal_places(camera, np.ones(1), np.ones(1))
+    assert np.hypot(*corner) == pytest.approx(2.176, abs=1e-3)
 
 
 def test_only_the_lens_that_it_is_made_for_is_distorted_by_a_model() -> None:

@@ -24,6 +24,9 @@ from optisense.sensors import SENSORS
 BARREL = {"kind": "brown-conrady", "k1": -0.3, "k2": 0.05, "p1": 0.004, "centre": [0.52, 0.49]}
 FISHEYE = {"kind": "kannala-brandt", "k1": -0.04, "k2": 0.003}
 
+NEARLY_FLAT = {"kind": "brown-conrady", "k1": -0.2599, "k2": 0.01908, "k3": 0.004855}
+"""A lens that shows a step outwards as a tenth of it, on the way to the corners."""
+
 BALL = ots.Contact(ots.Sphere(1.5), at=(3.0, 2.0), depth=0.8)
 
 
@@ -44,6 +47,7 @@ def rays_of(camera: RayCamera, x: Any, y: Any, pose: Pose | None = None) -> Any:
         {},
         {"distortion": BARREL},
         {"projection": "equidistant", "fov": 130.0, "distortion": FISHEYE},
+        {"fov": 102.25, "distortion": NEARLY_FLAT},
     ],
 )
 def test_rays_are_those_of_the_design(changes: dict[str, Any]) -> None:

@@ -11,8 +11,10 @@ Coefficients, signs and axes are those of OpenCV, whose calibrations can be ente
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Callable
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import Field
 
 from optisense.design.fields import Number
@@ -20,9 +22,9 @@ from optisense.design.kinds import KindModel
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
-NEWTON_STEPS = 12
-"""Number of Newton steps in `undistort`. Seven reach single precision for lenses that move the
-picture's corners by half of their distance from the middle.
+NEWTON_STEPS = 16
+"""Number of Newton steps in `undistort`, with those that are halved. Of 4,000 random lenses that do
+not fold up to the picture's corners, all are inverted to 1e-9 with 16, and 2 are not with 12.
 """
 
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
@@ -82,21 +84,38 @@ class LensDistortion(KindModel):
             numbers: coefficients, as from `coefficients`.
         """
 
-    def undistort(self, x: Any, y: Any, numbers: tuple[Any, ...]) -> tuple[Any, Any]:
+    def undistort(
+        self, x: Any, y: Any, numbers: tuple[Any, ...], select: Callable[..., Any] = np.where
+    ) -> tuple[Any, Any]:
         """Return the points (x, y) of the ideal image plane that the lens shows at positions.
 
-        Newton's method is used; where the lens folds, it does not converge.
+        Newton's method starts on the axis. A step that leads farther away or beyond a fold is
+        halved until it does not, so that the points are found wherever the lens does not fold on
+        the way to them; where it folds, the method does not converge.
 
         Args:
             x, y: positions as the lens shows them, arrays of one shape.
             numbers: coefficients, as from `coefficients`.
+            select: function of a mask and two arrays that returns the elements of the first one
+                where the mask is true, and those of the second one elsewhere.
         """
-        ideal_x, ideal_y = x, y
-        for _ in range(NEWTON_STEPS):
+
+        def state(ideal_x: Any, ideal_y: Any) -> tuple[Any, ...]:
             shown_x, shown_y = self.distort(ideal_x, ideal_y, numbers)
-            a, b, c, d = self.jacobian(ideal_x, ideal_y, numbers)
             off_x, off_y = shown_x - x, shown_y - y
-            inverse = 1.0 / (a * d - b * c)
-            ideal_x = ideal_x - (d * off_x - b * off_y) * inverse
-            ideal_y = ideal_y - (a * off_y - c * off_x) * inverse
-        return ideal_x, ideal_y
+            slopes = self.jacobian(ideal_x, ideal_y, numbers)
+            return ideal_x, ideal_y, off_x, off_y, off_x * off_x + off_y * off_y, *slopes
+
+        now = state(0.0 * x, 0.0 * y)
+        share = 1.0 + 0.0 * x
+        for _ in range(NEWTON_STEPS):
+            ideal_x, ideal_y, off_x, off_y, error, a, b, c, d = now
+            step = share / (a * d - b * c)
+            tried = state(
+                ideal_x - (d * off_x - b * off_y) * step, ideal_y - (a * off_y - c * off_x) * step
+            )
+            *_, new_error, a, b, c, d = tried
+            nearer = (new_error < error) & (a * d - b * c > 0.0)
+            now = tuple(select(nearer, new, old) for new, old in zip(tried, now, strict=True))
+            share = select(nearer, 1.0, 0.5 * share)
+        return now[0], now[1]

@@ -132,7 +132,7 @@ class RayCamera:
         shape = dr.opaque(mi.Float, self.height / self.width)
         y = -(v - (1 - 2 * down) * shape) * edge
         numbers = tuple(dr.detach(each) for each in lens)
-        ideal_x, ideal_y = distortion.undistort(dr.detach(x), dr.detach(y), numbers)
+        ideal_x, ideal_y = distortion.undistort(dr.detach(x), dr.detach(y), numbers, dr.select)
         a, b, c, d = distortion.jacobian(ideal_x, ideal_y, numbers)
         shown_x, shown_y = distortion.distort(ideal_x, ideal_y, lens)
         off_x, off_y = shown_x - x, shown_y - y
