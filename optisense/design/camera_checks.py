@@ -15,7 +15,7 @@ from optisense.design.arrangement import in_picture, skin_distances, straight_ra
 from optisense.design.camera import Camera
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
-from optisense.design.projection import folding_angle
+from optisense.design.projection import angle_across, folding_angle
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -37,6 +37,9 @@ WIDEST_FISHEYE = 280.0
 (Lensrentals, "Assembling the C-4 Optics 4.9mm f3.5 Hyperfisheye Prototype", 2019). Entaniya's M12
 280, a lens for small cameras, has 280 by its name (assumed, as its data sheet was not at hand).
 """
+
+ROUNDED = 1e-9
+"""Rounding error of an angle, degrees, by which it may exceed its limit."""
 
 NARROWEST = 1.0
 """Smallest angle across the image, degrees. A sensing surface as wide as a fingertip, 17 mm, fills
@@ -77,7 +80,7 @@ ends at the skin does not. It covers rounding."""
 
 
 def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
-    """Return the problem of a field of view that no lens has.
+    """Return the problem of a field of view that no lens has; that of fisheyes is the true one.
 
     Args:
         where: place of the field of view in the design.
@@ -91,13 +94,15 @@ def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
             )
         ]
     if camera.projection == "equidistant":
-        if camera.fov <= WIDEST_FISHEYE:
+        folds = folding_angle(camera)
+        across = angle_across(camera) if folds is None or folds >= 180.0 else camera.fov
+        if across <= WIDEST_FISHEYE + ROUNDED:
             return []
         return [
             Diagnostic(
-                f"no fisheye lens sees {camera.fov:g} degrees",
+                f"no fisheye lens sees {across:.4g} degrees",
                 where,
-                f"Give {WIDEST_FISHEYE:g} degrees or less",
+                f"Give {WIDEST_FISHEYE:g} degrees or less; its distortion counts",
             )
         ]
     width, height = camera.resolution
@@ -162,7 +167,7 @@ def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagn
         meshes: deformed meshes, mm, by part.
     """
     found = lens_problems(design.camera, design.where("camera", "fov"))
-    found = found or distortion_problems(design.camera, design.where("camera", "distortion"))
+    found = found or uniqueness_problems(design)
     found = found or place_problems(design, meshes)
     return found[0] if found else None
 
@@ -293,20 +298,26 @@ def _distance(point: NDArray[np.float64], mesh: TriangleMesh) -> float:
     return float(np.linalg.norm(closest_points(part, point) - point, axis=1).min())
 
 
-def distortion_problems(camera: Camera, where: str) -> list[Diagnostic]:
-    """Return the problem of a distortion that folds within the picture.
-
-    Args:
-        where: place of the lens's distortion in the design.
-    """
-    angle = folding_angle(camera)
+def uniqueness_problems(design: SensorDesign) -> list[Diagnostic]:
+    """Return the problem of a lens that shows a direction twice within the picture."""
+    angle = folding_angle(design.camera)
     if angle is None:
         return []
+    if angle >= 180.0:
+        return [
+            Diagnostic(
+                "the picture reaches more than 180 degrees off the lens's axis, where it shows the "
+                "same directions again",
+                design.where("camera", "fov"),
+                "Give a smaller field of view (fov): it is that across the width, and the corners "
+                "are farther off the axis, as are top and bottom of a tall picture",
+            )
+        ]
     return [
         Diagnostic(
             f"the lens's distortion folds {angle:.3g} degrees off its axis, inside the picture: "
             "points beyond are shown twice, or some pixels show nothing",
-            where,
+            design.where("camera", "distortion"),
             "Give coefficients nearer to 0, or a smaller field of view (fov); a calibration is "
             "valid only where its marks were",
         )

@@ -12,9 +12,9 @@ from optisense.design.addressing import get_value
 from optisense.design.arrangement import overlaps
 from optisense.design.cage_checks import cage_problems, half_caged
 from optisense.design.camera_checks import (
-    distortion_problems,
     lens_problems,
     place_problems,
+    uniqueness_problems,
     view_problems,
 )
 from optisense.design.limits import placed_things, unit_slips
@@ -69,7 +69,7 @@ def check_design(
         problems += _check_mesh(design, name, meshes)
     problems += unit_slips(design)
     problems += lens_problems(design.camera, design.where("camera", "fov"))
-    problems += distortion_problems(design.camera, design.where("camera", "distortion"))
+    problems += uniqueness_problems(design)
     of_kinds = _check_kinds(design)
     problems += [] if of_kinds else index_problems(design)  # which calls methods of kinds
     problems += _check_finishes(design, meshes)

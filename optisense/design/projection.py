@@ -109,23 +109,31 @@ def _largest_height(camera: Camera) -> float:
     return float(np.nanmax(np.hypot(*ideal_places(camera, across, down))))
 
 
+def angle_across(camera: Camera) -> float:
+    """Return the angle that a fisheye sees across the picture, degrees, with its distortion."""
+    middle = 0.5 if camera.distortion is None else camera.distortion.centre[1]
+    x, _ = ideal_places(camera, np.array([0.0, 1.0]), np.full(2, middle))
+    return float(np.degrees(np.abs(x).sum()))
+
+
 def folding_angle(camera: Camera) -> float | None:
     """Return the angle off the axis at which a lens folds within the picture, degrees.
 
     Beyond this angle the distortion has no inverse: two directions are shown at one position, and
-    others nowhere.
+    others nowhere. Beyond 180 degrees, a fisheye shows the directions of smaller angles again.
 
     Returns:
         Angle, or None for a lens that shows each point of the picture once.
     """
     lens = camera.distortion
-    if lens is None:
-        return None
-    numbers = lens.coefficients()
     along = np.linspace(0.0, 1.0, FOLD_PLACES)
     across, down = np.meshgrid(along, along)
     shown = shown_places(camera, across, down)
     ideal = ideal_places(camera, across, down)
+    again = camera.projection == "equidistant" and bool((np.hypot(*ideal) > np.pi).any())
+    if lens is None:
+        return 180.0 if again else None
+    numbers = lens.coefficients()
     with np.errstate(all="ignore"):
         off = np.hypot(*(np.array(lens.distort(ideal[0], ideal[1], numbers)) - shown))
         found = off <= UNDISTORTED_TO * np.maximum(1.0, np.hypot(*shown))
@@ -133,7 +141,9 @@ def folding_angle(camera: Camera) -> float | None:
         a, b, c, d = lens.jacobian(way * ideal[0], way * ideal[1], numbers)
         unfolded = (a * d - b * c > 0.0).all(axis=0)
     bad = ~(found & unfolded)
-    return _first_fold(camera, shown[:, bad]) if bad.any() else None
+    if bad.any():
+        return _first_fold(camera, shown[:, bad])
+    return 180.0 if again else None
 
 
 def _first_fold(camera: Camera, shown: FloatArray) -> float:

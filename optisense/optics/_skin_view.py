@@ -10,7 +10,7 @@ from typing import TypeGuard
 import numpy as np
 
 from optisense.design import SensorDesign
-from optisense.design.camera_checks import distortion_problems
+from optisense.design.camera_checks import uniqueness_problems
 from optisense.design.problems import raise_problems
 from optisense.errors import RenderError
 from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh, nine_places
@@ -52,7 +52,7 @@ def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) 
 
     Raises:
         RenderError: the resolution is not two whole numbers, or below one pixel.
-        DesignError: the lens folds the picture over itself.
+        DesignError: the lens shows a direction twice.
     """
     camera = design.camera
     size: object = camera.resolution if resolution is None else resolution
@@ -65,7 +65,7 @@ def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) 
         raise RenderError(
             f"a picture of {width}x{height} pixels has no pixel", hint="Give e.g. 320x240"
         )
-    raise_problems(distortion_problems(camera, design.where("camera", "distortion")), "camera")
+    raise_problems(uniqueness_problems(design), "camera")
     return RayCamera(
         position=camera.position,
         direction=camera.direction,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,12 @@ from optisense import sensors
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
 from optisense.design._focus_checks import apparent_distances
 from optisense.design.camera_checks import camera_fault, view_shares
+from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.optics._skin_view import ray_camera
+
+BARREL = {"kind": "kannala-brandt", "k1": -0.0305, "k2": 0.001}
+"""Distortion by which a fisheye of 230 degrees sees 266 across the picture."""
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +66,28 @@ def test_angles_that_no_lens_has(
         (problem,) = found
         assert said in problem.message and problem.where == "camera.fov"
         assert fault(design) == problem.message
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"fov": 280.0, "resolution": [120, 160]}, "more than 180 degrees off"),
+        ({"fov": 280.0, "resolution": [160, 120]}, None),  # 175 degrees in the corners
+        ({"fov": 230.0, "distortion": BARREL}, "more than 180 degrees off"),  # 180.7 in the corners
+        ({"fov": 260.0, "distortion": BARREL}, "no fisheye lens sees 314.3 degrees"),
+    ],
+)
+def test_a_fisheye_shows_each_direction_once(
+    mini: SensorDesign, changes: dict[str, Any], said: str | None
+) -> None:
+    camera = mini.camera.model_dump(mode="json") | {"projection": "equidistant"} | changes
+    design = set_value(mini, "camera", camera)
+    if said is None:
+        assert fault(design) is None
+    else:
+        assert any(said in problem.message for problem in errors(design))
+        with pytest.raises(DesignError, match="same directions again"):
+            ray_camera(design)
 
 
 @pytest.mark.parametrize(
