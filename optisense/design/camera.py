@@ -135,8 +135,8 @@ class Camera(ImagingModel, Viewpoint):
         """Return the chain that turns radiance into the camera's picture.
 
         Args:
-            vergence: inverse (h, w), of any size, of the apparent distance of the scene, 1/mm. If
-                it is None, a blur that depends on depth is left out.
+            vergence: inverse (h, w) of the apparent distance of the scene over the camera's own
+                picture, of any size, 1/mm. If it is None, a blur that depends on depth is left out.
         """
         focus = None
         if self.blur is not None and (vergence is not None or not self.blur.by_depth):
@@ -152,6 +152,7 @@ class Camera(ImagingModel, Viewpoint):
             white_balance=self.white_balance,
             colour_matrix=self.colour_matrix,
             tone_curve=self.tone_curve,
+            film=self.resolution[1] / self.resolution[0],
         )
 
     @model_validator(mode="after")

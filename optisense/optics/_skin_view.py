@@ -75,6 +75,7 @@ def ray_camera(design: SensorDesign, resolution: tuple[int, int] | None = None) 
         height=int(height),
         equidistant=camera.projection == "equidistant",
         distortion=camera.distortion,
+        film=camera.resolution[1] / camera.resolution[0],
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,23 @@ def test_a_part_of_a_picture_is_blurred_as_it_is_in_the_whole() -> None:
     box = slice(26 - reach, 34 + reach), slice(36 - reach, 44 + reach)
     part = chain.respond(light[box], PictureWindow.part(light.shape, box))
     assert part[reach:-reach, reach:-reach] == pytest.approx(whole[26:34, 36:44], abs=1e-6)
+
+
+def test_a_picture_of_another_shape_shows_the_same_place_of_the_film_alike() -> None:
+    """Of a camera of 80x60: its rows 15 to 44, and a taller picture, which adds 15 to each side."""
+    camera = ots.load("builtin:gelsight-mini-ideal").camera
+    camera.shading = RadialShading(falloff=0.8, power=3.0)
+    focus = SoftFocus(np.linspace(0.0, 3.0 / WIDTH, 48).reshape(6, 8), HEIGHT / WIDTH)
+    chain = replace(camera.picture_chain(), focus=focus)
+    light = np.random.default_rng(2).random((HEIGHT, WIDTH, 3)).astype(np.float32)
+    whole, flat = chain.respond(light), field(1.0, 1.0, 1.0)
+    cut = chain.respond(light[15:45])
+    assert cut[13:-13] == pytest.approx(whole[28:32], abs=0.01)
+    sharp = camera.picture_chain()
+    assert sharp.respond(flat[15:45]) == pytest.approx(sharp.respond(flat)[15:45], abs=1e-6)
+    tall = sharp.respond(np.ones((90, WIDTH, 3), dtype=np.float32))
+    assert tall[15:75] == pytest.approx(sharp.respond(flat), abs=1e-6)
+    assert tall.min() == pytest.approx(0.2, abs=1e-6)  # beyond the film as in its corners
 
 
 def test_black_that_is_subtracted_is_0_and_black_that_is_not_is_the_level() -> None:

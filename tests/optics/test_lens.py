@@ -58,6 +58,13 @@ def test_rays_are_those_of_the_design(changes: dict[str, Any]) -> None:
     assert np.abs(rays_of(camera, x, y) - exact).max() < 1e-6
 
 
+def test_a_picture_of_another_shape_is_cut_out_of_the_distorted_camera() -> None:
+    model = OpticalModel(mini(distortion={**BARREL, "centre": [0.5, 0.7]}))
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(64) + 0.5, np.arange(24) + 0.5))
+    cut, whole = (model.camera((64, height)) for height in (24, 48))
+    assert rays_of(cut, x, y) == pytest.approx(rays_of(whole, x, y + 12.0), abs=1e-6)
+
+
 def test_ground_truth_follows_the_distorted_camera() -> None:
     """A pixel of the distorted camera sees what the plain one sees at the ideal place."""
     plain, bent = OpticalModel(mini()), OpticalModel(mini(distortion=BARREL))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from optisense.array_types import FloatingArray
+from optisense.array_types import FloatArray, FloatingArray
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,12 @@ class PictureWindow:
 
 @dataclass(frozen=True)
 class FilmPlaces:
-    """Positions on the film, arrays of one shape (h, w).
+    """Positions on the camera's film, arrays of one shape (h, w).
 
     Attributes:
-        across, down: coordinates, 0 to 1, from the left and the top border of the picture.
-        radius: distance from the middle; 1 in the corners.
+        across, down: coordinates, 0 to 1, from the left and the top border of the film. Those of a
+            picture that shows more above and below than the film are below 0 and above 1.
+        radius: distance from the middle; 1 in the corners of the film.
     """
 
     across: FloatingArray
@@ -53,8 +54,29 @@ class FilmPlaces:
     radius: FloatingArray
 
 
-def film_places(height: int, width: int) -> FilmPlaces:
-    """Return the centres (height, width) of the pixels of a picture."""
-    across, down = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
-    x, y = 2.0 * across - 1.0, (2.0 * down - 1.0) * height / width
-    return FilmPlaces(across, down, np.hypot(x, y) / np.hypot(1.0, height / width))
+def film_coordinates(
+    height: int, width: int, film: float | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Return the coordinates across (width,) and down (height,) of a picture's pixels on the film.
+
+    A picture is as wide as the film, and of another shape it shows less or more above and below.
+
+    Args:
+        film: height of the film over its width; that of the picture if None.
+    """
+    across, down = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+    if film is not None:
+        down = 0.5 + (down - 0.5) * (height / width / film)
+    return across, down
+
+
+def film_places(height: int, width: int, film: float | None = None) -> FilmPlaces:
+    """Return the centres (height, width) of the pixels of a picture.
+
+    Args:
+        film: height of the film over its width; that of the picture if None.
+    """
+    shape = height / width if film is None else film
+    across, down = np.meshgrid(*film_coordinates(height, width, film))
+    x, y = 2.0 * across - 1.0, (2.0 * down - 1.0) * shape
+    return FilmPlaces(across, down, np.hypot(x, y) / np.hypot(1.0, shape))

@@ -39,9 +39,11 @@ class RadialShading(LensShading):
     )
 
     def transmission(self, places: FilmPlaces) -> FloatingArray:
-        """Return the transmission (h, w, 3): 1 in the middle, 1 - falloff in the corners."""
+        """Return the transmission (h, w, 3): 1 in the middle, 1 - falloff in the corners and beyond
+        them.
+        """
         each = [
             self.falloff if own is None else own
             for own in (self.red_falloff, None, self.blue_falloff)
         ]
-        return 1.0 - np.multiply.outer(places.radius**self.power, np.array(each))
+        return 1.0 - np.multiply.outer(np.minimum(places.radius, 1.0) ** self.power, np.array(each))

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatingArray
 from optisense.design.fields import Colour, PositiveRGB
 from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurred, reach_of
-from optisense.design.lenses.film import PictureWindow, film_places
+from optisense.design.lenses.film import PictureWindow, film_coordinates, film_places
 from optisense.design.lenses.shading import LensShading
 from optisense.design.responses._tone_curve import ToneCurve
 from optisense.design.responses.base import CameraResponse
@@ -46,10 +46,13 @@ class SoftFocus:
     """Blur of a lens over the picture.
 
     Attributes:
-        deviation: standard deviation as a share of the picture's width, (h, w) or (1, 1).
+        deviation: standard deviation over the camera's film as a share of the picture's width,
+            (h, w) or (1, 1).
+        film: height of the film over its width; that of each picture if None.
     """
 
     deviation: FloatingArray
+    film: float | None = None
 
     @classmethod
     def of(
@@ -57,16 +60,18 @@ class SoftFocus:
     ) -> SoftFocus:
         """Return the blur of a lens; `vergence` (h, w), 1/mm, is needed if it depends on depth."""
         given = np.zeros((1, 1)) if vergence is None else vergence
-        return cls(np.atleast_2d(blur.deviation(camera, given)))
+        width, height = camera.resolution
+        return cls(np.atleast_2d(blur.deviation(camera, given)), height / width)
 
     def in_pixels(self, window: PictureWindow) -> FloatingArray:
         """Return the standard deviation (h, w), in pixels, for a window of a picture."""
         from scipy.ndimage import map_coordinates  # takes a third of a second to load
 
         rows, columns = self.deviation.shape
-        down = (np.arange(window.height)[window.rows] + 0.5) / window.height * rows - 0.5
-        across = (np.arange(window.width)[window.columns] + 0.5) / window.width * columns - 0.5
-        at = np.meshgrid(down, across, indexing="ij")
+        across, down = film_coordinates(window.height, window.width, self.film)
+        at = np.meshgrid(
+            down[window.rows] * rows - 0.5, across[window.columns] * columns - 0.5, indexing="ij"
+        )
         return window.width * map_coordinates(self.deviation, at, order=1, mode="nearest")
 
     def span(self, width: int) -> tuple[float, float]:
@@ -96,6 +101,8 @@ class PictureChain:
         white_balance: gains of R, G and B.
         colour_matrix: matrix by which its processor mixes R, G and B.
         tone_curve: curve of the stored levels, in place of the response's own curve.
+        film: height of the camera's film over its width, on which the shading is given; that of
+            each picture if None.
     """
 
     response: CameraResponse = field(default_factory=lambda: USUAL_RESPONSE)
@@ -108,6 +115,7 @@ class PictureChain:
     white_balance: PositiveRGB | None = None
     colour_matrix: ChannelMatrix | None = None
     tone_curve: ToneCurve | None = None
+    film: float | None = None
 
     @property
     def is_plain(self) -> bool:
@@ -185,8 +193,8 @@ class PictureChain:
 
     def _transmission(self, window: PictureWindow) -> FloatingArray:
         assert self.shading is not None
-        data = self.shading.model_dump_json()
-        return _transmission(_Shown(self.shading, data), window.height, window.width)[window.box]
+        shown = _Shown(self.shading, self.shading.model_dump_json())
+        return _transmission(shown, window.height, window.width, self.film)[window.box]
 
     def metered(
         self, radiance: FloatingArray, where: NDArray[np.bool_] | None = None
@@ -273,7 +281,7 @@ class _Shown:
 
 
 @lru_cache(maxsize=4)
-def _transmission(shown: _Shown, height: int, width: int) -> FloatingArray:
-    found = shown.shading.transmission(film_places(height, width)).astype(np.float32)
+def _transmission(shown: _Shown, height: int, width: int, film: float | None) -> FloatingArray:
+    found = shown.shading.transmission(film_places(height, width, film)).astype(np.float32)
     found.setflags(write=False)
     return found

@@ -41,6 +41,8 @@ class RayCamera:
         width, height: size of the image, pixels.
         equidistant: whether the lens is an equidistant fisheye instead of a perspective lens.
         distortion: the lens's distortion; None for an ideal lens.
+        film: height of the camera's own picture over its width, to which the distortion's centre
+            refers; that of the image if None.
     """
 
     position: tuple[float, float, float]
@@ -51,6 +53,7 @@ class RayCamera:
     height: int
     equidistant: bool = False
     distortion: LensDistortion | None = None
+    film: float | None = None
 
     def axes(self) -> np.ndarray:
         """Return the unit axes (3, 3) as rows: image right, image up and viewing direction."""
@@ -129,7 +132,7 @@ class RayCamera:
         across, down = distortion.centre
         edge = half if self.equidistant else dr.tan(half)
         x = (u + (1 - 2 * across)) * edge
-        shape = dr.opaque(mi.Float, self.height / self.width)
+        shape = dr.opaque(mi.Float, self.film or self.height / self.width)
         y = -(v - (1 - 2 * down) * shape) * edge
         numbers = tuple(dr.detach(each) for each in lens)
         ideal_x, ideal_y = distortion.undistort(dr.detach(x), dr.detach(y), numbers, dr.select)
