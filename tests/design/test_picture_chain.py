@@ -206,6 +206,25 @@ def test_automatic_exposure_fills_neither_sensor_nor_picture() -> None:
         assert 0.3 < np.percentile(level, 95) < 0.6
 
 
+@pytest.mark.parametrize(
+    ("changes", "reached"),
+    [
+        ({"stray_light": (0.4, 0.4, 0.4)}, 0.55),
+        ({"stray_light": (0.1, 0.3, 0.2), "white_balance": (1.3, 1.0, 1.2)}, 0.55),
+        ({"black_level": BlackLevel(level=0.3, subtracted=0.0)}, 0.55),
+        ({"black_level": BlackLevel(level=0.2, subtracted=0.5), "colour_matrix": MATRIX}, 0.55),
+        ({"stray_light": (0.6, 0.6, 0.6)}, 0.6 + 0.2 * 0.55),  # a fifth is left for the light
+    ],
+)
+def test_automatic_exposure_counts_what_is_not_light(
+    changes: dict[str, Any], reached: float
+) -> None:
+    light = np.random.default_rng(3).random((HEIGHT, WIDTH, 3)).astype(np.float32)
+    chain = PictureChain(**changes)
+    level = chain.respond(light * chain.auto_exposure(light)).max(axis=2)
+    assert np.percentile(level, 95) == pytest.approx(reached, abs=0.003)
+
+
 def test_tone_curves_are_what_they_are_called() -> None:
     level = np.linspace(0.0, 1.0, 11)
     assert GammaCurve(gamma=2.0).curve(level) == pytest.approx(np.sqrt(level))

@@ -26,7 +26,7 @@ from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurre
 from optisense.design.lenses.film import PictureWindow, film_coordinates, film_places
 from optisense.design.lenses.shading import LensShading
 from optisense.design.responses._tone_curve import ToneCurve
-from optisense.design.responses.base import CameraResponse
+from optisense.design.responses.base import EXPOSURE_TARGET, CameraResponse
 from optisense.design.responses.electronics import (
     BlackLevel,
     ChannelMatrix,
@@ -36,6 +36,11 @@ from optisense.design.responses.electronics import (
     normal_numbers,
 )
 from optisense.design.responses.full_well import FullWellResponse
+
+LEAST_ROOM = 0.2
+"""Smallest share of its target that automatic exposure gives to the light, where stray light and
+black level leave less: the picture is then brighter than the target, but still shows the light.
+"""
 
 USUAL_RESPONSE = FullWellResponse()
 """Response of a camera whose design names none."""
@@ -197,19 +202,27 @@ class PictureChain:
         return _transmission(shown, window.height, window.width, self.film)[window.box]
 
     def metered(
-        self, radiance: FloatingArray, where: NDArray[np.bool_] | None = None
+        self,
+        radiance: FloatingArray,
+        where: NDArray[np.bool_] | None = None,
+        target: float | None = None,
     ) -> NDArray[np.floating]:
-        """Return the input of automatic exposure: levels that must not exceed the full one.
+        """Return the input of automatic exposure: levels, proportional to the exposure, that reach
+        the target at the exposure at which the picture's levels do.
 
-        They are the larger of the levels on the sensor and those after its processor, without blur,
-        noise and overexposure.
+        The picture's are the larger of the levels on the sensor and those after its processor,
+        without blur, noise and overexposure. Stray light and a black level that is not subtracted
+        leave less for the light: the levels are divided by the share of the target that is left,
+        which counts as `LEAST_ROOM` if it is smaller.
 
         Args:
             radiance: radiance (h, w, 3) of a picture, or (n, 3) of the pixels of a mask.
             where: mask (h, w).
+            target: level in the picture, the full one if None.
         """
         if self.is_plain:
             return radiance
+        reached = self.full_level() if target is None else target
         level: FloatingArray = np.asarray(radiance, dtype=np.float32)
         transmission = None
         if self.crosstalk is not None:
@@ -219,11 +232,25 @@ class PictureChain:
             whole = self._transmission(PictureWindow.whole(height, width))
             transmission = whole if where is None else whole[where]
             level = level * transmission
-        return np.maximum(level, self._balanced(level, transmission))
+        stray = np.array(self.stray_light or (0.0, 0.0, 0.0), dtype=np.float32)
+        if self.black_level is None:
+            lit, dark = level, stray
+        else:
+            lit, dark = (
+                self.black_level.scale() * level,
+                self.black_level.subtract(self.black_level.read(stray)),
+            )
+        return np.maximum(
+            _with_room(level, stray, reached),
+            _with_room(
+                self._balanced(lit, transmission), self._balanced(dark, transmission), reached
+            ),
+        )
 
     def auto_exposure(self, radiance: FloatingArray) -> float:
         """Return the exposure, a factor on radiance (h, w, 3), for a well exposed picture."""
-        return self.response.auto_exposure(self.metered(radiance))
+        target = EXPOSURE_TARGET * self.full_level()
+        return self.response.auto_exposure(self.metered(radiance, target=target))
 
     def full_level(self) -> float:
         """Return the level that automatic exposure must not exceed."""
@@ -264,6 +291,15 @@ class PictureChain:
     def encode(self, linear: FloatingArray) -> NDArray[np.uint8]:
         """Return the stored levels (...) in 8 bits of linear levels (...), 0 to 1."""
         return (self.tone_curve or self.response).encode(linear)
+
+
+def _with_room(lit: FloatingArray, dark: FloatingArray, target: float) -> FloatingArray:
+    """Return levels (..., 3) of light, divided by the share of a target that levels in the dark,
+    (3,) or (..., 3), leave.
+    """
+    if not dark.any():
+        return lit
+    return lit / np.maximum(1.0 - dark / np.float32(target), np.float32(LEAST_ROOM))
 
 
 @dataclass(frozen=True)

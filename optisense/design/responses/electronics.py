@@ -45,6 +45,10 @@ class BlackLevel(Model):
         """Return the converter's output (...), 0 to 1, for levels (...) relative to black."""
         return np.clip(self.level + (1.0 - self.level) * level, 0.0, 1.0)
 
+    def scale(self) -> float:
+        """Return the factor on levels relative to black by reading and subtraction."""
+        return (1.0 - self.level) / (1.0 - self.subtracted * self.level)
+
     def subtract(self, read: FloatingArray) -> FloatingArray:
         """Return the levels (...) above the assumed black, scaled so that a full pixel stays at 1.
 
