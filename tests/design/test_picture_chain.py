@@ -98,6 +98,15 @@ def test_noise_has_the_mean_and_variance_of_shot_and_read_noise(level: float, ga
     assert seen.var() == pytest.approx(variance, rel=5.0 * np.sqrt(2.0 / count))
 
 
+def test_a_pixel_far_beyond_full_is_white_and_one_that_is_just_full_is_noisy() -> None:
+    noise = SensorNoise(full_well=2000.0, read_noise=5.0, gain=4.0, binning=2.0)
+    for black in (None, BlackLevel(level=0.0625)):
+        chain = PictureChain(noise=noise, black_level=black)
+        assert chain.respond(field(3.0, 3.0, 3.0)).min() == 1.0
+        just = chain.respond(field(1.0, 1.0, 1.0))
+        assert (just < 1.0).mean() == pytest.approx(0.5, abs=0.02)
+
+
 def test_the_same_seed_gives_the_same_noise_and_another_one_other_noise() -> None:
     light = field(0.4, 0.4, 0.4)
     first = FULL.respond(light, seed=3)

@@ -44,6 +44,18 @@ class CameraResponse(KindModel):
             width: number of pixels across the whole picture, if `exposed` is a part of it.
         """
 
+    def filled(self, exposed: FloatingArray, width: int | None = None) -> FloatingArray:
+        """Return the levels (h, w, 3) of light in the sensor's pixels, from 0 up, before a pixel or
+        the converter cuts them off at 1: their noise is that of all this light.
+
+        A kind that does not say has its reading.
+
+        Args:
+            exposed: exposed levels (h, w, 3) of the picture or a part of it.
+            width: number of pixels across the whole picture, if `exposed` is a part of it.
+        """
+        return self.respond(exposed, width)
+
     def full_level(self) -> float:
         """Return the exposed level above which a channel is overexposed."""
         return 1.0

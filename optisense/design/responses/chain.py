@@ -4,12 +4,13 @@ The order is that of a real camera:
 
 1. the lens: blur;
 2. the sensor: crosstalk between the channels, the shading by lens and pixels, which is measured of
-   each channel, overexposure (`CameraResponse`), stray light, noise, black level;
+   each channel, overexposure (`CameraResponse`), stray light, noise, black level, full pixels;
 3. its processor: the black level is subtracted, the shading corrected, the colours are balanced and
    mixed by a matrix, levels are clipped, and the tone curve gives what is stored.
 
 A sensor saturates before its processor amplifies, so a white pixel of the picture may be a clipped
-red; noise is added before the gains, and grows with them.
+red. Noise is added before pixels are full, so that a pixel far beyond that is white, and before the
+gains, with which it grows.
 """
 
 from __future__ import annotations
@@ -146,7 +147,7 @@ class PictureChain:
         place = window or PictureWindow.whole(*exposed.shape[:2])
         if self.is_plain:
             return self.response.respond(exposed, place.width)
-        level = self.response.respond(self._on_sensor(exposed, place), place.width)
+        level = self.response.filled(self._on_sensor(exposed, place), place.width)
         return self._processed(self._read(level, place, seed), place)
 
     def linear(self, exposed: FloatingArray) -> NDArray[np.float32]:

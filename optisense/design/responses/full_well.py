@@ -64,6 +64,15 @@ class FullWellResponse(CameraResponse):
             exposed: exposed levels (h, w, 3) of the picture or a part of it.
             width: number of pixels across the whole picture, if `exposed` is a part of it.
         """
+        return np.clip(self.filled(exposed, width), 0.0, 1.0, dtype=np.float32)
+
+    def filled(self, exposed: FloatingArray, width: int | None = None) -> FloatingArray:
+        """Return the levels (h, w, 3), with overexposure spread over the channels.
+
+        Args:
+            exposed: exposed levels (h, w, 3) of the picture or a part of it.
+            width: number of pixels across the whole picture, if `exposed` is a part of it.
+        """
         exposed = np.asarray(exposed, dtype=np.float32)
         excess = np.clip(brightest(exposed) - self.full_well, 0.0, MAX_EXCESS)
         if excess.any():
@@ -74,7 +83,7 @@ class FullWellResponse(CameraResponse):
             exposed = exposed + mask[:, :, None] * (
                 self.full_well - np.minimum(exposed, self.full_well)
             )
-        return np.clip(exposed, 0.0, 1.0, dtype=np.float32)
+        return exposed
 
     def encode(self, linear: FloatingArray) -> NDArray[np.uint8]:
         """Return the stored levels (...) in 8 bits, by the sRGB curve in single precision."""
