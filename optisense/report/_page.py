@@ -78,7 +78,8 @@ def render_page(
     """Return the page of `write_report` as text."""
     height, width = image.contact_mask.shape
     assumed, sourced = tables.provenance_rows(design)
-    factor, camera = _exposure(design, image, exposure)
+    camera = image.chain.without_noise()
+    factor = camera.auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
     return page(
         "report",
         title=design.name,
@@ -105,15 +106,6 @@ def render_page(
     )
 
 
-def _exposure(
-    design: SensorDesign, image: TactileImage, exposure: float | Literal["auto"]
-) -> tuple[float, PictureChain]:
-    """Return the factor on the radiance, and the camera without its noise."""
-    camera = design.camera.picture_chain().without_noise()
-    factor = camera.auto_exposure(image.radiance) if exposure == "auto" else float(exposure)
-    return factor, camera
-
-
 def _pictures(
     design: SensorDesign,
     image: TactileImage,
@@ -124,7 +116,7 @@ def _pictures(
     """Return the pictures with their captions; the tactile image comes first.
 
     Args:
-        factor, camera: factor on the radiance, and camera without noise (see `_exposure`).
+        factor, camera: factor on the radiance, and camera without noise.
     """
     picture = image.picture(exposure)
     shown: list[tuple[str, Callable[[], NDArray[np.uint8]], str, str]]

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from optisense.design import Provenance
+from optisense.design.responses.chain import SoftFocus
 from optisense.errors import OutputError
 from optisense.geometry import Contact, Sphere
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report
 from optisense.report._page import render_page
+from optisense.report._pictures import data_uri
 from optisense.report._tables import contact_rows
 from optisense.sensors import gelsight_mini_ideal
 
@@ -50,6 +54,17 @@ def test_the_scene_data_is_json(image: TactileImage) -> None:
     assert found
     drawn = [part["name"] for part in json.loads(found[1])["parts"]]
     assert drawn == [*gelsight_mini_ideal().parts, "sphere 1"]
+
+
+def test_single_lights_are_as_soft_as_the_picture(image: TactileImage) -> None:
+    """With one group of lights, its picture is that of all lights, sharp or not."""
+    soft = replace(image.chain, focus=SoftFocus(np.full((1, 1), 0.1)))
+    counts = []
+    for chain in (image.chain, soft):
+        alone = replace(image, layers={"red": image.layers["red"]}, chain=chain)
+        page = render_page(gelsight_mini_ideal(), alone)
+        counts.append(page.count(data_uri(alone.picture())))
+    assert counts[0] == counts[1] >= 2
 
 
 def test_texts_of_a_design_stay_texts(image: TactileImage) -> None:
