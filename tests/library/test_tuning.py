@@ -62,8 +62,8 @@ def test_a_tuning_file_is_read(tmp_path: Path, version: int) -> None:
         content = {"version": 2.0, "algorithms": [{k: v} for k, v in content.items()]}
     values = read_tuning(write(tmp_path, content)).values
     assert values["black_level"] == {"level": 0.03125}
-    # The variance at the full level of 65536 is 16 * 65536, so a full pixel has 65536 / 16.
-    assert values["noise"] == {"full_well": 4096.0, "read_noise": 0.62}
+    # The variance at the full level is 16 * (65536 - 2048), as black does not count.
+    assert values["noise"] == {"full_well": 3968.0, "read_noise": 0.62}
     assert values["white_balance"] == [pytest.approx(1.0 / 0.6, abs=1e-5), 1.0, 1.66667]
     assert values["colour_matrix"][0] == pytest.approx([1.9, -0.6, -0.3])
     assert values["tone_curve"]["points"][1] == pytest.approx([0.09375, 0.31724], abs=1e-5)
@@ -142,7 +142,7 @@ def test_a_camera_of_ones_own_is_added_and_used(own: Path, tmp_path: Path) -> No
     added = library.add_tuning(write(tmp_path, sections()), like="pi-v2", name="ours")
     assert added.file == own / "cameras" / "ours.yaml" and added.entry.unsourced() == []
     entry = library.entry("camera", "ours")
-    assert entry.value.noise.full_well == 4096.0
+    assert entry.value.noise.full_well == 3968.0
     assert entry.value.fov == 62.2
     crosstalk = entry.source("crosstalk")
     assert crosstalk is not None and crosstalk.status == "derived"
@@ -151,7 +151,7 @@ def test_a_camera_of_ones_own_is_added_and_used(own: Path, tmp_path: Path) -> No
     with pytest.raises(LibraryError, match="no camera 'pi-v9'"):
         library.add_tuning(write(tmp_path, sections()), like="pi-v9", name="other")
     design = library.with_imaging(ots.load("builtin:gelsight-mini-ideal"), "ours")
-    assert design.camera.noise is not None and design.camera.noise.full_well == 4096.0
+    assert design.camera.noise is not None and design.camera.noise.full_well == 3968.0
     assert design.camera.fov == 52.157
     save_design(design, tmp_path / "design")
     assert load_design(tmp_path / "design").camera == design.camera
@@ -196,10 +196,11 @@ def test_cameras_of_the_library_come_with_what_their_makers_measured(name: str) 
 def test_noise_slopes_of_the_library_are_those_of_the_files() -> None:
     slopes = {"pi-v1": 4.25, "pi-v2": 3.67, "pi-v3": 2.5, "pi-hq-6mm": 2.767}
     for name, slope in slopes.items():
-        noise = library.camera(name).noise
-        assert noise is not None
-        deviation = noise.deviation(np.array([0.25]))
-        assert 65536 * deviation == pytest.approx(slope * np.sqrt(0.25 * 65536), rel=1e-4)
+        camera = library.camera(name)
+        assert camera.noise is not None and camera.black_level is not None
+        deviation = camera.noise.deviation(np.array([0.25]))
+        full = 65536 * (1.0 - camera.black_level.level)  # counts above black
+        assert full * deviation == pytest.approx(slope * np.sqrt(0.25 * full), rel=1e-4)
 
 
 def test_a_focus_distance_gives_the_depth_of_field_of_the_lens() -> None:

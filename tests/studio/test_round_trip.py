@@ -240,7 +240,7 @@ def test_what_a_camera_does_with_light_comes_back(scene: Any, tmp_path: Path) ->
     bpy.ops.optisense.add_camera(model="pi-v2", imaging=True)
     assert bpy.ops.optisense.save_as(filepath=str(tmp_path / "saved")) == {"FINISHED"}
     camera = as_read(str(tmp_path / "saved"))[0]["camera"]
-    assert camera["noise"]["full_well"] == 4865.7
+    assert camera["noise"]["full_well"] == 4561.6
     assert camera["tone_curve"]["kind"] == "points" and len(camera["shading"]["gain"]) == 12
     assert "f_number" not in camera
     bpy.ops.optisense.open(filepath=str(tmp_path / "saved"))

@@ -68,7 +68,7 @@ class SensorNoise(Model):
     """
 
     full_well: Positive = Field(
-        description="electrons of a pixel that is full at a gain of 1", examples=[4866.0]
+        description="electrons of a pixel that is full at a gain of 1", examples=[4562.0]
     )
     read_noise: NonNegative = Field(
         default=0.0, description="electrons, standard deviation in the dark"
