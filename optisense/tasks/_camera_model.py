@@ -7,7 +7,7 @@ pinhole camera, which most programs expect, is fitted to them, and its errors ar
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.design import Camera
+from optisense.design.lenses._brown_conrady import BrownConrady
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays
@@ -52,13 +53,13 @@ def ray_arrays(rays: ChiefRays) -> dict[str, NDArray[np.float32]]:
 
 @dataclass(frozen=True)
 class Pinhole:
-    """A pinhole camera with radial distortion, as in OpenCV.
+    """A pinhole camera with radial and tangential distortion, as in OpenCV.
 
     A point X (mm, design's frame) has the coordinates ``x = rotation @ X + translation`` in the
     camera's frame, x to the right, y down, z forward. With ``a = x[0] / x[2]``, ``b = x[1] /
-    x[2]``, ``r2 = a*a + b*b`` and ``f = 1 + radial[0]*r2 + radial[1]*r2*r2`` it appears in column
-    ``focal[0]*f*a + centre[0]`` and row ``focal[1]*f*b + centre[1]``. Columns and rows count from
-    the picture's edge: the middle of the first pixel is at 0.5, while it is at 0 in OpenCV.
+    x[2]`` and ``c, d`` their distorted values (`BrownConrady.distort`), it appears in column
+    ``focal[0]*c + centre[0]`` and row ``focal[1]*d + centre[1]``. Columns and rows count from the
+    picture's edge: the middle of the first pixel is at 0.5, while it is at 0 in OpenCV.
 
     Attributes:
         rotation: (3, 3) rotation from the design's frame to the camera's.
@@ -66,6 +67,7 @@ class Pinhole:
         focal: (2,) focal lengths, pixels.
         centre: (2,) column and row of the axis, pixels.
         radial: (2,) coefficients k1 and k2.
+        further: (3,) coefficients p1, p2 and k3, which are not fitted.
     """
 
     rotation: FloatArray
@@ -73,25 +75,32 @@ class Pinhole:
     focal: FloatArray
     centre: FloatArray
     radial: FloatArray
+    further: FloatArray = field(default_factory=lambda: np.zeros(3))
 
     @staticmethod
     def of(camera: Camera, resolution: tuple[int, int]) -> Pinhole:
         """Return the pinhole of a design's camera, without any refraction in front of its lens.
 
         Args:
-            camera: the camera, whose field of view is that across the picture.
+            camera: the camera, whose field of view is that across the picture. A distortion of
+                another kind than Brown-Conrady is left out.
             resolution: width and height, pixels.
         """
         right, up, forward = camera.axes()
         rotation = np.array([right, -up, forward])
         width, height = resolution
         focal = 0.5 * width / np.tan(np.radians(0.5 * camera.fov))
+        lens = camera.distortion
+        across, down = (0.5, 0.5) if lens is None else lens.centre
+        tall = width * camera.resolution[1] / camera.resolution[0]
+        numbers = np.array(lens.coefficients() if isinstance(lens, BrownConrady) else np.zeros(5))
         return Pinhole(
             rotation,
             -rotation @ np.array(camera.position, dtype=np.float64),
             np.array([focal, focal]),
-            np.array([0.5 * width, 0.5 * height]),
-            np.zeros(2),
+            np.array([across * width, 0.5 * height + (down - 0.5) * tall]),
+            numbers[:2],
+            numbers[2:],
         )
 
     def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -99,9 +108,9 @@ class Pinhole:
         along the viewing direction.
         """
         seen = points @ self.rotation.T + self.translation
-        flat = seen[:, :2] / seen[:, 2:]
-        r2 = (flat**2).sum(axis=1, keepdims=True)
-        bent = flat * (1.0 + self.radial[0] * r2 + self.radial[1] * r2 * r2)
+        across, down = (seen[:, :2] / seen[:, 2:]).T
+        numbers = (*self.radial, *self.further)
+        bent = np.stack(BrownConrady.distort(across, down, numbers), axis=1)
         return self.focal * bent + self.centre, seen[:, 2]
 
     def errors(self, points: FloatArray, pixels: FloatArray) -> dict[str, float]:
@@ -129,6 +138,7 @@ class Pinhole:
             "focal_pixels": self.focal.tolist(),
             "centre_pixels": self.centre.tolist(),
             "radial": self.radial.tolist(),
+            "distortion": [*self.radial.tolist(), *self.further.tolist()],
         }
 
 
@@ -154,6 +164,7 @@ def fit_pinhole(start: Pinhole, points: FloatArray, pixels: FloatArray) -> Pinho
             start.focal * np.exp(x[6:8]),
             start.centre + focal * x[8:10],
             start.radial + x[10:],
+            start.further,
         )
 
     def apart(x: FloatArray) -> FloatArray:
@@ -169,7 +180,8 @@ def camera_model(camera: Camera, rays: ChiefRays) -> dict[str, Any]:
         rays: chief rays without contacts.
 
     Returns:
-        "as_designed" and "fitted"; None for a camera that no pinhole describes: a fisheye, a very
+        "as_designed" and "fitted", and a "note" on a distortion that OpenCV's coefficients can't
+        state; None for a camera that no pinhole describes: a fisheye, a very
         wide view, or one that sees part of the skin from behind, as over mirrors.
     """
     height, width = rays.hit.shape
@@ -182,7 +194,14 @@ def camera_model(camera: Camera, rays: ChiefRays) -> dict[str, Any]:
     if (designed.project(points)[1] <= 0.0).any():
         return nothing
     fitted = fit_pinhole(designed, points, pixels)
-    return {
+    lens = camera.distortion
+    note = {}
+    if lens is not None and not isinstance(lens, BrownConrady):
+        note["note"] = (
+            f"OpenCV's coefficients can't state a distortion of kind '{lens.kind}': as_designed "
+            "leaves it out"
+        )
+    return note | {
         name: each.as_dict() | {"error": each.errors(points, pixels)}
         for name, each in (("as_designed", designed), ("fitted", fitted))
     }

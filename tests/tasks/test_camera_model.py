@@ -9,6 +9,8 @@ import pytest
 
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign
+from optisense.design.lenses._brown_conrady import BrownConrady
+from optisense.design.lenses._kannala_brandt import KannalaBrandt
 from optisense.geometry import Contact, Sphere
 from optisense.tasks._camera_model import Pinhole, camera_model, fit_pinhole, ray_arrays
 
@@ -33,6 +35,30 @@ def test_without_glass_the_design_is_right(bare: SensorDesign) -> None:
     assert told["fitted"]["focal_pixels"] == pytest.approx(
         told["as_designed"]["focal_pixels"], rel=1e-3
     )
+
+
+@pytest.mark.parametrize("size", [SIZE, (80, 40)])
+def test_the_distortion_of_the_design_is_that_of_its_pinhole(
+    bare: SensorDesign, size: tuple[int, int]
+) -> None:
+    lens = {"k1": -0.25, "k2": 0.06, "p1": 0.01, "p2": -0.015, "centre": [0.47, 0.56]}
+    bent = bare.copy()
+    bent.camera.distortion = BrownConrady.model_validate(lens)
+    told = camera_model(bent.camera, OpticalModel(bent).chief_rays(size))
+    assert told["as_designed"]["distortion"] == [-0.25, 0.06, 0.01, -0.015, 0.0]
+    assert told["as_designed"]["centre_pixels"] == pytest.approx(
+        [0.47 * 80, 0.5 * size[1] + 0.06 * 60]
+    )
+    assert told["as_designed"]["error"]["most_pixels"] < 2e-3
+    assert told["fitted"]["error"]["most_pixels"] < 2e-3
+
+
+def test_a_distortion_that_opencv_has_not_is_noted(bare: SensorDesign) -> None:
+    rays = OpticalModel(bare).chief_rays(SIZE)
+    assert "note" not in camera_model(bare.camera, rays)
+    lens = KannalaBrandt(k1=0.1)  # in place of a kind of another package
+    other = bare.camera.model_copy(update={"distortion": lens})
+    assert "'kannala-brandt'" in camera_model(other, rays)["note"]
 
 
 def test_through_glass_only_the_fitted_one_is(mini: OpticalModel) -> None:
