@@ -123,7 +123,7 @@ def _refuse_too_few(
     count = len(photographs.presses) - len(held_out)
     if not chosen:
         raise CalibrationError(
-            "there is no number to fit, as all families are kept as they are",
+            "there is no number to fit: all families are kept, or do not apply to this design",
             hint="Keep fewer families, or name further numbers to fit",
         )
     if count < LEAST_PRESSES:

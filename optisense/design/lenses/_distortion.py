@@ -45,7 +45,7 @@ class LensDistortion(KindModel):
         "optisense.distortions",
         DesignError,
         {
-            "brown-conrady": "optisense.design.lenses._brown_conrady:BrownConrady",
+            "brown-conrady": "optisense.design.lenses.brown_conrady:BrownConrady",
             "kannala-brandt": "optisense.design.lenses._kannala_brandt:KannalaBrandt",
         },
     )
