@@ -1,8 +1,8 @@
 """Repair of meshes from CAD files, as far as it needs no guessing.
 
 Repaired are vertices that differ by rounding, duplicate faces, and faces and whole shells that are
-turned inside out. Refused, with the place, are holes, edges of more than two faces, and faces that
-cut through each other; these must be corrected in the CAD tool.
+turned inside out. Refused, with the place, are holes, edges of more than two faces, faces that cut
+through each other, and bodies that overlap; these must be corrected in the CAD tool.
 """
 
 from __future__ import annotations
@@ -10,18 +10,25 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.array_types import FloatArray
+from optisense.array_types import BoolArray, FloatArray
 from optisense.errors import MeshError
 from optisense.geometry._mesh_checks import with_consistent_winding
 from optisense.geometry._welding import merged_vertices
+from optisense.geometry.coincidence import boxes_overlap, find_coincident
+from optisense.geometry.common_space import as_manifold, thick_place
 from optisense.geometry.connected import connected_components
 from optisense.geometry.containment import inside
-from optisense.geometry.crossings import self_crossings
+from optisense.geometry.crossings import TOUCH, near_pairs, self_crossings
 from optisense.geometry.mesh import TriangleMesh
 
 WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Distances (mm) below which vertices are merged, tried in ascending order until the mesh is
 closed: from the rounding of single precision to a tenth of the usual tolerance of a part."""
+
+_UNITE = (
+    "In the CAD tool: combine the overlapping bodies into one (Boolean union), or export each to its "
+    "own file"
+)
 
 
 def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh, list[str]]:
@@ -38,7 +45,8 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
 
     Raises:
         MeshError: no faces, not finite, holes, edges of more than two faces, faces that cut through
-            each other, or no volume; the message says where, and what to do in the CAD tool.
+            each other, bodies that overlap, or no volume; the message says where, and what to do
+            in the CAD tool.
     """
     where = f"part {name}"
     if not np.isfinite(mesh.vertices).all():
@@ -60,8 +68,8 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
         notes.append(f"{doubled} duplicate faces were dropped")
     if closed:
         mended = _closed(mended, where, notes)
-        mended = _outward(mended, where, notes)
         _refuse_crossings(mended, where)
+        mended = _outward(mended, where, notes)
     else:
         mended = _consistent(mended, notes)
     return (mended if notes or closed else mesh), notes
@@ -76,11 +84,15 @@ def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
 
 
 def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Return the number (m,) int64 of the connected shell that each face belongs to."""
-    ends = mesh.faces[:, [0, 1, 1, 2]].reshape(-1, 2)
-    group = connected_components(len(mesh.vertices), ends[:, 0], ends[:, 1])
-    _, labels = np.unique(group[mesh.faces[:, 0]], return_inverse=True)
-    return np.asarray(labels.reshape(-1), dtype=np.int64)
+    """Return the number (m,) int64 of the shell that each face belongs to: faces joined by edges.
+
+    Bodies that only share corners are different shells.
+    """
+    _, edge = np.unique(_keys(mesh), return_inverse=True)
+    order = np.argsort(edge.reshape(-1), kind="stable")
+    same = np.diff(edge.reshape(-1)[order]) == 0
+    face = order // 3
+    return connected_components(len(mesh.faces), face[:-1][same], face[1:][same])
 
 
 def _without_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
@@ -156,8 +168,7 @@ def _refuse_crossings(mesh: TriangleMesh, where: str) -> None:
         f"the mesh cuts through itself: {len(found.pairs)} pairs of faces cross, one of them near "
         f"{_point(found.places[0])} mm",
         where=where,
-        hint="In the CAD tool: combine the overlapping bodies into one (Boolean union), or export "
-        "each to its own file"
+        hint=_UNITE
         if two
         else "In the CAD tool: look for a fillet, offset or loft that folds over itself there, "
         "make it smaller, and export again",
@@ -181,17 +192,16 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     """Return a mesh with consistent winding and each shell outward, or inward if it is a cavity."""
     labels = shells(mesh)
     faces = with_consistent_winding(mesh).faces.copy()
-    bodies = [mesh.with_faces(faces[labels == label]) for label in range(labels.max() + 1)]
-    for label, body in enumerate(bodies):
-        point = body.triangles[0].mean(axis=0)
+    bodies = [mesh.with_faces(faces[labels == k]).compacted() for k in range(labels.max() + 1)]
+    for body in bodies:
         if not abs(body.volume) > 1e-9 * body.area**1.5:
             raise MeshError(
-                f"the mesh encloses no volume near {_point(point)} mm",
+                f"the mesh encloses no volume near {_point(body.triangles[0].mean(axis=0))} mm",
                 where=where,
                 hint="In the CAD tool: export a solid body, not a flat one",
             )
-        around = bodies[:label] + bodies[label + 1 :]
-        depth = sum(bool(inside(point, other)[0]) for other in around)
+    depths = _within(bodies, where).sum(axis=1)
+    for label, (body, depth) in enumerate(zip(bodies, depths, strict=True)):
         if (body.volume > 0.0) != (depth % 2 == 0):
             faces[labels == label] = faces[labels == label][:, ::-1]
     turned = (faces != mesh.faces).any(axis=1)
@@ -204,12 +214,55 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     return mesh.with_faces(faces)
 
 
+def _within(bodies: list[TriangleMesh], where: str) -> BoolArray:
+    """Return a mask (n, n) of the bodies (rows) that lie inside others (columns); bodies may touch
+    from outside.
+
+    Args:
+        bodies: closed shells of either winding whose faces do not cut through each other.
+
+    Raises:
+        MeshError: two bodies overlap in part, or have a part of their surfaces in common, so that
+            one is no cavity of the other.
+    """
+    solids = [as_manifold(body if body.volume > 0.0 else body.flipped()) for body in bodies]
+    result = np.zeros((len(bodies), len(bodies)), dtype=bool)
+    for one, body in enumerate(bodies):
+        for two in range(one):
+            other = bodies[two]
+            if not boxes_overlap(body, other, TOUCH):
+                continue
+            if len(near_pairs(body, other)[0]) == 0:  # surfaces that keep apart
+                result[one, two] = inside(body.vertices[0], other)[0]
+                result[two, one] = inside(other.vertices[0], body)[0]
+                continue
+            place = thick_place(solids[one] ^ solids[two], TOUCH)
+            if place is None:
+                continue
+            result[one, two] = thick_place(solids[one] - solids[two], TOUCH) is None
+            result[two, one] = thick_place(solids[two] - solids[one], TOUCH) is None
+            shared = len(find_coincident(body, other, TOUCH, facing=False).pairs) > 0
+            if shared or result[one, two] == result[two, one]:
+                raise MeshError(
+                    f"the mesh cuts through itself: two of its bodies overlap near {_point(place)} "
+                    "mm",
+                    where=where,
+                    hint=_UNITE,
+                )
+    return result
+
+
 def _edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the undirected edges (k, 2) and the number (k,) of faces of each."""
-    ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     size = len(mesh.vertices)
-    keys, count = np.unique(ends.min(axis=1) * size + ends.max(axis=1), return_counts=True)
+    keys, count = np.unique(_keys(mesh), return_counts=True)
     return np.column_stack([keys // size, keys % size]), count
+
+
+def _keys(mesh: TriangleMesh) -> NDArray[np.int64]:
+    """Return a number (3 m,) for each edge of each face, equal for the same two vertices."""
+    ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
+    return np.asarray(ends.min(axis=1) * len(mesh.vertices) + ends.max(axis=1))
 
 
 def _point(place: FloatArray) -> str:

@@ -71,6 +71,13 @@ def test_two_bodies_in_one_file_both_look_outward() -> None:
     assert shells(mesh).max() == 1
 
 
+@pytest.mark.parametrize("at", [(10, 2, 1), (10, 8, 3), (10, 8, 4), (2, 2, 4 - 5e-5)])
+def test_bodies_may_touch_with_faces_edges_and_corners(at: tuple[float, float, float]) -> None:
+    beside = TriangleMesh.box(at, np.add(at, (1, 1, 2))).flipped()
+    mesh, _ = repaired(TriangleMesh.joined([BLOCK, beside]), "plates", closed=True)
+    assert mesh.volume == pytest.approx(VOLUME + 2.0)
+
+
 @pytest.mark.parametrize("noise", [3e-7, 3e-6, 2e-4])
 def test_loose_triangles_are_joined(noise: float) -> None:
     corners = BLOCK.triangles.reshape(-1, 3)
@@ -94,6 +101,8 @@ def faulty(kind: str) -> TriangleMesh:
         "wall": TriangleMesh.box((10, 0, 0), (20, 8, 4), (3, 3, 3)),
         "edge": TriangleMesh.box((10, 8, 0), (20, 18, 4), (3, 3, 3)),
         "overlap": TriangleMesh.box((5, 1, 1), (20, 9, 9), (3, 3, 3)),
+        "stack": TriangleMesh.box((0, 0, 2), (10, 8, 6), (2, 4, 2)),
+        "notch": TriangleMesh.box((2, 2, 0), (4, 4, 2)).flipped(),
     }
     if kind in second:
         return TriangleMesh.joined([BLOCK, second[kind]])
@@ -120,6 +129,8 @@ def faulty(kind: str) -> TriangleMesh:
         ("wall", "not manifold", "(10.000, ", "inside the body"),
         ("edge", "not manifold: 3 edges", "(10.000, 8.000, ", "own file"),
         ("overlap", "cuts through itself", "(5.000, ", "union"),
+        ("stack", "bodies overlap", "(5.000, 4.000, 3.000)", "union"),
+        ("notch", "bodies overlap", "(3.000, 3.000, 1.000)", "union"),
         ("fold", "cuts through itself", ", 0.000)", "folds"),
         ("flat", "no volume", "(0.333, 0.333, 0.333)", "solid body"),
         ("nan", "not finite", "", "again"),
