@@ -26,9 +26,10 @@ WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
 closed: from the rounding of single precision to a tenth of the usual tolerance of a part."""
 
 _UNITE = (
-    "In the CAD tool: combine the overlapping bodies into one (Boolean union), or export each to its "
-    "own file"
+    "In the CAD tool: combine the overlapping bodies into one (Boolean union), or export each to "
+    "its own file"
 )
+"""Advice on bodies that overlap."""
 
 
 def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh, list[str]]:
@@ -189,7 +190,10 @@ def _consistent(mesh: TriangleMesh, notes: list[str]) -> TriangleMesh:
 
 
 def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
-    """Return a mesh with consistent winding and each shell outward, or inward if it is a cavity."""
+    """Return a mesh with consistent winding and each shell outward, or inward if it is a cavity.
+
+    The note on a shell that was drawn as a body, and becomes a cavity, names it.
+    """
     labels = shells(mesh)
     faces = with_consistent_winding(mesh).faces.copy()
     bodies = [mesh.with_faces(faces[labels == k]).compacted() for k in range(labels.max() + 1)]
@@ -200,14 +204,28 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
                 where=where,
                 hint="In the CAD tool: export a solid body, not a flat one",
             )
-    depths = _within(bodies, where).sum(axis=1)
+    within = _within(bodies, where)
+    depths = within.sum(axis=1)
     for label, (body, depth) in enumerate(zip(bodies, depths, strict=True)):
         if (body.volume > 0.0) != (depth % 2 == 0):
             faces[labels == label] = faces[labels == label][:, ::-1]
     turned = (faces != mesh.faces).any(axis=1)
+    # A shell was drawn inside out if most of its area had to be turned.
+    area = np.bincount(labels, mesh.face_areas)
+    over = 2.0 * np.bincount(labels, mesh.face_areas * turned) > area
     if turned.all():
         notes.append("it was inside out and has been turned over")
-    elif turned.any():
+        return mesh.with_faces(faces)
+    for label in np.flatnonzero(depths % 2 == 1):
+        outermost = np.flatnonzero(within[label] & (depths == 0))[0]
+        if over[label] != over[outermost]:
+            turned[labels == label] = False
+            notes.append(
+                f"the body near {_point(bodies[label].bounds.mean(axis=0))} mm, which lies inside "
+                f"another one, became a cavity of {abs(bodies[label].volume):.3g} mm^3; if the "
+                "part is solid there, delete the inner body in the CAD tool"
+            )
+    if turned.any():
         notes.append(
             f"{turned.sum()} of {len(turned)} faces were inside out; they were turned over"
         )

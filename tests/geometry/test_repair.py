@@ -57,11 +57,15 @@ def test_a_sound_solid_needs_nothing() -> None:
     assert mesh.volume == pytest.approx(VOLUME)
 
 
-def test_a_cavity_looks_into_the_hollow_however_it_was_drawn() -> None:
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_cavity_looks_into_the_hollow_however_it_was_drawn(turned: bool) -> None:
     hollow = TriangleMesh.box((2, 2, 1), (4, 4, 2))
-    for drawn in (hollow, hollow.flipped()):
-        mesh, _ = repaired(TriangleMesh.joined([BLOCK, drawn]), "gel", closed=True)
+    for drawn, told in ((hollow, not turned), (hollow.flipped(), turned)):
+        outer = BLOCK.flipped() if turned else BLOCK
+        mesh, notes = repaired(TriangleMesh.joined([outer, drawn]), "gel", closed=True)
         assert mesh.volume == pytest.approx(VOLUME - 4.0)
+        named = "near (3.000, 3.000, 1.500) mm, which lies inside another one, became a cavity"
+        assert any(f"{named} of 4 mm^3" in note for note in notes) == told
 
 
 def test_two_bodies_in_one_file_both_look_outward() -> None:
