@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -186,24 +188,36 @@ def place_on_gels(
     gels: Sequence[TriangleMesh],
     facet_error: float = FACET_ERROR,
 ) -> TriangleMesh:
-    """Return the mesh of `place` for the one of several elastomers that lies under the contact.
+    """Return the mesh of `place` for the one of several gels that lies under the contact.
 
     Args:
         contact, surface, facet_error: as in `place`.
-        gels: the elastomers, closed meshes; with none, the depth is not checked.
+        gels: the gels, as in `gel_under`; with none, the depth is not checked.
 
     Raises:
-        ContactError: the error of `place` for the first elastomer.
+        ContactError: as in `place`.
     """
     if not gels:
         return place(contact, surface, facet_error=facet_error)
-    errors = []
+    spot = locate(contact, surface)
+    found = gel_under(spot, gels)
+    return place(contact, surface, gels[0] if found is None else found[0], facet_error)
+
+
+def gel_under(
+    spot: SurfacePoint, gels: Sequence[TriangleMesh]
+) -> tuple[TriangleMesh, float] | None:
+    """Return the uppermost of several gels under a point of the skin, and its thickness (mm) there;
+    None if there is none.
+
+    Args:
+        gels: meshes as in `available_depth`; layers that touch are one mesh (see `without_seams`).
+    """
+    found = []
     for gel in gels:
-        try:
-            return place(contact, surface, gel, facet_error)
-        except ContactError as error:
-            errors.append(error)
-    raise errors[0]
+        with suppress(ContactError):
+            found.append((gel, available_depth(spot.point, spot.inward, gel)))
+    return min(found, key=itemgetter(1), default=None)
 
 
 def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> float:
@@ -212,7 +226,7 @@ def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> f
     Args:
         point: (3,) point on the surface of the gel, mm.
         inward: (3,) unit vector into the gel.
-        gel: closed mesh, mm, with outward face normals.
+        gel: mesh, mm, with outward face normals, that ends where the gel does.
 
     Raises:
         ContactError: there is no gel behind the point.

@@ -14,7 +14,7 @@ from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import Contact, MeshIndenter, SensingSurface, TriangleMesh
-from optisense.geometry.contact import available_depth, locate, surface_axes
+from optisense.geometry.contact import gel_under, locate, surface_axes
 from optisense.geometry.surface import SurfacePoint
 from optisense.mechanics._contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics._deformed_mesh import SkinMesh, skin_mesh
@@ -61,28 +61,31 @@ triangles. The error of a draft of GelSight Mini grows by 0.03 % of the mean lig
 takes 7 % less time while a cage point is dragged."""
 
 
-def elasticity_of(design: SensorDesign) -> Elasticity:
-    """Return the elastic constants of a design's first elastomer; `USUAL_GEL` if it has none."""
-    for name in design.parts_of(Role.ELASTOMER):
-        material = design.materials.get(design.parts[name].material or "")
+def _elastomers(design: SensorDesign) -> list[tuple[str, str, Elasticity]]:
+    """Return part, material and constants of the elastomers whose material states constants."""
+    found = []
+    for part in design.parts_of(Role.ELASTOMER):
+        name = design.parts[part].material or ""
+        material = design.materials.get(name)
         if isinstance(material, Dielectric) and material.elasticity is not None:
             given = material.elasticity
-            return Elasticity(given.youngs_modulus, given.poisson_ratio, given.friction)
-    return USUAL_GEL
+            constants = Elasticity(given.youngs_modulus, given.poisson_ratio, given.friction)
+            found.append((part, name, constants))
+    return found
+
+
+def elasticity_of(design: SensorDesign) -> Elasticity:
+    """Return the elastic constants of a design's first elastomer; `USUAL_GEL` if it has none."""
+    found = _elastomers(design)
+    return found[0][2] if found else USUAL_GEL
 
 
 def elasticity_in_words(design: SensorDesign) -> str:
-    """Return a text with the elastic constants used for a design's gel, and their status."""
-    used = elasticity_of(design)
-    given = next(
-        (
-            material
-            for name in design.parts_of(Role.ELASTOMER)
-            if (material := design.parts[name].material or "")
-            and getattr(design.materials.get(material), "elasticity", None) is not None
-        ),
-        None,
-    )
+    """Return a text with the elastic constants used for a design's gel, and their status; it names
+    the elastomers that have others.
+    """
+    used, found = elasticity_of(design), _elastomers(design)
+    given = found[0][1] if found else None
     words = []
     for field, text in (
         ("youngs_modulus", f"Young's modulus {used.youngs_modulus:g} MPa"),
@@ -96,7 +99,11 @@ def elasticity_in_words(design: SensorDesign) -> str:
             known = [design.provenance[path] for path in paths if path in design.provenance]
             status = known[0].status.value if known else "given"
         words.append(f"{text} ({status})")
-    return ", ".join(words)
+    text = ", ".join(words)
+    others = [part for part, _, constants in found if constants != used]
+    if others:
+        text += f"; those of '{found[0][0]}' are used for {', '.join(others)}, too"
+    return text
 
 
 @cache
@@ -137,7 +144,8 @@ class Gel:
         Args:
             surface: the undeformed sensing surface.
             skin: its mesh, with all its triangles.
-            elastomers: the gels under it; without any the gel is `USUAL_THICKNESS` thick.
+            elastomers: the gels under it, as in `gel_under`; without any the gel is
+                `USUAL_THICKNESS` thick.
             elasticity: elastic constants of the gel.
             place: function that returns a contact's placed indenter in the design's frame (mm).
             check: function that is called before the first press and raises if the gel cannot be
@@ -282,9 +290,5 @@ class Gel:
 
     def _thickness(self, spot: SurfacePoint) -> float:
         """Return the thickness (mm) of the gel under a point of the skin."""
-        for elastomer in self._elastomers:
-            try:
-                return available_depth(spot.point, spot.inward, elastomer)
-            except ContactError:
-                continue  # this elastomer lies under another one
-        return USUAL_THICKNESS
+        found = gel_under(spot, self._elastomers)
+        return USUAL_THICKNESS if found is None else found[1]

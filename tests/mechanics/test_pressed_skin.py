@@ -25,6 +25,7 @@ from optisense.mechanics import (
     skin_mesh,
     youngs_modulus_of_shore_a,
 )
+from optisense.optics._ray_model import RayModel
 from optisense.sensors import load
 
 GEL = Elasticity(0.435, 0.49)
@@ -257,6 +258,38 @@ def test_the_status_of_each_elastic_constant_is_told():
     silent.materials["silicone-xp565"].elasticity = None
     assert elasticity_of(silent).youngs_modulus == 0.435
     assert "MPa (assumed)" in elasticity_in_words(silent)
+
+
+@pytest.mark.parametrize("lower_first", [False, True])
+def test_touching_layers_are_one_gel(lower_first):
+    whole = load("gelsight-mini-ideal").model_copy(deep=True)
+    whole.cages.clear()
+    low, high = whole.meshes["gel"].bounds
+    whole.meshes["gel"] = TriangleMesh.box(low, high)
+    middle = low[2] + 0.6 * (high[2] - low[2])
+    layers = whole.model_copy(deep=True)
+    layers.meshes["gel"] = TriangleMesh.box((*low[:2], middle), high, (2, 3, 1))
+    layers.meshes["low"] = TriangleMesh.box(low, (*high[:2], middle), (5, 4, 1))
+    layers.parts["low"] = layers.parts["gel"]
+    if lower_first:
+        layers.parts["gel"] = layers.parts.pop("gel")
+    # The gel ends beside the second place, where its elements matter.
+    for at in ((0.0, 0.0), (9.0, 0.0)):
+        contact = Contact(Sphere(1.5), at=at, depth=0.8)
+        one, several = (
+            RayModel(design).pressed([contact]).contacts[0].force for design in (whole, layers)
+        )
+        assert several == pytest.approx(one, rel=1e-6)
+
+
+def test_elastomers_of_other_stiffness_are_named():
+    design = load("gelsight-mini-ideal").model_copy(deep=True)
+    name = design.parts["gel"].material
+    design.materials["soft"] = design.materials[name].model_copy(deep=True)
+    design.materials["soft"].elasticity.youngs_modulus = 0.1
+    design.parts["low"] = design.parts["gel"].model_copy(update={"material": "soft"})
+    assert elasticity_of(design).youngs_modulus == 0.435
+    assert "; those of 'gel' are used for low, too" in elasticity_in_words(design)
 
 
 @pytest.mark.parametrize("name", ["silicone-xp565", "silicone-solaris", "pdms"])

@@ -17,6 +17,7 @@ from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
+from optisense.geometry.seams import without_seams
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
 from optisense.optics.scene._solids import Interface, Sheet, Solid
 from optisense.optics.scene.emitters import (
@@ -49,8 +50,8 @@ class Assembly:
     Attributes:
         pieces: all fixed surfaces; flat faces are merged into few triangles.
         sensing: the deformed sensing surface, with all its triangles.
-        gels: the elastomers, without what parts of higher priority cut out of them; drafts of parts
-            that bend leave it in.
+        gels: the elastomers, without what parts of higher priority cut out of them (drafts of parts
+            that bend leave it in); those that touch are one mesh.
         emitters: all lights; ``group`` counts in the order of ``groups``.
         fine: by number of a piece of the sensing surface, that piece with all its triangles.
         ior_before: refractive index on the inner side of the (first) sensing surface.
@@ -196,10 +197,12 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     return Assembly(
         pieces=pieces,
         sensing=sensing[0] if len(sensing) == 1 else TriangleMesh.joined(sensing),
-        gels=[
-            meshes[name] if bend else carved(design, meshes, name)
-            for name in design.parts_of(Role.ELASTOMER)
-        ],
+        gels=without_seams(
+            [
+                meshes[name] if bend else carved(design, meshes, name)
+                for name in design.parts_of(Role.ELASTOMER)
+            ]
+        ),
         emitters=emitters,
         groups=list(design.lights),
         fine=fine,
