@@ -8,7 +8,6 @@ from optisense import library
 from optisense.array_types import FloatArray
 from optisense.design import Camera
 from optisense.design.limits import refuse_far
-from optisense.design.projection import picture_places
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -106,26 +105,6 @@ def upward(choice: CameraChoice, look: FloatArray) -> FloatArray:
         return vector(choice.up)
     y, z = np.eye(3)[1], np.eye(3)[2]
     return y if abs(look @ y) < 0.7 else z
-
-
-def share_seen(camera: Camera, skin: TriangleMesh) -> tuple[float, float]:
-    """Return the shares of a sensing surface and of the picture that a camera would see along
-    straight lines, ignoring other parts.
-
-    Returns:
-        The share of the surface's area that lies in the picture and faces the camera, and the share
-        of the picture's width or height (the larger) that it covers.
-    """
-    centres, areas = skin.triangles.mean(axis=1), skin.face_areas
-    way = centres - np.array(camera.position)
-    across, down = picture_places(camera, centres)
-    u, v = 2.0 * across - 1.0, 2.0 * down - 1.0
-    facing = np.einsum("ij,ij->i", way, skin.face_normals) < 0.0
-    seen = (np.abs(u) <= 1.0) & (np.abs(v) <= 1.0) & facing
-    if not seen.any():
-        return 0.0, 0.0
-    spread = max(float(np.ptp(u[seen])), float(np.ptp(v[seen]))) / 2.0
-    return float(areas[seen].sum() / areas.sum()), spread
 
 
 def _behind(

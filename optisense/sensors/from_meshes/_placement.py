@@ -6,7 +6,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from optisense import library
-from optisense.design import Camera, LightGroup, Provenance, Role, Status
+from optisense.design import Camera, LightGroup, Provenance, Role, SensorDesign, Status
+from optisense.design.camera_checks import LEAST_PICTURE, view_shares
 from optisense.design.colour import NAMED_COLOURS
 from optisense.design.problems import design_error
 from optisense.errors import DesignError
@@ -15,7 +16,7 @@ from optisense.geometry.containment import inside
 from optisense.geometry.patches import middle
 from optisense.sensors.from_meshes import _lights as light_placement
 from optisense.sensors.from_meshes import _strips
-from optisense.sensors.from_meshes._camera import make_camera, share_seen
+from optisense.sensors.from_meshes._camera import make_camera
 from optisense.sensors.from_meshes._pick_and_place import read_pick_and_place
 from optisense.sensors.from_meshes._recipe_state import RecipeState
 from optisense.sensors.from_meshes._touching import refuse_contact_with_lamps
@@ -24,7 +25,8 @@ from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.sensors.from_meshes.surfaces import chosen, pick
 
 LITTLE_SEEN = 0.5
-"""Share of the sensing surface that the camera sees below which a warning states it."""
+"""Share of the area of the sensing surface that the camera sees below which a note states it:
+the built-in sensors see more."""
 
 
 def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGroup:
@@ -117,7 +119,7 @@ def _note_beyond(state: RecipeState, name: str, group: LightGroup, row: LightRow
 
 
 def place_camera(state: RecipeState) -> Camera:
-    """Return the camera, with a warning if it sees little of the sensing surface.
+    """Return the camera.
 
     Raises:
         DesignError: the camera can't be placed or aimed like this.
@@ -148,24 +150,39 @@ def place_camera(state: RecipeState) -> Camera:
             status=Status.ASSUMED, source="where the sensing surface fills the picture"
         )
     try:
-        camera = make_camera(choice, skin, place, target, state.meshes)
+        return make_camera(choice, skin, place, target, state.meshes)
     except DesignError as error:
         raise DesignError(error.message, where=where, hint=error.hint) from None
     except ValidationError as error:
         raise design_error(error, {}, where=where, model=Camera) from None
-    if not state.of(Role.MIRROR):
-        seen, spread = share_seen(camera, skin)
-        if seen < LITTLE_SEEN:
-            state.notes.append(
-                f"the camera sees about {100 * seen:.0f} % of the sensing surface: check its "
-                "place (at), what it looks at (look_at) and its field of view"
-            )
-        elif spread < 0.3:
-            state.notes.append(
-                f"the sensing surface fills only {100 * spread:.0f} % of the picture: the "
-                "camera is far away, or its field of view is wide"
-            )
-    return camera
+
+
+def view_note(design: SensorDesign) -> str | None:
+    """Return a note if the camera of a finished design sees little of the sensing surface, or from
+    afar; refraction is ignored, and designs with mirrors are not judged.
+    """
+    shares = view_shares(design, design.meshes)
+    if shares is None:
+        return None
+    skin = TriangleMesh.joined(
+        [design.meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
+    )
+    way = skin.triangles[:, 0] - np.array(design.camera.position)
+    facing = np.einsum("ij,ij->i", way, skin.face_vectors) < 0.0
+    seen = min(shares.skin, float(skin.face_areas[facing].sum() / skin.area))
+    if seen < LITTLE_SEEN:
+        return (
+            f"the camera sees about {100 * seen:.0f} % of the area of the sensing surface, if "
+            "refraction is neglected: check its place (at), what it looks at (look_at) and its "
+            "field of view"
+        )
+    if shares.picture < LEAST_PICTURE:
+        return (
+            f"the sensing surface fills only about {100 * shares.picture:.0f} % of the area of the "
+            "picture, if refraction is neglected: the camera is far away, or its field of view is "
+            "wide"
+        )
+    return None
 
 
 def check_places(state: RecipeState, camera: Camera, groups: dict[str, LightGroup]) -> None:

@@ -28,7 +28,12 @@ from optisense.geometry.plane_cuts import cut_along_planes
 from optisense.geometry.repair import refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
 from optisense.sensors.from_meshes._part_poses import laid_on, resting_order
-from optisense.sensors.from_meshes._placement import check_places, place_camera, place_lights
+from optisense.sensors.from_meshes._placement import (
+    check_places,
+    place_camera,
+    place_lights,
+    view_note,
+)
 from optisense.sensors.from_meshes._recipe_state import RecipeState
 from optisense.sensors.from_meshes._touching import (
     lay_on_elastomer,
@@ -103,6 +108,8 @@ class _Builder(RecipeState):
         check_places(self, camera, groups)
         design = self._imaged(self._design(materials, contacts.priorities, camera, groups))
         design.meshes.update({name: self.meshes[name] for name in self.recipe.parts})
+        seen = view_note(design)
+        self.notes += [] if seen is None else [seen]
         for name in self.of(Role.INDENTER):
             self.notes.append(
                 f"{name} is kept for reference and not pressed into the gel. Press it with "

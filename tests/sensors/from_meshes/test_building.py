@@ -191,6 +191,21 @@ def test_what_looks_odd_is_told(cad: Any) -> None:
     assert any("sees about 0 %" in note for note in design_from_meshes(cad.write(away)).notes)
     far = cad.recipe.replace("pi-v2}", "pi-v2, at: [0, 0, -300]}")
     assert any("far away" in note for note in design_from_meshes(cad.write(far)).notes)
+    above = cad.recipe.replace("pi-v2}", "pi-v2, at: [0, 0, 30]}")  # it sees the back of the skin
+    assert any("sees about 0 %" in note for note in design_from_meshes(cad.write(above)).notes)
+
+
+@pytest.mark.parametrize(("z", "told"), [(-22, ""), (-60, "fills only about 8 % of the area")])
+def test_the_share_of_the_picture_does_not_depend_on_the_triangles(
+    cad: Any, z: float, told: str
+) -> None:
+    """64 mm away, the view is 77 x 58 mm wide, of which the skin of 20 x 16 mm fills 7 %."""
+    text = cad.recipe.replace("pi-v2}", f"pi-v2, at: [0, 0, {z}]}}")
+    gel = cad.shapes()["gel"]
+    for shape in (gel, gel.subdivide().subdivide().subdivide()):
+        notes = design_from_meshes(cad.write(text, gel=shape)).notes
+        seen = [note for note in notes if "picture" in note or "camera sees" in note]
+        assert len(seen) == bool(told) and all(told in note for note in seen)
 
 
 def test_a_row_longer_than_its_side_is_told(cad: Any) -> None:
