@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Literal
@@ -69,11 +70,7 @@ def add_cage(
     corners = np.array([design.meshes[part].bounds for part in chosen])
     lower, upper = corners[:, 0].min(axis=0) - margin, corners[:, 1].max(axis=0) + margin
     thin = np.maximum(0.0, THINNEST - (upper - lower)) / 2.0
-    if min(resolution) < 2 or max(resolution) > MOST_ALONG or np.prod(resolution) > MAX_POINTS:
-        raise DesignError(
-            f"a cage can't have {_times(resolution)} control points",
-            hint=f"Give 2 to {MOST_ALONG} along each axis, {MAX_POINTS} in all at most",
-        )
+    _refuse_resolution(resolution)
     cage = Cage.around(chosen, [lower - thin, upper + thin], resolution)
     return _with_cage(design, name, cage.model_dump(mode="json"))
 
@@ -95,9 +92,11 @@ def refine_cage(design: SensorDesign, name: str, resolution: Resolution) -> Sens
     shapes.
 
     Raises:
-        DesignError: there is no such cage, or `resolution` has fewer points along an axis.
+        DesignError: there is no such cage, or `resolution` is out of range or has fewer points
+            along an axis.
     """
     cage = _cage(design, name)
+    _refuse_resolution(resolution)
     if any(new < old for new, old in zip(resolution, cage.resolution, strict=True)):
         raise DesignError(
             f"cage '{name}' has {_times(cage.resolution)} control points; "
@@ -229,6 +228,14 @@ def select_points(resolution: Resolution, which: str) -> list[int]:
             _, ny, nz = resolution
             return [(i * ny + j) * nz + k for i in axes[0] for j in axes[1] for k in axes[2]]
     raise DesignError(f"there is no control point '{which}'", hint=hint)
+
+
+def _refuse_resolution(resolution: Resolution) -> None:
+    if min(resolution) < 2 or max(resolution) > MOST_ALONG or math.prod(resolution) > MAX_POINTS:
+        raise DesignError(
+            f"a cage can't have {_times(resolution)} control points",
+            hint=f"Give 2 to {MOST_ALONG} along each axis, {MAX_POINTS} in all at most",
+        )
 
 
 def _shares(

@@ -201,6 +201,7 @@ class TestEditing:
             (lambda: add_cage(svelte, "new", []), "needs a part"),
             (lambda: add_cage(svelte, "new", ["M2"], (1, 3, 3)), "1 x 3 x 3"),
             (lambda: refine_cage(svelte, "M1", (2, 3, 3)), "fewer"),
+            (lambda: refine_cage(svelte, "M1", (10**4,) * 3), "can't have 10000 x"),
             (lambda: remove_cage(svelte, "M"), "no cage 'M'"),
             (lambda: move_points(svelte, "M1", {"0": (1, 0, 0)}), "is a blend"),
             (lambda: set_range(svelte, "M1", c_min=np.zeros((8, 3))), "8 entries"),
