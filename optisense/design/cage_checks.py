@@ -25,6 +25,8 @@ from optisense.geometry.overlaps import (
     touching,
     touching_vertices,
 )
+from optisense.geometry.rays import ray_hits
+from optisense.geometry.surface import distance_within
 
 AT_REST = 1e-9
 """Largest displacement of a control point that counts as rest, mm; a margin for rounding."""
@@ -33,6 +35,10 @@ COARSE = 0.1
 """Largest distance, mm, between the straight edges of a mesh and the smooth shape that its cage
 gives; a larger one is reported.
 """
+
+BESIDE = 1.0
+"""Largest distance (mm) of a light from a part that it lies beside, and by which the part must move
+away for a warning: about the height of an LED's package."""
 
 FOLDS = {
     "inside out": "is turned inside out by cage '{cage}' near {place}: {count} of its vertices",
@@ -147,6 +153,56 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
                     )
                 )
     return problems
+
+
+def left_lights(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
+    """Return warnings about lights that stay in place while a cage moves parts away from them or
+    across them, one for each cage and group.
+
+    Args:
+        meshes: deformed meshes, mm, by part.
+    """
+    problems: list[Diagnostic] = []
+    moved, bent = _moved_cages(design, meshes)
+    for cage_name, cage in moved.items():
+        names = [name for name in cage.parts if name in bent and name in design.meshes]
+        for group_name, group in design.lights.items():
+            left, parts = 0, set()
+            for light in group.lights:
+                place = np.array(light.position)
+                passed = {
+                    name for name in names if _leaves(cage, place, design.meshes[name], bent[name])
+                }
+                left, parts = left + bool(passed), parts | passed
+            if left:
+                problems.append(
+                    Diagnostic(
+                        f"{left} of {len(group.lights)} lights of group '{group_name}' stay in "
+                        f"place while cage '{cage_name}' moves the parts beside them: "
+                        f"{', '.join(name for name in names if name in parts)}",
+                        design.where("lights", group_name),
+                        "Move the lights too, or move the control points back: cages move parts "
+                        "only",
+                        severity="warning",
+                    )
+                )
+    return problems
+
+
+def _leaves(cage: Cage, place: NDArray[np.float64], rest: TriangleMesh, bent: TriangleMesh) -> bool:
+    """Return whether a part that a cage bends moves away from a place (3,), mm, or across it."""
+    inner = place.clip(*np.array(cage.box))
+    if np.linalg.norm(place - inner) > BESIDE:
+        return False
+    weights = cage_weights(inner, cage.box, cage.resolution)
+    way = (weights @ cage.offsets_at_rest())[0]
+    if np.linalg.norm(way) <= CONTACT:
+        return False
+    # The cage would carry the place along `way`; a part in between has moved across it.
+    if (ray_hits(bent, place + way, -way).distance < 1.0).any():
+        return True
+    before = distance_within(rest, place, BESIDE)
+    return before <= BESIDE and distance_within(bent, place, before + BESIDE) > before + BESIDE
 
 
 def _coats(surface: TriangleMesh, solid: TriangleMesh) -> bool:

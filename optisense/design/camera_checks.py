@@ -20,7 +20,7 @@ from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.rays import ray_hits
-from optisense.geometry.surface import closest_points
+from optisense.geometry.surface import distance_within
 from optisense.geometry.surface_samples import surface_samples
 
 WIDEST_PERSPECTIVE = 135.0
@@ -147,7 +147,7 @@ def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
                 )
             ]
     for name, mesh in meshes.items():
-        distance = _distance(position, mesh)
+        distance = distance_within(mesh, position, SMALLEST_CAMERA)
         if distance < 0.5 * SMALLEST_CAMERA:
             return [
                 Diagnostic(
@@ -286,16 +286,6 @@ def _small(message: str, where: str) -> Diagnostic:
         "surface",
         severity="warning",
     )
-
-
-def _distance(point: NDArray[np.float64], mesh: TriangleMesh) -> float:
-    """Return the distance from a point to a mesh, mm; infinite beyond the smallest camera."""
-    low, high = mesh.face_bounds
-    near = ((low < point + SMALLEST_CAMERA) & (high > point - SMALLEST_CAMERA)).all(axis=1)
-    if not near.any():
-        return float("inf")
-    part = mesh.with_faces(mesh.faces[near])
-    return float(np.linalg.norm(closest_points(part, point) - point, axis=1).min())
 
 
 def uniqueness_problems(design: SensorDesign) -> list[Diagnostic]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from optisense.design._focus_checks import focus_problems
 from optisense.design.addressing import get_value
 from optisense.design.arrangement import overlaps
-from optisense.design.cage_checks import cage_problems, half_caged
+from optisense.design.cage_checks import cage_problems, half_caged, left_lights
 from optisense.design.camera_checks import (
     lens_problems,
     place_problems,
@@ -91,6 +91,7 @@ def check_design(
             bent = cage_problems(design, meshes)
             problems += bent
             problems += half_caged(design, meshes)
+            problems += left_lights(design, meshes)
             if not any(problem.severity == "error" for problem in bent):
                 problems += overlaps(design, meshes)
     problems += _check_provenance(design)

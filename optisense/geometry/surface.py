@@ -242,6 +242,16 @@ def closest_points(mesh: TriangleMesh, point: FloatArray) -> FloatArray:
     return np.where(inside[:, None], foot, on_edges[np.arange(len(corners)), nearest])
 
 
+def distance_within(mesh: TriangleMesh, point: FloatArray, reach: float) -> float:
+    """Return the distance (mm) of a point (3,) from a mesh; infinite beyond about `reach` (mm)."""
+    low, high = mesh.face_bounds
+    near = ((low < point + reach) & (high > point - reach)).all(axis=1)
+    if not near.any():
+        return float("inf")
+    part = mesh.with_faces(mesh.faces[near])
+    return float(np.linalg.norm(closest_points(part, point) - point, axis=1).min())
+
+
 def _barycentric(triangle: FloatArray, point: FloatArray) -> FloatArray:
     """Return the barycentric coordinates (3,) of a point in the plane of three corners (3, 3)."""
     edges = (triangle[1:] - triangle[0]).T

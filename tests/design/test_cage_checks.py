@@ -9,6 +9,8 @@ import pytest
 
 from optisense import sensors
 from optisense.design import (
+    Part,
+    Role,
     SensorDesign,
     add_cage,
     cage_problems,
@@ -40,6 +42,18 @@ def shape(design: SensorDesign, part: str) -> np.ndarray:
 
 
 class TestChecks:
+    def test_lights_that_a_part_leaves_behind_are_told(self, mini: SensorDesign) -> None:
+        """The green lights are 0.2 mm beside the guide, and 3 mm from a wall."""
+        walled = mini.model_copy(deep=True)
+        walled.parts["wall"] = Part(role=Role.BLOCKER, mesh="wall.obj")
+        walled.meshes["wall"] = TriangleMesh.box((-17, -9, -9), (-16, 9, -6))
+        caged = add_cage(walled, "g", ["guide", "wall"], (2, 2, 2))
+        for way, parts in ((0.5, ""), (2.0, "guide"), (6.0, "guide, wall")):
+            moved = move_points(caged, "g", {"*,*,*": (way, 0.0, 0.0)})
+            said = [each.message for each in check_design(moved) if "'green' stay" in each.message]
+            assert len(said) == bool(parts) and all(each.endswith(f": {parts}") for each in said)
+            assert all(each.startswith("5 of 5 lights") for each in said)
+
     def test_built_in_bends_are_fine(self) -> None:
         for build in (
             sensors.gelsight_mini_ideal_cylindrical,
