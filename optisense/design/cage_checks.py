@@ -167,7 +167,8 @@ def left_lights(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     for cage_name, cage in moved.items():
         names = [name for name in cage.parts if name in bent and name in design.meshes]
         for group_name, group in design.lights.items():
-            left, parts = 0, set()
+            left = 0
+            parts: set[str] = set()
             for light in group.lights:
                 place = np.array(light.position)
                 passed = {

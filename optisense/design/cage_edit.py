@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+import numbers
+import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import ValidationError
 
-from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array, as_points
+from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array
+from optisense.design.limits import LARGEST
 from optisense.design.problems import design_error
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
@@ -50,9 +53,17 @@ def add_cage(
 
     Raises:
         DesignError: there is a cage of that name, a part is unknown, has no mesh or is in a cage
-            already, or the resolution is out of range.
+            already, or the resolution or the margin is out of range.
     """
+    if isinstance(parts, str):
+        raise DesignError(
+            f"the parts of a cage are a list of names, not '{parts}'",
+            hint=f"Write ['{parts}'], also for a single one",
+        )
     chosen = list(parts)
+    resolution = _counts(resolution)
+    if not (_is_number(margin) and 0.0 <= margin <= LARGEST):
+        raise DesignError(f"the margin of a cage is {margin}", hint=f"Give 0 to {LARGEST:g}, in mm")
     if name in design.cages:
         raise DesignError(
             f"there is a cage '{name}' already", where=design.where("cages", name),
@@ -70,7 +81,6 @@ def add_cage(
     corners = np.array([design.meshes[part].bounds for part in chosen])
     lower, upper = corners[:, 0].min(axis=0) - margin, corners[:, 1].max(axis=0) + margin
     thin = np.maximum(0.0, THINNEST - (upper - lower)) / 2.0
-    _refuse_resolution(resolution)
     cage = Cage.around(chosen, [lower - thin, upper + thin], resolution)
     return _with_cage(design, name, cage.model_dump(mode="json"))
 
@@ -96,7 +106,7 @@ def refine_cage(design: SensorDesign, name: str, resolution: Resolution) -> Sens
             along an axis.
     """
     cage = _cage(design, name)
-    _refuse_resolution(resolution)
+    resolution = _counts(resolution)
     if any(new < old for new, old in zip(resolution, cage.resolution, strict=True)):
         raise DesignError(
             f"cage '{name}' has {_times(cage.resolution)} control points; "
@@ -141,6 +151,8 @@ def move_points(
         DesignError: there is no such cage or point, or the shape is set by a blend.
     """
     cage = _cage(design, name)
+    if of not in get_args(Shape):
+        raise DesignError(f"a cage has no '{of}'", hint=f"Give {', '.join(get_args(Shape))}")
     if of == "points" and cage.blend is not None:
         raise DesignError(
             f"the shape of cage '{name}' is a blend of c_min and c_max",
@@ -156,8 +168,8 @@ def move_points(
         )
     points = as_array(current)
     for which, way in moves.items():
-        step = np.asarray(way, dtype=np.float64)
-        if step.shape != (3,) or not np.isfinite(step).all():
+        step = _array(way)
+        if step is None or step.shape != (3,) or not np.isfinite(step).all():
             raise DesignError(
                 f"points '{which}' of cage '{name}' can't be moved by {way}",
                 hint="Give three numbers: mm along x, y and z",
@@ -188,8 +200,21 @@ def set_range(
     now = cage.current_points()
     data = cage.model_dump(mode="json")
     for field, given in (("c_min", c_min), ("c_max", c_max)):
-        data[field] = _plain(now if given is None else np.asarray(given, dtype=np.float64))
-    data["blend"] = blend
+        points = now if given is None else _array(given)
+        if points is None or points.shape[1:] != (3,) or not np.isfinite(points).all():
+            raise DesignError(
+                f"{field} of cage '{name}' is no array of finite control points",
+                where=design.where("cages", name, field),
+                hint=f"Give {len(now)} rows of x, y, z, in mm",
+            )
+        data[field] = _plain(points)
+    if not (blend is None or _is_number(blend)):
+        raise DesignError(
+            f"the blend of cage '{name}' is no number",
+            where=design.where("cages", name, "blend"),
+            hint="Give 0 (c_min) to 1 (c_max), or None",
+        )
+    data["blend"] = None if blend is None else float(blend)
     data["points"] = _plain(now) if blend is None else []
     return _with_cage(design, name, data)
 
@@ -216,7 +241,7 @@ def select_points(resolution: Resolution, which: str) -> list[int]:
         f"Write a number below {count}, or i,j,k below {','.join(map(str, resolution))}, with * "
         "for all of an axis"
     )
-    text = which.replace(" ", "")
+    text = which.replace(" ", "") if isinstance(which, str) else ""
     if re.fullmatch(r"\d+", text) and int(text) < count:
         return [int(text)]
     if re.fullmatch(r"(\d+|\*),(\d+|\*),(\d+|\*)", text):
@@ -227,15 +252,39 @@ def select_points(resolution: Resolution, which: str) -> list[int]:
         if all(max(axis) < size for axis, size in zip(axes, resolution, strict=True)):
             _, ny, nz = resolution
             return [(i * ny + j) * nz + k for i in axes[0] for j in axes[1] for k in axes[2]]
-    raise DesignError(f"there is no control point '{which}'", hint=hint)
+    raise DesignError(f"there is no control point {which!r}", hint=hint)
 
 
-def _refuse_resolution(resolution: Resolution) -> None:
-    if min(resolution) < 2 or max(resolution) > MOST_ALONG or math.prod(resolution) > MAX_POINTS:
+def _counts(resolution: Iterable[int]) -> Resolution:
+    """Return the numbers of control points along x, y, z as Python's integers.
+
+    Raises:
+        DesignError: they are not three integers, or out of range.
+    """
+    hint = f"Give 2 to {MOST_ALONG} along each axis, {MAX_POINTS} in all at most"
+    try:
+        nx, ny, nz = (operator.index(count) for count in resolution)
+    except (TypeError, ValueError):
         raise DesignError(
-            f"a cage can't have {_times(resolution)} control points",
-            hint=f"Give 2 to {MOST_ALONG} along each axis, {MAX_POINTS} in all at most",
-        )
+            f"the resolution of a cage is {resolution!r}, not three integers such as (5, 5, 3)",
+            hint=hint,
+        ) from None
+    counts = nx, ny, nz
+    if min(counts) < 2 or max(counts) > MOST_ALONG or math.prod(counts) > MAX_POINTS:
+        raise DesignError(f"a cage can't have {_times(counts)} control points", hint=hint)
+    return counts
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def _array(values: object) -> NDArray[np.float64] | None:
+    """Return numbers as an array; None if they are something else."""
+    try:
+        return np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
 
 
 def _shares(
@@ -279,7 +328,7 @@ def _with_cage(design: SensorDesign, name: str, cage: dict[str, Any]) -> SensorD
 
 
 def _plain(points: NDArray[np.float64]) -> list[dict[str, float]]:
-    return [point.model_dump() for point in as_points(points)]
+    return [{"x": x, "y": y, "z": z} for x, y, z in points.tolist()]
 
 
 def _times(resolution: Resolution) -> str:

@@ -216,7 +216,7 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     if turned.all():
         notes.append("it was inside out and has been turned over")
         return mesh.with_faces(faces)
-    for label in np.flatnonzero(depths % 2 == 1):
+    for label in np.flatnonzero(depths % 2 == 1).tolist():
         outermost = np.flatnonzero(within[label] & (depths == 0))[0]
         if over[label] != over[outermost]:
             turned[labels == label] = False

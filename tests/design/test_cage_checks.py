@@ -184,7 +184,7 @@ class TestEditing:
 
     def test_refining_and_settling_keep_the_shape(self, svelte: SensorDesign) -> None:
         for changed in (
-            refine_cage(svelte, "M1", (5, 4, 7)),
+            refine_cage(svelte, "M1", np.array([5, 4, 7])),
             settle_cage(svelte, "M1"),
             refine_cage(settle_cage(svelte, "M1"), "M1", (4, 3, 3)),
         ):
@@ -208,6 +208,7 @@ class TestEditing:
                 select_points((3, 3, 3), wrong)
 
     def test_what_cannot_be_edited_says_why(self, svelte: SensorDesign) -> None:
+        settled = settle_cage(svelte, "M1")
         for edit, message in (
             (lambda: add_cage(svelte, "M1", ["M2"]), "already"),
             (lambda: add_cage(svelte, "new", ["M1"]), "two cages"),
@@ -219,6 +220,17 @@ class TestEditing:
             (lambda: remove_cage(svelte, "M"), "no cage 'M'"),
             (lambda: move_points(svelte, "M1", {"0": (1, 0, 0)}), "is a blend"),
             (lambda: set_range(svelte, "M1", c_min=np.zeros((8, 3))), "8 entries"),
+            (lambda: add_cage(svelte, "new", "M2"), "list of names"),
+            (lambda: add_cage(svelte, "new", ["M2"], margin=-1.0), "margin of a cage is -1"),
+            (lambda: add_cage(svelte, "new", ["M2"], margin=np.nan), "margin of a cage is nan"),
+            (lambda: refine_cage(svelte, "M1", "5x5x3"), "not three integers"),
+            (lambda: set_range(svelte, "M1", c_max=np.full((27, 3), np.nan)), "finite control"),
+            (lambda: set_range(svelte, "M1", c_max=np.zeros((3, 3, 9))), "finite control"),
+            (lambda: set_range(svelte, "M1", blend=np.zeros((27, 3))), "no number"),
+            (lambda: move_points(settled, "M1", {(1, 1, 1): (1, 0, 0)}), "no control point"),
+            (lambda: move_points(settled, "M1", {"0": "1,0,0"}), "can't be moved by 1,0,0"),
+            (lambda: move_points(settled, "M1", {"0": (1e300, 0, 0)}), "should be less"),
+            (lambda: move_points(settled, "M1", {"0": (1, 0, 0)}, "max"), "has no 'max'"),
         ):
             with pytest.raises(DesignError, match=message):
                 edit()
