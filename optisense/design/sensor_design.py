@@ -62,7 +62,8 @@ class SensorDesign(Model):
     """Camera-based tactile sensor. Lengths in mm, angles in degrees, powers in mW.
 
     `design.meshes` holds the undeformed mesh of each part by name; it is not part of the design
-    file but stored next to it. Changing a field checks it; see also `set_value`.
+    file but stored next to it. Meshes never change: assign another one, such as
+    ``mesh.with_vertices(...)``. Changing a field checks it; see also `set_value`.
     """
 
     schema_version: Literal[1] = Field(default=1, description="version of this file format")

@@ -94,7 +94,11 @@ def as_manifold(mesh: TriangleMesh) -> Any:
     import manifold3d
 
     welded = mesh.welded()
-    return manifold3d.Manifold(manifold3d.Mesh64(welded.vertices, welded.faces.astype(np.uint64)))
+    vertices, faces = (
+        welded.vertices.copy(),
+        welded.faces.astype(np.uint64),
+    )  # it takes no read-only
+    return manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
 
 
 def of_manifold(solid: Any) -> TriangleMesh:

@@ -33,7 +33,8 @@ class TriangleMesh:
     """An indexed triangle mesh, open or closed, in mm.
 
     Faces wind counter-clockwise seen from the side their normal points to. Nothing is
-    checked on construction beyond the array shapes; see `validate`.
+    checked on construction beyond the array shapes; see `validate`. A mesh never changes: its
+    arrays are read-only, and arrays that can be written to are copied when it is made.
 
     Attributes:
         vertices: (n, 3) float64, mm.
@@ -46,17 +47,22 @@ class TriangleMesh:
     normals: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        vertices = np.asarray(self.vertices, dtype=np.float64).reshape(-1, 3)
-        object.__setattr__(self, "vertices", vertices)
-        object.__setattr__(self, "faces", np.asarray(self.faces, dtype=np.int32).reshape(-1, 3))
+        object.__setattr__(self, "vertices", _fixed_rows(self.vertices, np.float64))
+        object.__setattr__(self, "faces", _fixed_rows(self.faces, np.int32))
         if self.normals is not None:
-            normals = np.asarray(self.normals, dtype=np.float64).reshape(-1, 3)
-            if len(normals) != len(vertices):
+            object.__setattr__(self, "normals", _fixed_rows(self.normals, np.float64))
+            if len(self.normals) != len(self.vertices):
                 raise MeshError(
-                    f"a mesh has {len(vertices)} vertices but {len(normals)} normals",
+                    f"a mesh has {len(self.vertices)} vertices but {len(self.normals)} normals",
                     hint="Give one normal for each vertex, or none",
                 )
-            object.__setattr__(self, "normals", normals)
+
+    def __deepcopy__(self, memo: object) -> TriangleMesh:
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the arrays alone; they are read-only again when the mesh is made of them."""
+        return TriangleMesh, (self.vertices, self.faces, self.normals)
 
     # ---- making
 
@@ -276,6 +282,14 @@ class TriangleMesh:
             self.triangles, self.faces, self.face_normals, crease
         )
         return TriangleMesh(self.vertices[vertex], faces, normals)
+
+
+def _fixed_rows(values: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
+    """Return a read-only array (n, 3) of the values, which is a copy unless they are read-only."""
+    fixed = isinstance(values, np.ndarray) and not values.flags.writeable
+    array = np.asarray(values, dtype=dtype) if fixed else np.array(values, dtype=dtype)
+    array.setflags(write=False)
+    return array.reshape(-1, 3)
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:

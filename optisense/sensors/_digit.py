@@ -320,8 +320,9 @@ def _gel(
         corners = max(12, math.ceil(share * len(rim)))
         rings.append(_ring(share * _resampled(smooth, corners), -rise * share * share))
     mesh = stacked(rings)
-    mesh.vertices[-1, 2] = 0.0  # the top
-    return mesh
+    vertices = mesh.vertices.copy()
+    vertices[-1, 2] = 0.0  # the top
+    return mesh.with_vertices(vertices)
 
 
 def _resampled(polygon: FloatArray, count: int) -> FloatArray:

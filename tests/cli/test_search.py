@@ -195,7 +195,9 @@ def test_a_study_that_was_edited_is_refused_with_the_difference(
     shutil.copytree(study, copy)
     design = copy / "design"
     edited = ots.set_value(ots.load_design(design), "lights.red.flux", 12.0)
-    edited.meshes["gel"].vertices[0] += 0.01
+    vertices = edited.meshes["gel"].vertices.copy()
+    vertices[0] += 0.01
+    edited.meshes["gel"] = edited.meshes["gel"].with_vertices(vertices)
     ots.save_design(edited, design)
     result = run("--resume", "--out", copy)
     assert result.exit_code == 2

@@ -1,5 +1,7 @@
 """Facts about triangle meshes: closed forms, round trips, and bad files."""
 
+import copy
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,20 @@ def test_box_is_closed_with_the_volume_and_area_of_a_box() -> None:
     assert mesh.volume == pytest.approx(3 * 4 * 4)
     assert mesh.area == pytest.approx(2 * (3 * 4 + 3 * 4 + 4 * 4))
     np.testing.assert_allclose(mesh.bounds, [[-1, -2, -3], [2, 2, 1]])
+
+
+def test_a_mesh_never_changes() -> None:
+    corners = np.eye(3)
+    made = TriangleMesh(corners, [[0, 1, 2]], corners)
+    corners[0, 0] = 7.0
+    for mesh in (made, copy.deepcopy(made), pickle.loads(pickle.dumps(made))):
+        assert mesh.normals is not None
+        np.testing.assert_array_equal(mesh.vertices, np.eye(3))
+        np.testing.assert_array_equal(mesh.normals, np.eye(3))
+        for array in (mesh.vertices, mesh.faces, mesh.normals):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0, 0] = 2
+    assert np.shares_memory(TriangleMesh(made.vertices, made.faces).vertices, made.vertices)
 
 
 def test_grid_faces_up() -> None:
