@@ -11,9 +11,8 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 
-from optisense.design.problems import design_error
 from optisense.design.sensor_design import SensorDesign, dotted
 from optisense.errors import DesignError
 from optisense.near import suggestion
@@ -52,7 +51,7 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
     Raises:
         DesignError: a path names nothing, or the values do not fit there.
     """
-    data = design.model_dump(mode="json")
+    data = design._data()
     for path, value in values.items():
         get_value(design, path)  # raises an error that suggests a similar name
         target: Any = data
@@ -60,10 +59,7 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
         for step in way:
             target = target[_key(target, step)]
         target[_key(target, last)] = _plain(value)
-    try:
-        return design._replaced(data)
-    except ValidationError as error:
-        raise design_error(error, data, where=", ".join(values)) from None
+    return design._replaced(data, where=", ".join(values))
 
 
 def parse_path(path: str) -> Steps:

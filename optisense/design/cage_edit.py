@@ -11,11 +11,9 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import ValidationError
 
 from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array
 from optisense.design.limits import LARGEST
-from optisense.design.problems import design_error
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry.cage_map import refined_points
@@ -321,10 +319,7 @@ def _known(names: Iterable[str], wanted: str = "") -> str:
 def _with_cage(design: SensorDesign, name: str, cage: dict[str, Any]) -> SensorDesign:
     data = design.model_dump(mode="json")
     data["cages"][name] = cage
-    try:
-        return design._replaced(data)
-    except ValidationError as error:
-        raise design_error(error, data, where=f"cage '{name}'") from None
+    return design._replaced(data, where=f"cage '{name}'")
 
 
 def _plain(points: NDArray[np.float64]) -> list[dict[str, float]]:

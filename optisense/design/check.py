@@ -21,7 +21,7 @@ from optisense.design.limits import placed_things, unit_slips
 from optisense.design.material_checks import absorption_problems, index_problems
 from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.problems import Diagnostic
+from optisense.design.problems import Diagnostic, invalid_values
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError, MeshError, OptiSenseError
 from optisense.geometry import TriangleMesh
@@ -53,8 +53,9 @@ def check_design(
     transparent parts that absorb all light, a sensing surface that faces the wrong way, lies off
     the elastomer, is mostly out of the camera's view or out of its focus, parts that cages have
     folded or pushed together, cages that would tear a sensing surface off its elastomer, solids
-    that overlap with one priority, and provenance of values that don't exist. (Fields, ranges and
-    references between parts are checked when a design is created.)
+    that overlap with one priority, and provenance of values that don't exist. Fields, ranges and
+    references between parts are checked when a design is created; they are checked again first, for
+    edits inside lists and sections, and no other problem is looked for if one of them is wrong.
 
     Args:
         design: design to check.
@@ -63,11 +64,13 @@ def check_design(
     Returns:
         Problems in the order of the design file; an empty list if there are none.
     """
-    problems: list[Diagnostic] = []
+    problems = invalid_values(design)
+    if problems:  # the other checks rely on valid values
+        return problems
     meshes: dict[str, TriangleMesh] = {}
     for name in design.parts:
         problems += _check_mesh(design, name, meshes)
-    problems += unit_slips(design)
+    problems += unit_slips(design, meshes)
     problems += lens_problems(design.camera, design.where("camera", "fov"))
     problems += uniqueness_problems(design)
     of_kinds = _check_kinds(design)
@@ -104,12 +107,10 @@ def _check_mesh(
     """Put the part's mesh into `meshes` unless it has a problem."""
     part = design.parts[name]
     place = design.where("parts", name, "mesh")
-    if name not in design.meshes:
-        return [Diagnostic(f"part '{name}' has no mesh", place, "Set design.meshes[name]")]
     try:
-        mesh = design.meshes[name].validate(name, closed=part.role in TRANSPARENT_SOLIDS)
-    except MeshError as error:
-        return [Diagnostic(f"part '{name}': {error.message}", place, error.hint)]
+        mesh = design.valid_mesh(name)
+    except (DesignError, MeshError) as error:
+        return [Diagnostic(error.message, place, error.hint)]
     meshes[name] = mesh
     if part.role is Role.SENSING_SURFACE and mesh.is_closed:
         return [

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, Any, cast
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, GetCoreSchemaHandler
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    ValidationError,
+)
 from pydantic_core import CoreSchema
 
 LARGEST_NUMBER = 1e12
@@ -95,6 +102,21 @@ class Model(BaseModel):
     """Base class of all models in a design file: unknown fields are refused, changes checked."""
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set a field if the value fits.
+
+        Raises:
+            DesignError: the value does not fit; the field is unchanged.
+        """
+        before = dict(self.__dict__)
+        try:
+            super().__setattr__(name, value)
+        except ValidationError as error:
+            from optisense.design.problems import design_error
+
+            self.__dict__.update(before)  # pydantic sets it before it compares fields
+            raise design_error(error, {name: value}, where=name, model=type(self)) from None
 
 
 def unit_of(model: type[BaseModel], name: str) -> str:

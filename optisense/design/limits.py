@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
 
 LARGEST = 1000.0
 """Largest size of a part, and largest distance of a light or camera from the origin, mm; larger
@@ -21,10 +24,14 @@ SMALLEST = 0.5
 """Smallest size of a part in its largest dimension, mm; thin parts are larger in the others."""
 
 
-def unit_slips(design: SensorDesign) -> list[Diagnostic]:
-    """Return problems of parts, lights and camera whose sizes or distances suggest another unit."""
+def unit_slips(design: SensorDesign, meshes: Mapping[str, TriangleMesh]) -> list[Diagnostic]:
+    """Return problems of parts, lights and camera whose sizes or distances suggest another unit.
+
+    Args:
+        meshes: valid meshes of parts, by name.
+    """
     problems: list[Diagnostic] = []
-    for name, mesh in design.meshes.items():
+    for name, mesh in meshes.items():
         place = design.where("parts", name, "mesh")
         extent = float(np.ptp(mesh.bounds, axis=0).max())
         far = float(np.abs(mesh.bounds).max())

@@ -73,22 +73,39 @@ def design_error(
     error: ValidationError,
     data: Any,
     *,
-    where: str,
+    where: str = "",
     lines: Lines | None = None,
     model: type[BaseModel] = SensorDesign,
 ) -> DesignError:
     """Return the DesignError for an error of pydantic.
 
     Args:
-        where: file, or dotted path that was set.
+        where: file, or dotted path that was set; empty for the dotted paths of the problems.
         lines: line of each path in the file, if there is one.
     """
     problems = _problems(error, data, where, lines or {}, model)
     try:
-        raise_problems(problems, where, unseen=max(error.error_count() - MAX_EXAMINED, 0))
+        raise_problems(
+            problems, where or "the design", unseen=max(error.error_count() - MAX_EXAMINED, 0)
+        )
     except DesignError as found:
         return found
     raise AssertionError("pydantic reported no problem")  # it always reports one
+
+
+def invalid_values(design: SensorDesign) -> list[Diagnostic]:
+    """Return the problems of values that a design has got by edits inside its lists and sections,
+    which are not checked when they are made.
+    """
+    try:
+        data = design._data()
+        type(design).model_validate(data)
+    except DesignError as error:
+        return [Diagnostic(error.message, design.where() or "design", error.hint)]
+    except ValidationError as error:
+        where = "" if design._source is None else str(design._source)
+        return _problems(error, data, where, design._lines, type(design))
+    return []
 
 
 def _problems(
@@ -175,7 +192,7 @@ def _path_in(data: Any, location: tuple[str | int, ...]) -> Path:
 
 def _place(path: Path, where: str, lines: Lines) -> str:
     if not lines:
-        return where
+        return where or dotted(path)
     for length in range(len(path), -1, -1):
         if path[:length] in lines:
             return f"{where}:{lines[path[:length]]}"

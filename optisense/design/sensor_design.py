@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, StringConstraints, model_validator
+from pydantic import Field, PrivateAttr, StringConstraints, ValidationError, model_validator
+from pydantic_core import PydanticSerializationError
 
 from optisense.design.cage import Cage
 from optisense.design.camera import Camera
@@ -18,8 +19,8 @@ from optisense.design.lights import LightGroup
 from optisense.design.markers import Markers
 from optisense.design.materials import CoatingModel, Material, kinds_for
 from optisense.design.part_faces import check_finishes
-from optisense.design.parts import Part, Role
-from optisense.errors import DesignError
+from optisense.design.parts import TRANSPARENT_SOLIDS, Part, Role
+from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.near import suggestion
 from optisense.text import to_html
@@ -179,6 +180,30 @@ class SensorDesign(Model):
         skins = [self._meshes.get(name) for name in self.parts_of(Role.SENSING_SURFACE)]
         return float(sum(skin.face_areas.sum() for skin in skins if skin is not None))
 
+    def valid_mesh(self, name: str) -> TriangleMesh:
+        """Return the undeformed mesh of a part, with outward faces if it is a transparent solid.
+
+        Raises:
+            DesignError: the part has no mesh, or an object of another type.
+            MeshError: the mesh has no triangles, a coordinate that is not finite, a face that names
+                a missing vertex, or, if it is a transparent solid, an open edge.
+        """
+        mesh, where = self._meshes.get(name), self.where("parts", name, "mesh")
+        if mesh is None:
+            hint = "Set design.meshes[name]"
+            raise DesignError(f"part '{name}' has no mesh", where=where, hint=hint)
+        if not isinstance(mesh, TriangleMesh):
+            raise DesignError(
+                f"the mesh of part '{name}' is of type {type(mesh).__name__}",
+                where=where,
+                hint="Set design.meshes[name] to TriangleMesh(mesh.vertices, mesh.faces)",
+            )
+        try:
+            return mesh.validate(name, closed=self.parts[name].role in TRANSPARENT_SOLIDS)
+        except MeshError as error:
+            message = f"part '{name}': {error.message}"
+            raise MeshError(message, where=where, hint=error.hint) from error
+
     def deformed_meshes(self) -> dict[str, TriangleMesh]:
         """Return the mesh of each part in its current shape: as stored, then deformed by its cage.
 
@@ -236,8 +261,12 @@ class SensorDesign(Model):
         return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
     def copy(self) -> SensorDesign:  # type: ignore[override]
-        """Return an independent design; the meshes, which never change, are shared."""
-        return self._replaced(self.model_dump(mode="json"))
+        """Return an independent design; the meshes, which never change, are shared.
+
+        Raises:
+            DesignError: a value that was edited inside a list or a section does not fit.
+        """
+        return self._replaced(self._data())
 
     def _repr_html_(self) -> str:
         """Return a labelled section, for notebooks."""
@@ -259,9 +288,35 @@ class SensorDesign(Model):
                 return f"{self._source}:{self._lines[path[:length]]}"
         return f"{self._source}: {dotted(path)}"
 
-    def _replaced(self, data: dict[str, object]) -> SensorDesign:
-        """Return a design of these values with this one's meshes and files."""
-        design = type(self).model_validate(data)
+    def _data(self) -> dict[str, Any]:
+        """Return the values as in a design file; they are not checked.
+
+        Raises:
+            DesignError: a value is of a type that no design file holds.
+        """
+        try:
+            return self.model_dump(mode="json", warnings=False)
+        except PydanticSerializationError as error:
+            raise DesignError(f"the design has a value of a wrong type: {error}") from None
+
+    def _replaced(self, data: dict[str, Any], where: str = "") -> SensorDesign:
+        """Return a design of these values with this one's meshes and files.
+
+        Args:
+            where: place of the values in errors; by default the lines of this design's file or, if
+                there is none, the dotted paths.
+
+        Raises:
+            DesignError: the values don't fit.
+        """
+        try:
+            design = type(self).model_validate(data)
+        except ValidationError as error:
+            from optisense.design.problems import design_error
+
+            if where or self._source is None:
+                raise design_error(error, data, where=where) from None
+            raise design_error(error, data, where=str(self._source), lines=self._lines) from None
         design._meshes = {n: m for n, m in self._meshes.items() if n in design.parts}
         design._source = self._source
         design._lines = self._lines

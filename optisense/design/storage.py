@@ -72,7 +72,7 @@ def load_design(path: str | Path) -> SensorDesign:
     for place, value in design.values_of_kinds().items():
         for field, named in value.located(folder).files().items():
             file_inside(folder, named, design.where(*place, field))
-    raise_problems(unit_slips(design), str(file))
+    raise_problems(unit_slips(design, design.meshes), str(file))
     return design
 
 

@@ -105,7 +105,7 @@ class Renderer:
         """
         from optisense.optics import OpticalModel
 
-        raise_problems(unit_slips(design), f"design '{design.name}'")
+        raise_problems(unit_slips(design, design.meshes), f"design '{design.name}'")
         if self._model is None:
             self._model = OpticalModel(design, self.variant, self._drafts)
         elif _is_another(self._model.design, design):
@@ -125,7 +125,7 @@ class Renderer:
         from optisense.optics import OpticalModel as Usual  # first: it checks libLLVM
         from optisense.optics.drafts import DraftModel
 
-        raise_problems(unit_slips(design), f"design '{design.name}'")
+        raise_problems(unit_slips(design, design.meshes), f"design '{design.name}'")
         if self._drafts is None:
             self._drafts = DraftModel(design, self.variant, self._model)
         else:

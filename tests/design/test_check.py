@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,6 +15,7 @@ from optisense.design.arrangement import may_overlap
 from optisense.design.cage_checks import _overlap
 from optisense.design.camera_checks import view_shares
 from optisense.design.check import inside
+from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.search.space.constraints import NoCrossings
 
@@ -42,6 +48,40 @@ def test_nan_in_a_mesh(design: SensorDesign) -> None:
     vertices[0, 0] = np.nan
     design.meshes["wall"] = design.meshes["wall"].with_vertices(vertices)
     assert any("'wall'" in problem.message for problem in check_design(design))
+
+
+EDITS: dict[str, Callable[[Any], object]] = {
+    "unknown material 'nope'": lambda design: setattr(design.parts["gel"], "material", "nope"),
+    "unknown part 'nope'": lambda design: design.cages["skin"].parts.append("nope"),
+    "unknown part 'gel'": lambda design: design.parts.pop("gel"),
+    "is made of an unknown material": lambda design: design.materials.clear(),
+    "letters, digits": lambda design: design.parts.update({"ü b": design.parts["gel"]}),
+    "points has 7 entries": lambda design: design.cages["skin"].points.pop(),
+    "lights[1]": lambda design: design.lights["red"].lights.append("x"),
+    "wrong type": lambda design: design.lights["red"].lights.append(object()),
+}
+"""Edits inside lists and sections that make a design invalid, by a part of the message."""
+
+
+@pytest.mark.parametrize("message", EDITS)
+def test_edits_inside_sections_are_told_alike_by_all(design: SensorDesign, message: str) -> None:
+    EDITS[message](design)
+    assert any(message in problem.message for problem in check_design(design))
+    for use in (SensorDesign.copy, lambda given: set_value(given, "camera.fov", 30.0)):
+        with pytest.raises(DesignError, match=re.escape(message)):
+            use(design)
+
+
+def test_an_object_that_is_no_mesh(design: SensorDesign) -> None:
+    design.meshes["gel"] = SimpleNamespace(vertices=(), faces=())  # type: ignore[assignment]
+    problem = only(check_design(design))
+    assert "SimpleNamespace" in problem.message and "TriangleMesh(" in str(problem.hint)
+
+
+@pytest.mark.parametrize("faces", [[], [[0, 1, 2]]])
+def test_a_mesh_without_vertices(design: SensorDesign, faces: list[list[int]]) -> None:
+    design.meshes["gel"] = TriangleMesh([], faces)
+    assert "part 'gel'" in only(check_design(design)).message
 
 
 def test_a_missing_mesh(design: SensorDesign) -> None:

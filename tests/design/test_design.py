@@ -90,10 +90,14 @@ def test_bounds_enclose_all_parts(design: SensorDesign) -> None:
 
 
 def test_changes_in_place_are_checked(design: SensorDesign) -> None:
-    with pytest.raises(ValidationError):
+    with pytest.raises(DesignError, match="fov"):
         design.camera.fov = float("inf")
-    with pytest.raises(ValidationError):
+    with pytest.raises(DesignError, match="specularity"):
         design.coating.specularity = 2.0
+    without_skin = {name: part for name, part in design.parts.items() if name != "skin"}
+    with pytest.raises(DesignError, match="no part is a sensing_surface"):
+        design.parts = without_skin
+    assert "skin" in design.parts  # as before
 
 
 @pytest.mark.parametrize("given", ["gelsight-mini-ideal", Path("my-sensor"), None])
