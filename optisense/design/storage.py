@@ -89,8 +89,9 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
             is left empty, and files that a killed process has left are removed first.
 
     Raises:
-        DesignError: a part has no mesh, or two parts with different meshes (or two lamps
-            or materials with different files) share a file.
+        DesignError: a value does not fit, a part has no mesh, or two parts with different meshes
+            (or two lamps or materials with different files) share a file.
+        MeshError: a mesh could not be loaded again; see `SensorDesign.valid_mesh`.
         FolderInUseError: another process is writing to the folder.
         OutputError: the folder can't be written, or is not empty though it must be.
     """
@@ -99,9 +100,9 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
         with begun(folder, files_of(design)):
             save_design(design, folder)
         return
-    meshes = {name: _as_obj(part.mesh) for name, part in design.parts.items()}
-    _check_saveable(design, meshes)
     saved = design.copy()
+    meshes = {name: _as_obj(part.mesh) for name, part in design.parts.items()}
+    _check_saveable(saved, meshes)
     for name, file in meshes.items():
         saved.parts[name].mesh = file
     with held(folder), written_together("the design") as stage:
@@ -210,10 +211,7 @@ def _as_obj(file: str) -> str:
 def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
     owner: dict[str, str] = {}
     for name, file in files.items():
-        if name not in design.meshes:
-            raise DesignError(
-                f"part '{name}' has no mesh", where=f"parts.{name}", hint="Set design.meshes[name]"
-            )
+        design.valid_mesh(name)
         first = owner.setdefault(file.casefold(), name)
         if design.meshes[first] is not design.meshes[name] and not _same(
             design.meshes[first], design.meshes[name]

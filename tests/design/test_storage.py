@@ -305,6 +305,23 @@ class TestSaving:
             save_design(changed, folder)
         assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before
 
+    def test_what_could_not_be_loaded_is_not_saved(
+        self, design: SensorDesign, folder: Path
+    ) -> None:
+        before = {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+        gel = design.meshes["gel"]
+        bad = {
+            "no triangles": TriangleMesh([], []),
+            "not finite": gel.with_vertices(np.where(gel.vertices > 0.0, np.nan, gel.vertices)),
+            "not closed": gel.with_faces(gel.faces[1:]),
+            "does not exist": gel.with_faces(gel.faces + len(gel.vertices)),
+        }
+        for message, mesh in bad.items():
+            design.meshes["gel"] = mesh
+            with pytest.raises(MeshError, match=f"'gel'.*{message}"):
+                save_design(design, folder)
+        assert {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()} == before
+
     def test_other_files_in_the_folder_stay(self, design: SensorDesign, folder: Path) -> None:
         (folder / "notes.txt").write_text("keep me")
         save_design(design, folder)
