@@ -27,6 +27,7 @@ from optisense.geometry.indenter_kinds import (
 )
 from optisense.geometry.mesh import TriangleMesh, grid_faces
 from optisense.geometry.rotations import turn_about_axes
+from optisense.text import brief
 
 
 @dataclass(frozen=True)
@@ -170,6 +171,15 @@ class MeshIndenter(IndenterKind):
 
     source: TriangleMesh | str | Path
     scale: float = quantity("", "The factor from the file's unit to mm.", 1.0, low=ABOVE_ZERO)
+
+    def __post_init__(self) -> None:
+        """Raise ContactError if the source is neither a mesh nor a path, or by the scale."""
+        super().__post_init__()
+        if not isinstance(self.source, TriangleMesh | str | Path):
+            raise ContactError(
+                f"a MeshIndenter can't be made of {brief(repr(self.source))}",
+                hint="Give a file, or TriangleMesh(mesh.vertices, mesh.faces)",
+            )
 
     @classmethod
     def from_text(cls, text: str) -> MeshIndenter:

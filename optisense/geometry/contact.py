@@ -16,6 +16,7 @@ from optisense.geometry.indenter_kinds import FACET_ERROR, Indenter
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
+from optisense.text import brief
 
 REACH_MARGIN = 0.5
 """Height (mm) above the undeformed surface up to which an indenter is modelled beyond its contact,
@@ -42,6 +43,8 @@ on another tessellation of a curved surface are nearer, and a mistyped number is
 @dataclass(frozen=True)
 class Contact:
     """An indenter pressed into the sensing surface along its inward normal.
+
+    Lists and arrays of numbers are converted into tuples.
 
     Attributes:
         indenter: the indenter.
@@ -74,44 +77,63 @@ class Contact:
     twist: float = 0.0
 
     def __post_init__(self) -> None:
+        if isinstance(self.indenter, type) or not callable(getattr(self.indenter, "mesh", None)):
+            raise ContactError(
+                f"the indenter of a contact is {brief(repr(self.indenter))}",
+                hint="Give one such as Sphere(2), or MeshIndenter(mesh) for a mesh",
+            )
         if self.at is not None and self.point is not None:
             raise ContactError("a contact has both `at` and `point`", hint="Give one of them")
-        for values, count in ((self.at, 2), (self.point, 3)):
-            if values is not None and (
-                len(values) != count or not all(math.isfinite(value) for value in values)
-            ):
-                raise ContactError(
-                    f"a contact place needs {count} finite numbers, not {values}",
-                    hint="Give `at` as (u, v) or `point` as (x, y, z), in mm",
-                )
+        for name, (shape, _, _) in _NUMBERS.items():
+            given = getattr(self, name)
+            if given is None and getattr(Contact, name) is None:
+                continue
+            values = _finite(given, shape)
+            if values is None:
+                raise self._refusal(name)
+            object.__setattr__(self, name, values)
         if self.force is not None and self.depth != Contact.depth:
             raise ContactError("a contact has both `depth` and `force`", hint="Give one of them")
-        if not (math.isfinite(self.depth) and self.depth > 0.0):
-            raise ContactError(
-                f"the depth of a contact is {self.depth:g}", hint="Give a depth above 0, in mm"
-            )
+        if self.depth <= 0.0:
+            raise self._refusal("depth")
         if self.force is not None and not LEAST_FORCE <= self.force <= MOST_FORCE:
-            raise ContactError(
-                f"the force of a contact is {self.force:g}",
-                hint=f"Give a force above 0, in N, from {LEAST_FORCE:g} to {MOST_FORCE:g}",
-            )
-        if len(self.shift) != 2 or not all(map(math.isfinite, (*self.shift, self.twist))):
-            raise ContactError(
-                f"the shift of a contact is {self.shift} and its twist {self.twist:g}",
-                hint="Give `shift` as two numbers in mm and `twist` in degrees",
-            )
-        if not math.isfinite(self.rotation):
-            raise ContactError(
-                f"the rotation of a contact is {self.rotation:g}",
-                hint="Give a finite number of degrees",
-            )
-        if self.along is not None and not (
-            np.isfinite(self.along).all() and np.linalg.norm(self.along) > 0.0
-        ):
-            raise ContactError(
-                f"the direction `along` of a contact is {self.along}",
-                hint="Give it as x, y, z, not all of them 0",
-            )
+            raise self._refusal("force")
+        if self.along is not None and not any(self.along):
+            raise self._refusal("along")
+
+    def _refusal(self, name: str) -> ContactError:
+        """Return the error for the value of a field."""
+        value, (_, title, hint) = getattr(self, name), _NUMBERS[name]
+        text = f"{value:g}" if isinstance(value, int | float) else brief(repr(value))
+        return ContactError(f"the {title} of a contact is {text}", hint=hint)
+
+
+_NUMBERS: dict[str, tuple[tuple[int, ...], str, str]] = {
+    "at": ((2,), "place `at`", "Give it as 2 finite numbers (u, v), in mm"),
+    "point": ((3,), "place `point`", "Give it as 3 finite numbers (x, y, z), in mm"),
+    "depth": ((), "depth", "Give a depth above 0, in mm"),
+    "rotation": ((), "rotation", "Give a finite number of degrees"),
+    "along": ((3,), "direction `along`", "Give it as x, y, z, not all of them 0"),
+    "force": (
+        (),
+        "force",
+        f"Give a force above 0, in N, from {LEAST_FORCE:g} to {MOST_FORCE:g}",
+    ),
+    "shift": ((2,), "shift", "Give two numbers, in mm"),
+    "twist": ((), "twist", "Give a finite number of degrees"),
+}
+"""The numbers of a contact by field: their shape, their title in messages, and the remedy."""
+
+
+def _finite(values: object, shape: tuple[int, ...]) -> float | tuple[float, ...] | None:
+    """Return finite numbers of a shape as plain values; None if they are something else."""
+    try:
+        array = np.asarray(values)
+    except ValueError:  # lists of different lengths
+        return None
+    if array.dtype.kind not in "iuf" or array.shape != shape or not np.isfinite(array).all():
+        return None
+    return tuple(array.astype(float).tolist()) if shape else float(array)
 
 
 def refuse_no_contacts(contacts: object) -> None:
@@ -131,7 +153,7 @@ def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
         ContactError: the contact is off the surface.
     """
     if contact.point is None:
-        return surface.point_at(*(contact.at or (0.0, 0.0)))
+        return surface.point_at(*((0.0, 0.0) if contact.at is None else contact.at))
     place = surface.nearest(contact.point)
     distance = float(np.linalg.norm(place.point - np.asarray(contact.point)))
     if distance > ON_SURFACE:

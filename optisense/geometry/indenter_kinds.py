@@ -14,6 +14,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass
+from numbers import Real
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -23,6 +24,7 @@ from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rotations import turn_about_axes
 from optisense.near import suggestion
 from optisense.registry import Registry, must_derive, place_of_definition
+from optisense.text import brief
 
 FACET_ERROR = 4e-4
 """Largest distance (mm) of facets from the exact shape: a hundredth of the width that a pixel of
@@ -76,7 +78,8 @@ class Quantity:
 
     def check(self, owner: str, name: str, value: float) -> None:
         """Raise ContactError if a value is not a finite number or is outside the limits."""
-        if math.isfinite(value) and self.low <= value <= self.high:
+        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        if is_number and math.isfinite(value) and self.low <= value <= self.high:
             return
         if self.low == ABOVE_ZERO:
             hint = "Give one above 0"
@@ -85,7 +88,8 @@ class Quantity:
         else:
             hint = "Give a finite number"
         title = name.replace("_", " ")
-        raise ContactError(f"the {title} of an indenter ({owner}) is {value:g}", hint=hint)
+        text = f"{value:g}" if is_number else brief(repr(value))
+        raise ContactError(f"the {title} of an indenter ({owner}) is {text}", hint=hint)
 
 
 def quantity(

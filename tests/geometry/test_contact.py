@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,6 +34,36 @@ FLAT = surface_of(GEL)
 
 TURN, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
 TURN = TURN * np.sign(np.linalg.det(TURN))
+
+
+def test_lists_and_arrays_of_numbers_are_kept_as_tuples() -> None:
+    at = np.array([1.0, 0.0])
+    made = Contact(Sphere(2), at=at, depth=np.float32(0.5), along=[1, 0, 0], shift=np.zeros(2))  # type: ignore[arg-type]
+    same = Contact(Sphere(2), at=(1, 0), along=(1, 0, 0))
+    at[0] = 5.0
+    assert made == same and hash(made) == hash(same) and repr(made) == repr(same)
+    place(made, FLAT, GEL)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"at": 1.0}, {"at": "ab"}, {"at": np.zeros((2, 2))}, {"at": (1, math.nan)},
+        {"point": (1, 2)}, {"along": (1, 0)}, {"along": (0, 0, 0)}, {"along": "abc"},
+        {"shift": (1, [2])}, {"depth": "1"}, {"depth": 0}, {"force": "1"}, {"force": 0},
+        {"rotation": None}, {"twist": "1"}, {"indenter": "sphere"}, {"indenter": Sphere},
+        {"indenter": GEL},
+    ],
+)  # fmt: skip
+def test_a_contact_refuses_what_does_not_fit(given: dict[str, Any]) -> None:
+    with pytest.raises(ContactError, match=f"{next(iter(given))}.* of a contact"):
+        Contact(**{"indenter": Sphere(2), **given})
+
+
+def test_an_indenter_checks_its_numbers_when_it_is_made() -> None:
+    for kind, given in ((Sphere, "3"), (Sphere, None), (Sphere, np.ones(2)), (MeshIndenter, 3)):
+        with pytest.raises(ContactError, match="ndenter"):
+            kind(given)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
