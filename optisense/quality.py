@@ -41,6 +41,9 @@ QUICK_PHOTONS = 500_000
 MOST_PHOTONS = 10_000_000_000
 """Largest number of photons of an image; it takes days, so more is a typing error."""
 
+MOST_SEED = 2**32 - 1
+"""Largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""
+
 MOST_PIXELS = 20_000_000
 """Largest number of pixels of a picture that may be asked for; more would take all memory, and is a
 typing error."""

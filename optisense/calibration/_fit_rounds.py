@@ -33,6 +33,7 @@ from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.design import SensorDesign
+from optisense.quality import MOST_SEED
 
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel
@@ -246,7 +247,7 @@ class FitRounds:
         self._model.set_design(designed(self._design, moved, steps[self._rendering]))
         return layered_pictures(
             self._model, small, seen, self._settings.photons_of(number),
-            self._settings.seed + number + more,
+            (self._settings.seed + number + more) % (MOST_SEED + 1),
             None if contacts is None else contacts.contacts, self._kept,
         )  # fmt: skip
 

@@ -12,7 +12,7 @@ from annotated_types import Ge, Le
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict
 
 from optisense.mechanics.skins import SKINS
-from optisense.quality import LEVELS, MOST_PIXELS, photons_of
+from optisense.quality import LEVELS, MOST_PIXELS, MOST_SEED, photons_of
 
 LONGEST_RENDER = 7 * 24 * 3600.0
 """Longest time that a picture may be asked to take, s: a week; more is a typing error."""
@@ -25,9 +25,6 @@ EXPOSURES = (1e-9, 1e9)
 
 MOST_MARGIN = 100.0
 """Largest distance between a cage and its parts, mm: more than the size of a tactile sensor."""
-
-MOST_SEED = 2**32 - 1
-"""Largest seed of NumPy's older generators and of Mitsuba's samplers: 32 bits."""
 
 
 class CommandOptions(BaseModel):

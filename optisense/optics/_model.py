@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from numbers import Integral, Real
 
 import drjit as dr
 import numpy as np
@@ -38,7 +39,7 @@ from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
-from optisense.quality import MOST_PIXELS, PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
+from optisense.quality import MOST_PIXELS, MOST_SEED, PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
 
 SPPM_PASS_PHOTONS = 1_000_000
 """Largest number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on
@@ -208,7 +209,7 @@ class OpticalModel(RayModel):
             RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
         """
         refuse_no_contacts(contacts)
-        _check_choices(estimator, skin, noise, seconds)
+        _check_choices(estimator, skin, noise, seconds, seed)
         _check_pixels(resolution)
         number = None if photons is None else _photons_of(photons)
         began = time.perf_counter()
@@ -374,7 +375,9 @@ class OpticalModel(RayModel):
         return ImageLayers.from_sppm(result, view.rays, began)
 
 
-def _check_choices(estimator: str, skin: str, noise: float | None, seconds: float | None) -> None:
+def _check_choices(
+    estimator: str, skin: str, noise: float | None, seconds: float | None, seed: int
+) -> None:
     """Raise RenderError if a setting of `OpticalModel.render` is invalid."""
     if estimator not in ESTIMATORS:
         raise RenderError(
@@ -383,16 +386,20 @@ def _check_choices(estimator: str, skin: str, noise: float | None, seconds: floa
     if skin not in SKINS:
         raise RenderError(f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS))
     for name, value in (("noise", noise), ("seconds", seconds)):
-        if value is not None and not value > 0:
+        if value is not None and not (isinstance(value, Real) and value > 0):
             raise RenderError(
-                f"the limit '{name}' is {value}", hint="Give a number above 0, or none"
+                f"the limit '{name}' is {value!r}", hint="Give a number above 0, or none"
             )
+    if not (isinstance(seed, Integral) and 0 <= seed <= MOST_SEED):
+        raise RenderError(f"the seed is {seed!r}", hint=f"Give a number from 0 to {MOST_SEED}")
 
 
 def _check_pixels(resolution: object) -> None:
     """Raise RenderError if a picture has too many pixels."""
-    if is_size(resolution) and resolution[0] * resolution[1] > MOST_PIXELS:
-        width, height = resolution
+    if not is_size(resolution):
+        return
+    width, height = map(int, resolution)  # a product of NumPy's integers may overflow
+    if width * height > MOST_PIXELS:
         raise RenderError(
             f"a picture of {width} x {height} pixels is too large",
             hint=f"Ask for at most {MOST_PIXELS:,} pixels",

@@ -10,7 +10,7 @@ from optisense.errors import TaskError
 from optisense.geometry import Contact
 from optisense.mechanics import ELASTIC
 from optisense.optics.estimators import RADIANCE_CACHE
-from optisense.quality import SAMPLE_PHOTONS
+from optisense.quality import MOST_SEED, SAMPLE_PHOTONS
 from optisense.reading.camera_noise import MEASURED_NOISE
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ class SampleRendering:
     def __post_init__(self) -> None:
         if not 0 <= self.camera_noise < 256:
             raise TaskError(f"the camera noise is {self.camera_noise:g}", hint="Give 0 to 255")
-        if self.seed < 0:
-            raise TaskError(f"the seed is {self.seed}", hint="Give 0 or more")
+        if not 0 <= self.seed <= MOST_SEED:
+            raise TaskError(f"the seed is {self.seed}", hint=f"Give a number from 0 to {MOST_SEED}")
 
     def render(
         self,

@@ -251,6 +251,7 @@ def test_ground_truth_of_a_ball_is_a_sphere(skin: str, square_of_radius: float) 
     ("resolution", "message"),
     [
         ((100_000, 100_000), "too large"),
+        ((np.int32(100_000), np.int32(100_000)), "too large"),
         ("60x80", "the resolution is '60x80'"),
         ((60, 80, 3), "the resolution is"),
         ((60.5, 80), "the resolution is"),
@@ -267,6 +268,14 @@ def test_contacts_that_are_no_list_of_contacts_are_refused(contacts: Any) -> Non
     for ask in (model().render, model().pressed, partial(model().chief_rays, PIXELS)):
         with pytest.raises(ContactError, match="no list of contacts"):
             ask(contacts)
+
+
+@pytest.mark.parametrize(
+    "given", [{"noise": "1"}, {"seconds": 0}, {"seed": 1.5}, {"seed": -1}, {"seed": 2**32}]
+)
+def test_an_impossible_limit_or_seed_is_refused(given: Any) -> None:
+    with pytest.raises(RenderError, match=next(iter(given))):
+        model().render(resolution=PIXELS, **given)
 
 
 def test_an_unknown_skin_is_refused() -> None:
