@@ -120,7 +120,7 @@ class OpticalModel(RayModel):
         return self._caches
 
     def _new_store(self) -> CacheStore:
-        rays = self.chief_rays(self.design.camera.size_at(VIEW_ACROSS))
+        rays = self.chief_rays(self._design.camera.size_at(VIEW_ACROSS))
         return self.store_type(LitScene.of(self.scenes, not self.is_draft), rays.points[rays.hit])
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
@@ -249,10 +249,10 @@ class OpticalModel(RayModel):
         on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
         image = self._image(layers, view, contacts)
         image.settings = {
-            "design": self.design.name,
+            "design": self._design.name,
             "seed": seed,
             "resolution": [camera.width, camera.height],
-            "notes": self.design.camera.shape_notes((camera.width, camera.height)),
+            "notes": self._design.camera.shape_notes((camera.width, camera.height)),
             "estimator": estimator,
             "units": {"radiance": RADIANCE_UNIT, "length": "mm"},
             "photons": layers.photons,
@@ -282,12 +282,12 @@ class OpticalModel(RayModel):
         """Return the tactile image of an image's layers, with the markers of the skin."""
         units = dict(zip(self._traced_groups, layers.radiance, strict=True))
         markers = None
-        if self.design.markers is not None:
+        if self._design.markers is not None:
             factor, markers = self._marked(layers, view.pressed, view.camera)
             units = {name: layer * factor for name, layer in units.items()}
         return TactileImage(
             layers={
-                name: layer * self.design.lights[name].channel_flux().astype(np.float32)
+                name: layer * self._design.lights[name].channel_flux().astype(np.float32)
                 for name, layer in units.items()
             },
             unit_layers=units,
@@ -330,7 +330,7 @@ class OpticalModel(RayModel):
         """Return the factors (h, w, 3) by which the markers darken each pixel, and the markers'
         positions.
         """
-        markers = self.design.markers
+        markers = self._design.markers
         assert markers is not None
         points = layers.points.astype(np.float64)
         moved = np.zeros_like(points)
@@ -339,7 +339,7 @@ class OpticalModel(RayModel):
         material = points - moved
         dots = MarkerDots.on(markers, self.surface)
         share = dots.coverage(material)[..., None]
-        factor = 1.0 - share + share * ink_factor(markers, self.design.coating)
+        factor = 1.0 - share + share * ink_factor(markers, self._design.coating)
         untouched = self.chief_rays((camera.width, camera.height))
         return factor.astype(np.float32), dots.places(untouched, material, moved)
 

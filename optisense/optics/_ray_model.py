@@ -71,19 +71,19 @@ class RayModel:
         refuse_no_design(design)
         self.variant = use_variant(variant)
         keep_freed_memory()
-        self.design = design.copy()
+        self._design = design.copy()
         known = None if before is None else before.scenes
         assembly = self._assembled(None if known is None else known.assembly)
-        self.scenes: SensorScenes = SensorScenes(assembly, self.design.coating, known)
-        self._view = self.view_type(self.design, self.scenes)
+        self.scenes: SensorScenes = SensorScenes(assembly, self._design.coating, known)
+        self._view = self.view_type(self._design, self.scenes)
         self._chain: PictureChain | None = None
 
     def _assembled(self, before: Assembly | None) -> Assembly:
         """Return the assembly of the design, with unchanged shapes of the one before."""
         if self.bends_media:  # its shapes are approximate
-            return assemble(self.design, before, True)
-        name = self.design.name
-        assembly = assemble(self.design, _recent.pop(name, None) if before is None else before)
+            return assemble(self._design, before, True)
+        name = self._design.name
+        assembly = assemble(self._design, _recent.pop(name, None) if before is None else before)
         _recent[name] = assembly
         while len(_recent) > MOST_RECENT:
             del _recent[next(iter(_recent))]
@@ -91,9 +91,14 @@ class RayModel:
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
         """Adopt a design with its scenes and its view."""
-        if view is not self._view or design.camera != self.design.camera:
+        if view is not self._view or design.camera != self._design.camera:
             self._chain = None
-        self.design, self.scenes, self._view = design, scenes, view
+        self._design, self.scenes, self._view = design, scenes, view
+
+    @property
+    def design(self) -> SensorDesign:
+        """A copy of the design; edits of it have no effect until `set_design` adopts it."""
+        return self._design.copy()
 
     @property
     def groups(self) -> list[str]:
@@ -121,7 +126,7 @@ class RayModel:
         Raises:
             DesignError: there is no such value, or it does not fit.
         """
-        self.set_design(set_value(self.design, path, value))
+        self.set_design(set_value(self._design, path, value))
 
     def set_design(self, design: SensorDesign) -> None:
         """Adopt another design, and recompute only what depends on the values that differ.
@@ -136,7 +141,8 @@ class RayModel:
         Raises:
             DesignError, MeshError, LibraryError: the design can't be built.
         """
-        new, old = design.copy(), self.design
+        refuse_no_design(design)
+        new, old = design.copy(), self._design
         if _shapes(old) != _shapes(new) or old.meshes != new.meshes:
             assembly = assemble(new, self.scenes.assembly, self.bends_media)
             scenes = SensorScenes(assembly, new.coating, self.scenes)
@@ -149,13 +155,13 @@ class RayModel:
     def _view_of(self, design: SensorDesign, scenes: SensorScenes) -> SkinView:
         """Return the current view if the camera and all shapes are unchanged, else a new one."""
         same = scenes.assembly is self.scenes.assembly
-        if same and design.camera.view() == self.design.camera.view():
+        if same and design.camera.view() == self._design.camera.view():
             return self._view
         return self.view_type(design, scenes)
 
     def camera(self, resolution: tuple[int, int] | None = None) -> RayCamera:
         """Return the design's camera, at the given resolution (width, height) if there is one."""
-        return ray_camera(self.design, resolution)
+        return ray_camera(self._design, resolution)
 
     @property
     def picture_chain(self) -> PictureChain:
@@ -164,7 +170,7 @@ class RayModel:
         """
         if self._chain is None:
             self._chain = focused_chain(
-                self.design.camera, lambda: self.scenes.fine.scene, self.camera
+                self._design.camera, lambda: self.scenes.fine.scene, self.camera
             )
         return self._chain
 
@@ -239,7 +245,7 @@ class RayModel:
         """
         from optisense.optics.transport.ray_gradient import DifferentiableRays
 
-        meshes = self.design.deformed_meshes()
+        meshes = self._design.deformed_meshes()
         chosen = {name: meshes[name] for name in moving}
         return DifferentiableRays(self.scenes.fine.scene, self.camera(resolution), chosen)
 

@@ -112,7 +112,7 @@ class DraftModel(OpticalModel):
         super().set_design(self._straightened(design))
 
     def _view_of(self, design: SensorDesign, scenes: SensorScenes) -> SkinView:
-        if _all_but_lights_same(self.design, design):
+        if _all_but_lights_same(self._design, design):
             return self._view  # the view does not depend on the lights
         return super()._view_of(design, scenes)
 
@@ -132,7 +132,7 @@ class DraftModel(OpticalModel):
         before = self._shown
         if before is not None and not (before.asked == asked and self._are_same(contacts)):
             before = None
-        moved = None if before is None else _moved(before.design, self.design)
+        moved = None if before is None else _moved(before.design, self._design)
         still = moved is not None and not moved
         if before is not None and still:
             if not before.kept:
@@ -146,7 +146,7 @@ class DraftModel(OpticalModel):
         self._last_view = None if self._kept is None else self._kept.view
         if moved is None:
             self._kept = None
-        if before is None or not _same_picture(before.design, self.design) or still:
+        if before is None or not _same_picture(before.design, self._design) or still:
             self._faint = {}
         elif "photons" in kwargs:
             kwargs["photons"] = round(DRAG_PHOTONS * photons_of(kwargs["photons"]))
@@ -163,7 +163,7 @@ class DraftModel(OpticalModel):
         view = before is not None and bool(self._faint) and not still
         image.settings |= {"kept_layers": kept, "kept_view": view, "kept_media": bent}
         if not image.interrupted:
-            self._shown = _Shown(contacts, asked, self.design, image, bent or view)
+            self._shown = _Shown(contacts, asked, self._design, image, bent or view)
         return image
 
     @property
@@ -217,7 +217,7 @@ class DraftModel(OpticalModel):
         assert self._shown is not None
         if contacts == self._shown.contacts:
             return True
-        bent = self._shown.design.meshes != self.design.meshes
+        bent = self._shown.design.meshes != self._design.meshes
         return (
             bent and self._pressed is not None and self._pressed.carried_to(contacts, self.sensing)
         )
@@ -239,14 +239,14 @@ class DraftModel(OpticalModel):
             store.forget_cells()
             self._before, self._caches = store, None
         if self.scenes.assembly.media.bent:
-            assembly = assemble(self.design, self.scenes.assembly)
-            scenes = SensorScenes(assembly, self.design.coating, self.scenes)
-            self._set(self.design, scenes, self.view_type(self.design, scenes))
+            assembly = assemble(self._design, self.scenes.assembly)
+            scenes = SensorScenes(assembly, self._design.coating, self.scenes)
+            self._set(self._design, scenes, self.view_type(self._design, scenes))
 
     def _relit(self, image: TactileImage) -> TactileImage:
         """Return the same image under the design's own lights."""
         return image.relight(
-            {name: self.design.lights[name].channel_flux() for name in image.unit_layers}
+            {name: self._design.lights[name].channel_flux() for name in image.unit_layers}
         )
 
     def _set(self, design: SensorDesign, scenes: SensorScenes, view: SkinView) -> None:
@@ -262,7 +262,7 @@ class DraftModel(OpticalModel):
         lit = LitScene.of(self.scenes, may_trace_lobes=False)
         if before is not None and before.has_guide_for(lit):
             return DraftCacheStore(lit, before.seen, before)
-        rays = self.chief_rays(self.design.camera.size_at(VIEW_ACROSS))
+        rays = self.chief_rays(self._design.camera.size_at(VIEW_ACROSS))
         return DraftCacheStore(lit, rays.points[rays.hit], before)
 
     def _straightened(self, design: SensorDesign) -> SensorDesign:

@@ -12,7 +12,7 @@ from comparing import ROUNDING, SCORE_ROUNDING, TURNED_BESIDE_CONTACT, same_ligh
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
-from optisense.errors import ContactError, LibraryError, RenderError
+from optisense.errors import ContactError, DesignError, LibraryError, RenderError
 from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
 from optisense.optics.radiance_cache._direction_bins import COARSE_BINS
@@ -217,6 +217,22 @@ def test_a_contact_leaves_no_trace_in_the_next_image() -> None:
     render(used)
     # No test presses anything but this ball into the shared model.
     assert same(render(used, BALL), render(model(), BALL))
+
+
+def test_edits_of_a_models_design_have_no_effect_until_it_adopts_it() -> None:
+    used = OpticalModel(design(), "llvm")
+    before = render(used)
+    edited = used.design
+    edited.coating.reflectance = (0.05, 0.05, 0.05)
+    edited.lights["red"].flux = 0.0
+    edited.camera.fov = 20.0
+    assert same(render(used), before)
+    used.set_design(edited)
+    after = render(used)
+    assert after.layers["red"].max() == 0.0
+    assert after.layers["blue"].mean() < 0.5 * before.layers["blue"].mean()
+    with pytest.raises(DesignError, match="a design is needed"):
+        used.set_design("gelsight-mini")  # type: ignore[arg-type]
 
 
 def test_only_contacts_lights_what_the_whole_image_shows_there_and_nothing_else() -> None:
