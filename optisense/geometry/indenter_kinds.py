@@ -14,7 +14,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass
-from numbers import Real
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -76,9 +75,9 @@ class Quantity:
     low: float = -math.inf
     high: float = math.inf
 
-    def check(self, owner: str, name: str, value: float) -> None:
+    def check(self, owner: str, name: str, value: Any) -> None:
         """Raise ContactError if a value is not a finite number or is outside the limits."""
-        is_number = isinstance(value, Real) and not isinstance(value, bool)
+        is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
         if is_number and math.isfinite(value) and self.low <= value <= self.high:
             return
         if self.low == ABOVE_ZERO:

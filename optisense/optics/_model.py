@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from numbers import Integral, Real
+from typing import Any
 
 import drjit as dr
 import numpy as np
@@ -375,9 +375,7 @@ class OpticalModel(RayModel):
         return ImageLayers.from_sppm(result, view.rays, began)
 
 
-def _check_choices(
-    estimator: str, skin: str, noise: float | None, seconds: float | None, seed: int
-) -> None:
+def _check_choices(estimator: str, skin: str, noise: Any, seconds: Any, seed: Any) -> None:
     """Raise RenderError if a setting of `OpticalModel.render` is invalid."""
     if estimator not in ESTIMATORS:
         raise RenderError(
@@ -386,11 +384,11 @@ def _check_choices(
     if skin not in SKINS:
         raise RenderError(f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS))
     for name, value in (("noise", noise), ("seconds", seconds)):
-        if value is not None and not (isinstance(value, Real) and value > 0):
+        if value is not None and not (isinstance(value, int | float | np.number) and value > 0):
             raise RenderError(
                 f"the limit '{name}' is {value!r}", hint="Give a number above 0, or none"
             )
-    if not (isinstance(seed, Integral) and 0 <= seed <= MOST_SEED):
+    if not (isinstance(seed, int | np.integer) and 0 <= seed <= MOST_SEED):
         raise RenderError(f"the seed is {seed!r}", hint=f"Give a number from 0 to {MOST_SEED}")
 
 

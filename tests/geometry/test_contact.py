@@ -61,6 +61,7 @@ def test_a_contact_refuses_what_does_not_fit(given: dict[str, Any]) -> None:
 
 
 def test_an_indenter_checks_its_numbers_when_it_is_made() -> None:
+    assert Sphere(np.float32(2)) == Sphere(np.int64(2)) == Sphere(2)
     for kind, given in ((Sphere, "3"), (Sphere, None), (Sphere, np.ones(2)), (MeshIndenter, 3)):
         with pytest.raises(ContactError, match="ndenter"):
             kind(given)  # type: ignore[arg-type]
