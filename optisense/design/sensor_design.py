@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -267,6 +268,33 @@ class SensorDesign(Model):
             DesignError: a value that was edited inside a list or a section does not fit.
         """
         return self._replaced(self._data())
+
+    def __copy__(self) -> SensorDesign:
+        return self.copy()
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """Return an independent design; see `copy`. With an `update`, its values are not checked,
+        and the other fields are shared, except for the dictionary of meshes.
+        """
+        if update is None:
+            return cast("Self", self.copy())
+        changed = self.__deepcopy__() if deep else super().__copy__()
+        changed.__dict__.update(update)
+        changed._meshes = dict(self._meshes)
+        return changed
+
+    def __eq__(self, other: object) -> bool:
+        """Return whether two designs have equal values and meshes; where their files are, and where
+        they were read from, makes no difference.
+        """
+        if not isinstance(other, SensorDesign):
+            return NotImplemented
+        return (
+            type(self) is type(other)
+            and self.__dict__ == other.__dict__
+            and self._meshes.keys() == other._meshes.keys()
+            and all(mesh.equals(other._meshes[name]) for name, mesh in self._meshes.items())
+        )
 
     def _repr_html_(self) -> str:
         """Return a labelled section, for notebooks."""

@@ -213,9 +213,7 @@ def _check_saveable(design: SensorDesign, files: dict[str, str]) -> None:
     for name, file in files.items():
         design.valid_mesh(name)
         first = owner.setdefault(file.casefold(), name)
-        if design.meshes[first] is not design.meshes[name] and not _same(
-            design.meshes[first], design.meshes[name]
-        ):
+        if not design.meshes[first].equals(design.meshes[name]):
             raise DesignError(
                 f"parts '{first}' and '{name}' have different meshes but one file '{file}'",
                 where=f"parts.{name}.mesh",
@@ -237,11 +235,3 @@ def _named_files(design: SensorDesign) -> dict[str, bytes]:
                     hint="Give each its own file",
                 )
     return files
-
-
-def _same(one: TriangleMesh, other: TriangleMesh) -> bool:
-    return (
-        one.vertices.shape == other.vertices.shape
-        and one.faces.shape == other.faces.shape
-        and bool((one.vertices == other.vertices).all() and (one.faces == other.faces).all())
-    )

@@ -201,6 +201,11 @@ class TriangleMesh:
 
         return len(self.faces) > 0 and len(unmatched_edges(self)) == 0
 
+    def equals(self, other: TriangleMesh) -> bool:
+        """Return whether two meshes have equal arrays; `==` asks whether they are one object."""
+        arrays = ((each.vertices, each.faces, each.normals) for each in (self, other))
+        return self is other or all(map(_equal, *arrays))
+
     def validate(self, name: str, closed: bool) -> TriangleMesh:
         """Check the mesh of part `name` and return it, turned outward when `closed`.
 
@@ -290,6 +295,10 @@ def _fixed_rows(values: ArrayLike, dtype: type[np.generic]) -> NDArray[Any]:
     array = np.asarray(values, dtype=dtype) if fixed else np.array(values, dtype=dtype)
     array.setflags(write=False)
     return array.reshape(-1, 3)
+
+
+def _equal(one: NDArray[Any] | None, other: NDArray[Any] | None) -> bool:
+    return one is other or (one is not None and other is not None and np.array_equal(one, other))
 
 
 def grid_faces(rows: int, columns: int) -> IntArray:

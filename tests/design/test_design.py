@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +12,15 @@ import pytest
 from pydantic import Field, ValidationError
 
 import optisense as ots
-from optisense.design import Cage, Camera, LightGroup, Point, SensorDesign
+from optisense.design import (
+    Cage,
+    Camera,
+    LightGroup,
+    Point,
+    SensorDesign,
+    load_design,
+    save_design,
+)
 from optisense.design.fields import Model, Number
 from optisense.errors import DesignError
 
@@ -87,6 +97,29 @@ def test_a_cage_moves_all_its_parts_alike(design: SensorDesign) -> None:
 
 def test_bounds_enclose_all_parts(design: SensorDesign) -> None:
     np.testing.assert_allclose(design.bounds(), [[-20, -20, -30], [8.5, 20, 0]])
+
+
+def test_copies_of_all_kinds_are_equal_and_independent(
+    design: SensorDesign, tmp_path: Path
+) -> None:
+    save_design(design, tmp_path)
+    loaded = load_design(tmp_path)
+    copies = [
+        design.copy(), design.model_copy(), copy.copy(design), copy.deepcopy(design),
+        pickle.loads(pickle.dumps(design)),
+    ]  # fmt: skip
+    assert pickle.loads(pickle.dumps(loaded)) == loaded == copy.deepcopy(loaded)
+    for other in copies:
+        assert other == design
+        other.lights["red"].flux = 1.0
+        assert other != design
+        other.lights["red"].flux = design.lights["red"].flux
+        gel = other.meshes["gel"]
+        other.meshes["gel"] = gel.with_vertices(gel.vertices + 0.1)
+        assert other != design
+    other = design.model_copy(update={"name": "other"})
+    other.meshes.clear()
+    assert other.name == "other" and design.meshes
 
 
 def test_changes_in_place_are_checked(design: SensorDesign) -> None:
