@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from optisense.design.sensor_design import SensorDesign, dotted
+from optisense.design.sensor_design import SensorDesign, dotted, refuse_no_design
 from optisense.errors import DesignError
 from optisense.near import suggestion
 
@@ -30,6 +30,7 @@ def get_value(design: SensorDesign, path: str) -> Any:
     Raises:
         DesignError: the path is malformed or names nothing; the message suggests a similar name.
     """
+    refuse_no_design(design)
     value: Any = design
     for done, step in _walk(path):
         value = _child(value, step, path, done)
@@ -51,6 +52,7 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
     Raises:
         DesignError: a path names nothing, or the values do not fit there.
     """
+    refuse_no_design(design)
     data = design._data()
     for path, value in values.items():
         get_value(design, path)  # raises an error that suggests a similar name

@@ -28,18 +28,19 @@ def nine_places(points: ArrayLike, weights: ArrayLike | None = None) -> NDArray[
     differs between processors and GPUs, does not decide.
 
     Args:
-        points: (n, 3) points of the visible sensing surface, mm; at least nine.
+        points: (n, 3) points of the visible sensing surface, mm; at least nine. Those that
+            are not finite are left out.
         weights: (n,) the area that each point stands for; equal if None.
 
     Returns:
         (9,) int64 rows of `points`, row by row along the start grid.
 
     Raises:
-        ContactError: fewer than nine points.
+        ContactError: fewer than nine points that are finite.
     """
     where = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     share = np.ones(len(where)) if weights is None else np.asarray(weights, dtype=np.float64)
-    seen = np.flatnonzero(share > 0.0)
+    seen = np.flatnonzero((share > 0.0) & np.isfinite(where).all(axis=1))
     if len(seen) < 9:
         raise ContactError(
             f"only {len(seen)} points of the sensing surface are visible, nine are needed",

@@ -18,6 +18,8 @@ are a point in the frame of the design. Examples: `sphere:1.5@0,0:0.8`, `cylinde
 
 from __future__ import annotations
 
+import math
+
 from optisense.errors import ContactError
 from optisense.geometry.contact import Contact
 from optisense.geometry.indenter_kinds import INDENTERS, Indenter
@@ -86,10 +88,12 @@ def parse_place(text: str) -> tuple[float, float] | tuple[float, float, float]:
     """Read a place such as `3,-2`, in mm; see the module for the syntax.
 
     Raises:
-        ContactError: the text is neither two nor three numbers.
+        ContactError: the text is neither two nor three finite numbers.
     """
     try:
         numbers = _numbers(text, "a place", (2, 3))
+        if not all(map(math.isfinite, numbers)):
+            raise ContactError(f"a place needs finite numbers, not '{text}'")
     except ContactError as error:
         raise ContactError(
             error.message, where=f"place '{text}'", hint="Write it as U,V in mm, for example 3,-2"

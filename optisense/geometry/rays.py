@@ -42,10 +42,11 @@ def ray_hits(mesh: TriangleMesh, origins: ArrayLike, directions: ArrayLike) -> R
     Args:
         mesh: any mesh, mm.
         origins: (r, 3) origins, mm.
-        directions: (r, 3) directions of any length except zero.
+        directions: (r, 3) directions of any length except zero, or one (3,) for all rays.
     """
     start = np.asarray(origins, dtype=np.float64).reshape(-1, 3)
     way = np.asarray(directions, dtype=np.float64).reshape(-1, 3)
+    way = np.broadcast_to(way, start.shape)
     corners = mesh.triangles
     middle, reach = mesh.face_spheres
     step = max(1, _PAIRS_AT_ONCE // max(1, len(corners)))

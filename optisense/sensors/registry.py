@@ -9,11 +9,13 @@ from pathlib import Path
 from optisense import library
 from optisense.design import Diagnostic, SensorDesign, check_design, load_design, storage
 from optisense.design.problems import raise_problems
+from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import DesignError
 from optisense.near import suggestion
 from optisense.registry import Registry, place_of_definition
 from optisense.sensors.light_checks import light_problems
 from optisense.text import brief
+from optisense.untrusted_files import is_file, is_folder
 
 
 def _check(name: str, builder: object) -> None:
@@ -94,16 +96,16 @@ def load(name_or_folder: str | Path) -> SensorDesign:
         return build(text.removeprefix(BUILT_IN_PREFIX))
     path = Path(name_or_folder)
     if isinstance(name_or_folder, str) and text in SENSORS:
-        if path.is_dir():
+        if is_folder(path):
             raise DesignError(
                 f"'{text}' is a built-in sensor and also a folder here",
                 hint=f"Write ./{text} for the folder, {BUILT_IN_PREFIX}{text} for the built-in "
                 "sensor",
             )
         return build(text)
-    if not path.exists():
+    if not (is_folder(path) or is_file(path)):
         hint = suggestion(text, SENSORS.names(), limit=20)
-        raise DesignError(f"there is no built-in sensor and no folder '{text}'", hint=hint)
+        raise DesignError(f"there is no built-in sensor and no folder '{brief(text)}'", hint=hint)
     return load_design(path)
 
 
@@ -116,6 +118,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
     Raises:
         OptiSenseError: the design can't be saved, or an own part can't be read.
     """
+    refuse_no_design(design)
     storage.save_design(library.with_own_lights(design), folder, new=new)
 
 
@@ -128,6 +131,7 @@ def check(design: SensorDesign) -> list[Diagnostic]:
     Raises:
         DesignError: the design can't be simulated, or its simulation would be wrong.
     """
+    refuse_no_design(design)
     found = find_problems(design)
     raise_problems(found, f"design '{design.name}'")
     return found

@@ -133,10 +133,19 @@ def test_changes_in_place_are_checked(design: SensorDesign) -> None:
     assert "skin" in design.parts  # as before
 
 
+def test_a_name_that_no_folder_can_have() -> None:
+    with pytest.raises(DesignError, match="no built-in sensor and no folder"):
+        ots.load("a" * 5000)
+
+
 @pytest.mark.parametrize("given", ["gelsight-mini-ideal", Path("my-sensor"), None])
 def test_a_name_in_place_of_a_design_says_how_to_load_it(given: Any) -> None:
     for use in (
         ots.OpticalModel,
+        ots.check,
+        lambda each: ots.save_design(each, "sensor"),
+        lambda each: ots.get_value(each, "camera.fov"),
+        lambda each: ots.set_value(each, "camera.fov", 30.0),
         lambda each: ots.search.search(each, {"camera.fov": (40, 60)}, "aoap"),
         *([lambda each: ots.evaluate(each, "aoap")] if given is not None else []),
     ):

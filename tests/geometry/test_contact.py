@@ -20,6 +20,7 @@ from optisense.geometry import (
     parse_contact,
     place,
 )
+from optisense.geometry.contact_text import parse_place
 
 GEL = TriangleMesh.box((-12, -10, -4.25), (12, 10, 0), (24, 20, 2))
 
@@ -34,6 +35,11 @@ FLAT = surface_of(GEL)
 
 TURN, _ = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))
 TURN = TURN * np.sign(np.linalg.det(TURN))
+
+
+def test_a_place_that_is_not_finite_is_refused() -> None:
+    with pytest.raises(ContactError, match="finite"):
+        parse_place("nan,0")
 
 
 def test_lists_and_arrays_of_numbers_are_kept_as_tuples() -> None:

@@ -29,6 +29,8 @@ def test_rays_meet_every_small_face_of_a_wide_mesh():
     hits = ray_hits(sheet, starts, np.tile([0.0, 0.0, -2.0], (500, 1)))
     assert np.unique(hits.ray).tolist() == list(range(500))
     assert hits.distance == pytest.approx(3.5)
+    together = ray_hits(sheet, starts, (0.0, 0.0, -2.0))
+    assert together.face.tolist() == hits.face.tolist()
     assert len(ray_hits(sheet, np.zeros((0, 3)), np.zeros((0, 3))).ray) == 0
 
 

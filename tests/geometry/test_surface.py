@@ -117,6 +117,7 @@ def test_nine_places_on_a_rectangle_are_the_middles_of_its_ninths() -> None:
     x, y = np.meshgrid(np.linspace(-9, 9, 91), np.linspace(-6, 6, 61), indexing="ij")
     points = np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
     chosen = points[nine_places(points)]
+    assert (points[nine_places([*points, (np.nan, 0.0, 0.0)])] == chosen).all()
     expected = np.array([(a, b, 0) for a in (-6, 0, 6) for b in (-4, 0, 4)])
     distance = np.linalg.norm(chosen[:, None] - expected, axis=2)
     assert (distance.min(axis=0) < 0.3).all()
