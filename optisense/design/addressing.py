@@ -40,6 +40,8 @@ def get_value(design: SensorDesign, path: str) -> Any:
 def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
     """Return a new, checked design with `value` at `path`; the given design is not changed.
 
+    The provenance of this path is dropped if the value is another one.
+
     Raises:
         DesignError: the path names nothing, or the value does not fit there.
     """
@@ -49,18 +51,22 @@ def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
 def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesign:
     """Return a new design with all these values by their paths, checked once with all of them.
 
+    The provenance of these paths is dropped where the value is another one.
+
     Raises:
         DesignError: a path names nothing, or the values do not fit there.
     """
     refuse_no_design(design)
     data = design._data()
     for path, value in values.items():
-        get_value(design, path)  # raises an error that suggests a similar name
+        before = get_value(design, path)  # raises an error that suggests a similar name
         target: Any = data
         *way, last = parse_path(path)
         for step in way:
             target = target[_key(target, step)]
-        target[_key(target, last)] = _plain(value)
+        target[_key(target, last)] = plain = _plain(value)
+        if _plain(before) != plain:
+            data["provenance"].pop(path, None)
     return design._replaced(data, where=", ".join(values))
 
 

@@ -17,7 +17,9 @@ from optisense.design import (
     Camera,
     LightGroup,
     Point,
+    Provenance,
     SensorDesign,
+    Status,
     load_design,
     save_design,
 )
@@ -131,6 +133,16 @@ def test_changes_in_place_are_checked(design: SensorDesign) -> None:
     with pytest.raises(DesignError, match="no part is a sensing_surface"):
         design.parts = without_skin
     assert "skin" in design.parts  # as before
+
+
+def test_a_changed_number_loses_its_source(design: SensorDesign) -> None:
+    known = Provenance(status=Status.DERIVED, source="a data sheet")
+    design.provenance["lights.red.flux"] = known
+    kept = ots.set_value(design, "lights.red.flux", design.lights["red"].flux)
+    assert kept.provenance["lights.red.flux"] == known
+    changed = ots.set_value(design, "lights.red.flux", 9.0)
+    assert "lights.red.flux" not in changed.provenance
+    assert design.provenance["lights.red.flux"] == known
 
 
 def test_a_name_that_no_folder_can_have() -> None:
