@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, cast
+from collections.abc import Callable
+from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import (
     AfterValidator,
@@ -13,6 +14,8 @@ from pydantic import (
     ValidationError,
 )
 from pydantic_core import CoreSchema
+
+from optisense.errors import DesignError
 
 LARGEST_NUMBER = 1e12
 """Largest magnitude of a number in a design, in any unit. No meaningful number comes near, and its
@@ -103,6 +106,10 @@ class Model(BaseModel):
 
     model_config = ConfigDict(extra="forbid", validate_assignment=True)
 
+    error_in_words: ClassVar[Callable[..., DesignError]]
+    """The function `design_error` of `optisense.design.problems`, which sets it: that module
+    imports all models, so that they can't import it."""
+
     def __setattr__(self, name: str, value: object) -> None:
         """Set a field if the value fits.
 
@@ -113,10 +120,8 @@ class Model(BaseModel):
         try:
             super().__setattr__(name, value)
         except ValidationError as error:
-            from optisense.design.problems import design_error
-
             self.__dict__.update(before)  # pydantic sets it before it compares fields
-            raise design_error(error, {name: value}, where=name, model=type(self)) from None
+            raise Model.error_in_words(error, {name: value}, where=name, model=type(self)) from None
 
 
 def unit_of(model: type[BaseModel], name: str) -> str:

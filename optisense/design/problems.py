@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from optisense.design.fields import InconsistentValueError
+from optisense.design.fields import InconsistentValueError, Model
 from optisense.design.kinds import KindModel
 from optisense.design.sensor_design import SensorDesign, dotted
 from optisense.errors import DesignError
@@ -91,6 +91,9 @@ def design_error(
     except DesignError as found:
         return found
     raise AssertionError("pydantic reported no problem")  # it always reports one
+
+
+Model.error_in_words = staticmethod(design_error)
 
 
 def invalid_values(design: SensorDesign) -> list[Diagnostic]:

@@ -340,11 +340,11 @@ class SensorDesign(Model):
         try:
             design = type(self).model_validate(data)
         except ValidationError as error:
-            from optisense.design.problems import design_error
-
             if where or self._source is None:
-                raise design_error(error, data, where=where) from None
-            raise design_error(error, data, where=str(self._source), lines=self._lines) from None
+                raise Model.error_in_words(error, data, where=where) from None
+            raise Model.error_in_words(
+                error, data, where=str(self._source), lines=self._lines
+            ) from None
         design._meshes = {n: m for n, m in self._meshes.items() if n in design.parts}
         design._source = self._source
         design._lines = self._lines
