@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
-from optisense.objectives._projection_warping import JUMP, discontinuous_edges
+from optisense.objectives._pixel_edges import pixel_edges
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ def seen_footprints(rays: ChiefRays) -> tuple[NDArray[np.float32], NDArray[np.fl
     Raises:
         ObjectiveError: fewer than `LEAST_FOOTPRINTS` lie on the sensing surface.
     """
-    long, wide = footprints(rays.points, rays.hit)
+    long, wide = footprints(rays.points, rays.hit, rays.reflections)
     count = np.count_nonzero(np.isfinite(long))
     if count < LEAST_FOOTPRINTS:
         raise ObjectiveError(
@@ -99,7 +99,9 @@ def seen_footprints(rays: ChiefRays) -> tuple[NDArray[np.float32], NDArray[np.fl
 
 
 def footprints(
-    points: NDArray[np.float32], hit: NDArray[np.bool_]
+    points: NDArray[np.float32],
+    hit: NDArray[np.bool_],
+    reflections: NDArray[np.uint32] | None = None,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return length and width (h-1, w-1), mm, of the footprint between four neighbouring chief
     rays.
@@ -110,14 +112,11 @@ def footprints(
     Args:
         points: (h, w, 3) end points of the chief rays, mm.
         hit: (h, w) mask of the rays that meet the surface.
+        reflections: see `pixel_edges`.
     """
-    x, y, z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
-    right = [c[:, 1:] - c[:, :-1] for c in (x, y, z)]
-    down = [c[1:] - c[:-1] for c in (x, y, z)]
-    leap_right = discontinuous_edges(right, hit[:, 1:] & hit[:, :-1], 1, JUMP)
-    leap_down = discontinuous_edges(down, hit[1:] & hit[:-1], 0, JUMP)
+    right, down, leaps_right, leaps_down = pixel_edges(points, hit, reflections)
     whole = hit[:-1, :-1] & hit[:-1, 1:] & hit[1:, :-1] & hit[1:, 1:]
-    whole &= ~(leap_right[:-1] | leap_right[1:] | leap_down[:, :-1] | leap_down[:, 1:])
+    whole &= ~(leaps_right[:-1] | leaps_right[1:] | leaps_down[:, :-1] | leaps_down[:, 1:])
 
     half = np.float32(0.5)
     across = [half * (c[:-1] + c[1:]) for c in right]

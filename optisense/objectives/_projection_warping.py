@@ -11,16 +11,12 @@ from numpy.typing import NDArray
 
 from optisense.errors import ObjectiveError
 from optisense.objectives import _figures
+from optisense.objectives._pixel_edges import JUMP, pixel_edges
 from optisense.objectives.registry import objective
 from optisense.objectives.settings import refuse_outside
 
 if TYPE_CHECKING:
     from optisense.objectives.evaluation import Evaluation
-
-JUMP = 4.0
-"""Ratio of the length of an edge to those before and after it in its row or column above which the
-edge crosses a fold or a gap. On a smooth surface neighbouring edges differ by at most a factor of
-2.4, which occurs where the surface is seen edge-on."""
 
 BAND = 24
 """Number of rows of an image that are processed at once, which the processor's cache holds."""
@@ -81,11 +77,12 @@ def projection_warping(
 
     Args:
         jump: ratio of an edge's length to its neighbours' above which the edge crosses a fold or a
-            gap, and its triangles are left out.
+            gap. Its triangles are left out, as are those between rays that different surfaces
+            reflect.
     """
     refuse_outside("jump", jump, 1.0, MOST_JUMP, open_low=True)
     rays = evaluation.checked_rays
-    found = triangle_areas(rays.points, rays.hit, jump)
+    found = triangle_areas(rays.points, rays.hit, rays.reflections, jump)
     areas = found.areas[np.isfinite(found.areas)].astype(np.float64)
     if len(areas) < LEAST_TRIANGLES:
         raise ObjectiveError(
@@ -107,18 +104,19 @@ def projection_warping(
 
 
 def triangle_areas(
-    points: NDArray[np.float32], hit: NDArray[np.bool_], jump: float = JUMP
+    points: NDArray[np.float32],
+    hit: NDArray[np.bool_],
+    reflections: NDArray[np.uint32] | None = None,
+    jump: float = JUMP,
 ) -> TriangleAreas:
     """Return the areas of pixel triangles on the surface, half the cross product of two edges.
 
     Args:
         points: (h, w, 3) points that the pixels see, mm.
         hit: (h, w) mask of the pixels that see the surface.
-        jump: see `JUMP`.
+        reflections, jump: see `pixel_edges`.
     """
-    x, y, z = (np.ascontiguousarray(points[..., axis]) for axis in range(3))
-    right = [c[:, 1:] - c[:, :-1] for c in (x, y, z)]
-    down = [c[1:] - c[:-1] for c in (x, y, z)]
+    right, down, leaps_right, leaps_down = pixel_edges(points, hit, reflections, jump)
     upper = _half_cross([c[:-1] for c in right], [c[:, :-1] for c in down])
     lower = _half_cross([c[1:] for c in right], [c[:, 1:] for c in down])
     areas = np.stack([upper, lower], axis=-1)
@@ -127,10 +125,8 @@ def triangle_areas(
     whole = np.stack(
         [corner[0] & corner[1] & corner[2], corner[1] & corner[2] & corner[3]], axis=-1
     )
-    leap_right = discontinuous_edges(right, hit[:, 1:] & hit[:, :-1], 1, jump)
-    leap_down = discontinuous_edges(down, hit[1:] & hit[:-1], 0, jump)
     leaps = whole & np.stack(
-        [leap_right[:-1] | leap_down[:, :-1], leap_right[1:] | leap_down[:, 1:]], axis=-1
+        [leaps_right[:-1] | leaps_down[:, :-1], leaps_right[1:] | leaps_down[:, 1:]], axis=-1
     )
     areas[~whole | leaps] = np.nan
     return TriangleAreas(areas, int((~whole).sum()), int(leaps.sum()))
@@ -148,25 +144,3 @@ def _half_cross(a: list[NDArray[np.float32]], b: list[NDArray[np.float32]]) -> N
         np.sqrt(square, out=half[band])
     half *= np.float32(0.5)
     return half
-
-
-def discontinuous_edges(
-    edges: list[NDArray[np.float32]], there: NDArray[np.bool_], axis: int, jump: float
-) -> NDArray[np.bool_]:
-    """Return a mask (h, w) of the edges that are much longer than both their neighbours along an
-    axis.
-
-    Args:
-        edges: x, y and z (h, w) of the edges, mm.
-        there: (h, w) mask of the edges with both ends on the surface.
-        axis: axis of the pixels along which the edges run.
-        jump: see `JUMP`.
-    """
-    square = edges[0] ** 2 + edges[1] ** 2 + edges[2] ** 2
-    square[~there] = np.nan
-    lines = np.moveaxis(square, axis, 0)
-    longest = np.full_like(lines, np.nan)
-    longest[1:] = lines[:-1]
-    longest[:-1] = np.fmax(longest[:-1], lines[1:])
-    leaps: NDArray[np.bool_] = np.moveaxis(lines > jump**2 * longest, 0, axis)
-    return leaps

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from optisense.array_types import FloatArray, FloatingArray
 from optisense.geometry import TriangleMesh
 from optisense.geometry.surface_samples import surface_samples
-from optisense.objectives._projection_warping import JUMP, discontinuous_edges
+from optisense.objectives._pixel_edges import JUMP, discontinuous_edges
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays
@@ -91,14 +91,14 @@ def _footprint_samples(rays: ChiefRays, spacing: float) -> tuple[FloatArray, Flo
 def _steps(rays: ChiefRays, axis: int) -> FloatingArray:
     """Return the way (h, w, 3), mm, on the surface across each pixel along an axis of the picture.
 
-    It is that to the nearer of both neighbours whose rays take the same mirrors, without a leap
-    over a gap or fold; 0 without such a neighbour.
+    It is that to the nearer of both neighbours whose rays the same surfaces reflect, without a
+    leap over a gap or fold; 0 without such a neighbour.
     """
     points = np.moveaxis(rays.points, axis, 0)
-    hit, mirrors = (np.moveaxis(each, axis, 0) for each in (rays.hit, rays.mirrors))
+    hit, codes = (np.moveaxis(each, axis, 0) for each in (rays.hit, rays.reflections))
     edges = points[1:] - points[:-1]
     parts = [np.ascontiguousarray(edges[..., k]) for k in range(3)]
-    there = hit[1:] & hit[:-1] & (mirrors[1:] == mirrors[:-1])
+    there = hit[1:] & hit[:-1] & (codes[1:] == codes[:-1])
     there &= ~discontinuous_edges(parts, there, 0, JUMP)
     length = np.full((len(points) + 1, *hit.shape[1:]), np.inf, dtype=np.float32)
     length[1:-1] = np.where(there, _length(edges), np.inf)

@@ -25,6 +25,7 @@ def rays_onto(points: np.ndarray) -> ChiefRays:
         face=np.zeros(shape, np.int64),
         region=np.ones(shape, np.uint8),
         mirrors=np.zeros(shape, np.uint32),
+        reflections=np.zeros(shape, np.uint32),
     )
 
 

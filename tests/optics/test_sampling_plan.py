@@ -27,6 +27,7 @@ def disc(radius: float) -> PixelRegions:
             face=np.zeros(inside.shape, dtype=np.int64),
             region=np.where(inside, Region.INDENTER, Region.SENSING).astype(np.uint8),
             mirrors=np.zeros(inside.shape, dtype=np.uint32),
+            reflections=np.zeros(inside.shape, dtype=np.uint32),
         )
     )
 

@@ -19,8 +19,8 @@ from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.interact import RayKind, interact
 
 HASH_FACTOR = 0x9E3779B1
-"""Multiplier that mixes the patches of a ray's path into one number: 2^32 over the golden ratio,
-as in Knuth's multiplicative hashing."""
+"""Multiplier that mixes the surfaces or patches of a ray's path into one number: 2^32 over the
+golden ratio, as in Knuth's multiplicative hashing."""
 
 MIRROR_BITS = 32
 """Number of bits that record the mirrors a ray has met: the bits of an unsigned integer of the
@@ -52,6 +52,9 @@ class ChiefRays:
         region: (h, w) 1 for the sensing surface, 2 for an indenter.
         mirrors: (h, w) bits; bit n % 32 is set where surface n of the scene, a mirror, has
             reflected the ray.
+        reflections: (h, w) code of the surfaces that have reflected the ray, in order, be it a
+            mirror or by total reflection; 0 for a ray that nothing has reflected. Where neighbours
+            have different codes, the surface appears folded between them.
     """
 
     points: NDArray[np.float32]
@@ -62,6 +65,7 @@ class ChiefRays:
     face: NDArray[np.int64]
     region: NDArray[np.uint8]
     mirrors: NDArray[np.uint32]
+    reflections: NDArray[np.uint32]
 
     @property
     def hit(self) -> NDArray[np.bool_]:
@@ -83,6 +87,7 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
     region = mi.UInt32(0)
     face = mi.UInt32(0)
     mirrors = mi.UInt32(0)
+    reflections = mi.UInt32(0)
     path = mi.UInt32(0)
     while dr.hint(ray.active, exclude=[scene, patches]):
         step = interact(scene, ray, RayKind.CHIEF)
@@ -100,10 +105,13 @@ def _trace(scene: RayScene, patches: mi.UInt32 | None, ray: Ray) -> tuple[Any, .
             path = dr.select(hit.valid, (path ^ code) * HASH_FACTOR + 1, path)
         total |= step.totally
         mirrors |= dr.select(step.scattered, mi.UInt32(1) << (hit.surface % MIRROR_BITS), 0)
+        reflections = dr.select(
+            step.turned, (reflections ^ (hit.surface + 1)) * HASH_FACTOR + 1, reflections
+        )
         ray = step.ray
     failed = total & (outcome != int(RayOutcome.HIT))
     outcome = dr.select(failed, int(RayOutcome.TOTAL_REFLECTION), outcome)
-    return outcome, point, normal, ray.direction, region, face, mirrors, path
+    return outcome, point, normal, ray.direction, region, face, mirrors, reflections, path
 
 
 def trace_path_codes(
@@ -163,13 +171,13 @@ def trace_chief_rays(
     width = dr.opaque(mi.UInt32, camera.width)
     x = mi.Float(index % width) + 0.5
     y = mi.Float(index // width) + 0.5
-    outcome, point, normal, arriving, region, face, mirrors, _path = _trace(
+    outcome, point, normal, arriving, region, face, mirrors, reflections, _path = _trace(
         scene, None, Ray(*camera.rays(x, y), mi.Bool(True))
     )
     incidence = -dr.dot(arriving, normal)
     if sensing_faces is None:
         sensing_faces = np.zeros(0, dtype=np.int64)
-    dr.eval(outcome, point, normal, arriving, region, face, mirrors, incidence)
+    dr.eval(outcome, point, normal, arriving, region, face, mirrors, reflections, incidence)
 
     def image(values: object) -> NDArray[np.float32]:
         return np.asarray(values, dtype=np.float32).T.reshape(*shape, 3)
@@ -185,6 +193,7 @@ def trace_chief_rays(
         ),
         region=np.asarray(region).astype(np.uint8).reshape(shape),
         mirrors=np.asarray(mirrors).astype(np.uint32).reshape(shape),
+        reflections=np.asarray(reflections).astype(np.uint32).reshape(shape),
     )
 
 
