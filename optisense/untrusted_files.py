@@ -257,6 +257,20 @@ def is_folder(path: Path) -> bool:
         return False
 
 
+Stamp = tuple[str, int, int]
+"""Path, time of the last change (ns) and size (bytes) of a file; time and size of a missing file
+are -1."""
+
+
+def file_stamp(path: Path) -> Stamp:
+    """Return a value that changes if a file changes."""
+    try:
+        found = path.stat()
+    except (OSError, ValueError):
+        return str(path), -1, -1
+    return str(path), found.st_mtime_ns, found.st_size
+
+
 def first_problem(error: ValidationError) -> str:
     """Return the first problem of values that a pydantic model refuses, with its place."""
     report = error.errors(include_url=False, include_context=False)[0]

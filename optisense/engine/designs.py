@@ -24,7 +24,7 @@ from optisense.near import near_match
 from optisense.sensors import load
 from optisense.sensors.registry import find_problems
 from optisense.untrusted_arrays import read_array
-from optisense.untrusted_files import is_folder
+from optisense.untrusted_files import Stamp, file_stamp, is_folder
 
 MOST_MESHES = 200
 """Largest number of mesh files that are kept: those of some twenty designs. The one
@@ -35,8 +35,6 @@ MOST_FOLDERS = 20
 """Largest number of folders of designs that are kept, more than a user goes back and forth between;
 the one not used for longest is dropped first.
 """
-
-Stamp = tuple[str, int, int]
 
 
 class DesignReference(BaseModel):
@@ -146,7 +144,7 @@ class Designs:
             MeshError: the mesh can't be read.
         """
         paths = [given] if isinstance(given, str) else [given.vertices, given.faces]
-        key = tuple(_stamp(Path(path)) for path in paths)
+        key = tuple(file_stamp(Path(path)) for path in paths)
         mesh = self._meshes.pop(key, None)
         if mesh is None:
             mesh = TriangleMesh.load(given) if isinstance(given, str) else _mesh_of_arrays(given)
@@ -240,16 +238,7 @@ def _stamps(design: SensorDesign, file: Path) -> list[Stamp]:
     meshes = [file.parent / part.mesh for part in design.parts.values()]
     kinds = design.values_of_kinds().values()
     others = [file.parent / name for each in kinds for name in each.files().values()]
-    return [_stamp(path) for path in (file, *meshes, *others)]
-
-
-def _stamp(path: Path) -> Stamp:
-    """Return a value that changes if a file changes."""
-    try:
-        found = path.stat()
-    except (OSError, ValueError):
-        return str(path), -1, -1
-    return str(path), found.st_mtime_ns, found.st_size
+    return [file_stamp(path) for path in (file, *meshes, *others)]
 
 
 def _array(path: str) -> Any:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
@@ -28,6 +28,7 @@ from optisense.geometry.indenter_kinds import (
 from optisense.geometry.mesh import TriangleMesh, grid_faces
 from optisense.geometry.rotations import turn_about_axes
 from optisense.text import brief
+from optisense.untrusted_files import Stamp, file_stamp
 
 
 @dataclass(frozen=True)
@@ -160,7 +161,8 @@ class Plane(IndenterKind):
 class MeshIndenter(IndenterKind):
     """An indenter of any shape; +z of its mesh points away from the sensor.
 
-    Its lowest point (the middle of several) is put on the place of the contact.
+    Its lowest point (the middle of several) is put on the place of the contact. Two indenters of
+    the same file are equal only if the file was not written again in between.
 
     Attributes:
         source: a mesh (mm), or an OBJ, STL or PLY file.
@@ -171,15 +173,20 @@ class MeshIndenter(IndenterKind):
 
     source: TriangleMesh | str | Path
     scale: float = quantity("", "The factor from the file's unit to mm.", 1.0, low=ABOVE_ZERO)
+    _stamp: Stamp | None = field(init=False, repr=False, default=None)
 
     def __post_init__(self) -> None:
-        """Raise ContactError if the source is neither a mesh nor a path, or by the scale."""
+        """Keep the state of the file; raise ContactError if the source is neither a mesh nor a
+        path, or by the scale.
+        """
         super().__post_init__()
         if not isinstance(self.source, TriangleMesh | str | Path):
             raise ContactError(
                 f"a MeshIndenter can't be made of {brief(repr(self.source))}",
                 hint="Give a file, or TriangleMesh(mesh.vertices, mesh.faces)",
             )
+        if not isinstance(self.source, TriangleMesh):
+            object.__setattr__(self, "_stamp", file_stamp(Path(self.source)))
 
     @classmethod
     def from_text(cls, text: str) -> MeshIndenter:

@@ -1,5 +1,7 @@
 """Contacts pressed into a flat gel: shape of the skin, forces, neighbours."""
 
+import os
+
 import numpy as np
 import pytest
 from hertz import plane_strain_modulus
@@ -231,6 +233,18 @@ def test_a_mesh_with_a_hole_where_it_touches_is_told():
     assert press(Contact(whole, at=(0.0, 0.0), depth=0.3)).contacts[0].force > 0.0
     with pytest.raises(ContactError, match="has a hole where it touches"):
         press(Contact(three_sides, at=(0.0, 0.0), depth=0.3))
+
+
+def test_a_mesh_file_that_was_written_again_is_pressed_anew(tmp_path):
+    file, pad = tmp_path / "stamp.obj", gel()
+    forces = []
+    for half in (1.0, 2.0):
+        TriangleMesh.box((-half, -half, 0.0), (half, half, 2.0)).save_obj(file)
+        os.utime(file, (half, half))  # clocks of some disks count in seconds
+        indenter = MeshIndenter(str(file))
+        assert indenter == MeshIndenter(str(file))
+        forces.append(pad.pressed([Contact(indenter, at=(0, 0), depth=0.3)]).contacts[0].force)
+    assert forces[1] > 2.0 * forces[0]
 
 
 def test_a_force_finds_its_depth():
