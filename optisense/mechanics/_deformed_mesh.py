@@ -111,8 +111,9 @@ class SkinMesh:
         vertices, normals = np.zeros_like(self.vertices), whole[..., 3:]
         vertices[self.faces] = whole[..., :3]
         normals[-len(fine) :] += origin.tilt
-        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
-        return SkinMesh(vertices + origin.displacement, self.faces, normals, self.state, origin)
+        vertices += origin.displacement
+        normals = _on_side_of_faces(normals, vertices, self.faces)
+        return SkinMesh(vertices, self.faces, normals, self.state, origin)
 
     def part(self, *states: SkinState) -> TriangleMesh | None:
         """Return the triangles in any of the states, with shading normals; None without any."""
@@ -183,16 +184,31 @@ def skin_mesh(skin: TriangleMesh, pressed: PressedSkin, edge_scale: float = 1.0)
         face = traits[:, 0, 6].astype(np.int64)
         origin = _Origin(near, face, traits[..., 3:6], displacement, tilt[fine])
     fine_normals = fine_normals + tilt[fine]
-    all_normals = np.concatenate([normals[~near], fine_normals])
-    all_normals /= np.linalg.norm(all_normals, axis=2, keepdims=True)
+    vertices, faces = vertices + displacement, np.concatenate([faces[~near], fine])
     resting = np.full(int((~near).sum()), SkinState.RESTING)
     return SkinMesh(
-        vertices + displacement,
-        np.concatenate([faces[~near], fine]),
-        all_normals,
+        vertices,
+        faces,
+        _on_side_of_faces(np.concatenate([normals[~near], fine_normals]), vertices, faces),
         np.concatenate([resting, state]).astype(np.uint8),
         origin,
     )
+
+
+def _on_side_of_faces(
+    normals: FloatArray, vertices: FloatArray, faces: NDArray[np.int64]
+) -> FloatArray:
+    """Return unit normals (m, 3, 3) of corners on the side of the faces' normals.
+
+    Where the slope jumps, the normal of a corner may point against a steep face beside it; it is
+    then replaced by that of the face.
+    """
+    normals = normals / np.linalg.norm(normals, axis=2, keepdims=True)
+    corners = vertices[faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face, corner = np.nonzero(np.einsum("fck,fk->fc", normals, across) < 0.0)
+    normals[face, corner] = across[face] / np.linalg.norm(across[face], axis=1, keepdims=True)
+    return normals
 
 
 def _near(mesh: TriangleMesh, pressed: PressedSkin) -> NDArray[np.bool_]:

@@ -18,7 +18,7 @@ from optisense.array_types import FloatArray
 from optisense.mechanics._convolution import GridResponse
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._footprint import NO_OVERLAP, Footprint
-from optisense.mechanics._grid_spline import GridArea, GridSpline, binned
+from optisense.mechanics._grid_spline import GridArea, GridSpline, LimitedSpline, binned
 from optisense.mechanics._height_map import slopes
 
 if TYPE_CHECKING:
@@ -61,7 +61,8 @@ class Nearby(NamedTuple):
 class DisplacementField:
     """Displacement around one contact, on a fine grid inside a coarse one.
 
-    Between grid points it is a cubic spline, so that slopes are smooth.
+    Between grid points it is a cubic spline, so that slopes are smooth. Beside sharp edges of an
+    indenter, it does not overshoot.
 
     Attributes:
         place: the grid of the pressure.
@@ -179,12 +180,12 @@ class DisplacementField:
         return result
 
     @cached_property
-    def _fine(self) -> GridSpline:
+    def _fine(self) -> LimitedSpline:
         response, pressure, start = self._loads[0]
         fine = response.normal(pressure)
         inside = tuple(slice(self._ring, self._ring + n) for n in self._touching.shape)
         fine[inside][self._touching] = self._overlap[self._touching]
-        return GridSpline(fine, *start)
+        return LimitedSpline(fine, *start)
 
     @cached_property
     def _coarse(self) -> GridSpline:

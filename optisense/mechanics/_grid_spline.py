@@ -86,6 +86,42 @@ class GridSpline(GridArea):
         )
 
 
+class LimitedSpline(GridSpline):
+    """A cubic spline that does not overshoot beside steps.
+
+    In each cell it stays between the values at the four corners, with an allowance for smooth tops
+    and valleys, which lie between grid points.
+    """
+
+    def __init__(self, values: FloatArray, x0: float, y0: float, pitch: float) -> None:
+        """Fit the spline; the arguments are those of `GridSpline`."""
+        super().__init__(values, x0, y0, pitch)
+        corners = _corners(values)
+        self._low, self._high = corners.min(axis=0), corners.max(axis=0)
+        for axis in (0, 1):
+            bend = np.zeros_like(values)
+            inner = bend[1:-1] if axis == 0 else bend[:, 1:-1]
+            inner[:] = np.diff(values, 2, axis=axis)
+            bends = _corners(bend)
+            # A parabola of second difference b deviates by b / 8 from its chord. At a step, bends
+            # differ between the corners of a cell, and the smallest one is near 0.
+            self._high -= np.minimum(bends.max(axis=0), 0.0) / 8.0
+            self._low -= np.maximum(bends.min(axis=0), 0.0) / 8.0
+
+    def _between(self, rows: FloatArray, columns: FloatArray) -> FloatArray:
+        last = self._low.shape[0] - 1, self._low.shape[1] - 1
+        row = rows.astype(np.int64).clip(0, last[0])
+        column = columns.astype(np.int64).clip(0, last[1])
+        return np.clip(
+            super()._between(rows, columns), self._low[row, column], self._high[row, column]
+        )
+
+
+def _corners(values: FloatArray) -> FloatArray:
+    """Return the values (4, rows - 1, columns - 1) at the corners of each cell of a grid."""
+    return np.stack([values[:-1, :-1], values[1:, :-1], values[:-1, 1:], values[1:, 1:]])
+
+
 def binned(
     pressure: FloatArray,
     place: Footprint,

@@ -129,6 +129,14 @@ def test_the_rim_of_a_flat_punch_is_flat():
     assert np.abs([slope_x, slope_y]).max() < 1e-3
 
 
+def test_the_skin_follows_sharp_edges_without_going_deeper():
+    rod = Cylinder(1.5, 5.0).tilted(-1.1, 1.4)
+    edges = skin_mesh(TOP, press(Contact(rod, at=(0.0, 0.0), depth=0.7, rotation=188.0)))
+    assert edges.vertices[:, 2].min() == pytest.approx(-0.7, abs=1e-3)
+    steep = TriangleMesh(edges.vertices, edges.faces).face_normals
+    assert (np.einsum("fck,fk->fc", edges.corner_normals, steep) > 0.0).all()
+
+
 def test_the_rim_of_a_wide_punch_is_as_straight_as_that_of_a_small_one():
     top = TriangleMesh.grid((50.0, 50.0)).flipped()
     body = TriangleMesh.box((-25.0, -25.0, -4.25), (25.0, 25.0, 0.0))
