@@ -13,7 +13,7 @@ from optisense.geometry.objects import OBJECTS
 from optisense.report._drawing import figure_uri, legend_above
 from optisense.report._files import page
 from optisense.report._pictures import data_uri, normal_colours
-from optisense.tasks.paired_bootstrap import BETTER, INCONCLUSIVE, WORSE, ErrorChange
+from optisense.tasks.paired_errors import BETTER, INCONCLUSIVE, WORSE, ErrorChange
 from optisense.tasks.press_readings import PressPictures
 from optisense.tasks.verification import Verification
 

@@ -24,7 +24,7 @@ from optisense.near import suggestion
 from optisense.tasks._calibration import CalibratedSensor, ReconstructionSettings
 from optisense.tasks._draws import rays_of_places
 from optisense.tasks._unseen_presses import UnseenPress, choose_presses
-from optisense.tasks.paired_bootstrap import (
+from optisense.tasks.paired_errors import (
     BETTER,
     INCONCLUSIVE,
     LEAST_OBJECTS,
@@ -146,12 +146,12 @@ class Verification:
     @property
     def normal_change(self) -> ErrorChange:
         """Change of the error of the normals, degrees."""
-        return error_change(*self.normals, seed=self.settings.reading.seed)
+        return error_change(*self.normals)
 
     @property
     def depth_change(self) -> ErrorChange:
         """Change of the error of the depth, mm."""
-        return error_change(*self.depths, seed=self.settings.reading.seed)
+        return error_change(*self.depths)
 
     @property
     def verdict(self) -> str:

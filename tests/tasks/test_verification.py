@@ -20,7 +20,7 @@ from optisense.sensors._gelsight_mini_ideal import gelsight_mini_ideal
 from optisense.tasks import ReconstructionSettings, VerificationSettings, verify
 from optisense.tasks._calibration import CalibratedSensor
 from optisense.tasks._unseen_presses import MOST_DEEP, VIEW_RIM, choose_presses
-from optisense.tasks.paired_bootstrap import INCONCLUSIVE, WORSE
+from optisense.tasks.paired_errors import INCONCLUSIVE, WORSE
 from optisense.tasks.press_readings import PressReading, check_seen, whole_errors
 
 FEW = ("screw-head", "cable", "wedge", "nut", "bean", "braille")
