@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from optisense.cli.app import app
 from optisense.optics.backend.versions import versions
 from optisense.search import ManufacturingErrors, Study, ToleranceDistribution
+from optisense.tasks._generation import DRAWING
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -54,12 +55,13 @@ def test_a_study_is_continued_and_reported_and_its_best_is_taken(
 
 
 def test_a_dataset_is_continued(tmp_path: Path) -> None:
-    """With the renderer that it was made with, which samples depend on."""
+    """With the renderer and the drawing that it was made with, which samples depend on."""
     folder = Path(shutil.copytree(ASSETS / "dataset-v1", tmp_path / "dataset"))
     info = folder / "dataset.json"
     known = json.loads(info.read_text())
     now = versions("llvm")
     known["made_with"] = {name: now[name] for name in ("optisense", "mitsuba")}
+    known["drawing"] = DRAWING
     info.write_text(json.dumps(known))
     before = (folder / "images" / "000000.png").read_bytes()
     settings = ("--count", "3", "--resolution", "40x30", "--photons", "20000")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -111,6 +111,16 @@ class DrawnContact:
     spot: tuple[float, float]
     tilt_x: float
     tilt_y: float
+
+    def elsewhere(self, places: Places, rng: np.random.Generator) -> DrawnContact:
+        """Return the same contact at another random place.
+
+        The shares of indenters, depths and rotations do not depend on where they fit.
+        """
+        point, spot = places.draw(rng)
+        x, y, z = point.tolist()
+        contact = replace(self.contact, point=(x, y, z))
+        return replace(self, contact=contact, spot=(float(spot[0]), float(spot[1])))
 
 
 @dataclass(frozen=True)

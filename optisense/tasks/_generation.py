@@ -48,10 +48,14 @@ from optisense.writing import inside, write_json, written_whole
 if TYPE_CHECKING:
     from optisense.optics import OpticalModel, TactileImage
 
-ATTEMPTS = 50
-"""Number of contacts drawn for one sample before it is recorded as failed. A plate of 8 mm with a
-random rotation keeps clear of a GelSight Mini's edge in one draw of six, so that one sample in
-10,000 fails; a rejected draw takes chief rays but no rendering."""
+ATTEMPTS = 100
+"""Number of places drawn for one sample before it is recorded as failed. A plate of 8 mm keeps
+clear of a GelSight Mini's edge at one place of 4 to 12, depending on its rotation, so that one
+sample in 30,000 fails; a rejected place takes chief rays but no rendering."""
+
+DRAWING = 2
+"""Version of how samples follow from the seed. Datasets of another version, or of releases without
+this number, are not continued, since some of their samples would differ."""
 
 LEAST_PIXELS = 4
 """Number of pixels below which a contact counts as unseen: two by two show if it slopes."""
@@ -176,9 +180,11 @@ class _Maker:
     def make(self, index: int) -> None:
         """Generate one sample, or record why it cannot be generated."""
         reason = ""
+        rng = np.random.default_rng([self._settings.seed, index, _CONTACT])
+        drawn = self._settings.contacts.draw(self._indenters, self._places, rng)
         for attempt in range(ATTEMPTS):
-            rng = np.random.default_rng([self._settings.seed, index, _CONTACT, attempt])
-            drawn = self._settings.contacts.draw(self._indenters, self._places, rng)
+            if attempt:
+                drawn = drawn.elsewhere(self._places, rng)
             try:
                 reason = self._why_not(drawn)
             except ContactError as error:
@@ -307,6 +313,7 @@ class _Maker:
         made_with = versions(self._model.variant)
         return {
             "design_name": self._model.design.name,
+            "drawing": DRAWING,
             "made_with": {name: made_with[name] for name in ("optisense", "mitsuba")},
             "settings": values,
             "mesh_files": {

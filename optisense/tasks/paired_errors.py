@@ -84,8 +84,8 @@ def error_change(before: FloatArray, after: FloatArray) -> ErrorChange:
     The standard error of the change has three parts: the changes of the objects, whose spread
     includes that of their places, and the readers of either sensor, which are independent. As
     these are few, Student's t widens the interval; its degrees of freedom follow from the parts by
-    Welch and Satterthwaite (Welch, "The generalization of 'Student's' problem when several different
-    population variances are involved", Biometrika 34, 1947).
+    Welch and Satterthwaite (Welch, "The generalization of 'Student's' problem when several
+    different population variances are involved", Biometrika 34, 1947).
 
     Args:
         before, after: (objects, places, readers) errors of both sensors on the same presses.

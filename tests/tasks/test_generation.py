@@ -196,6 +196,18 @@ def test_other_settings_and_other_designs_are_refused(made: Dataset, mini: Optic
     assert len(Dataset.load(made.folder)) == COUNT
 
 
+def test_samples_of_another_drawing_are_not_mixed_in(
+    made: Dataset, mini: OpticalModel, tmp_path: Path
+) -> None:
+    folder = Path(shutil.copytree(made.folder, tmp_path / "older"))
+    info = json.loads((folder / "dataset.json").read_text())
+    del info["drawing"]
+    (folder / "dataset.json").write_text(json.dumps(info))
+    with pytest.raises(TaskError, match="drawing"):
+        generate(mini, folder, COUNT + 1, SETTINGS)
+    assert len(Dataset.load(folder)) == COUNT
+
+
 def test_where_numbers_come_from_does_not_matter(made: Dataset) -> None:
     same: SensorDesign = load("gelsight-mini-ideal")
     same.provenance.clear()
@@ -300,6 +312,10 @@ def test_contacts_stay_clear_of_the_edge_unless_they_may_be_cut(
     free = generate(mini, tmp_path / "cut", 8, cut)
     assert min(edge_distance(sample.mask) for sample in free) == 0
     assert len(kept.failures) == len(free.failures) == 0
+    # Contacts are drawn at another place only, so that what fits rarely is not drawn less often.
+    assert any(row["attempt"] for row in kept.labels)
+    for name in ("depth", "rotation"):
+        assert [row[name] for row in kept.labels] == [row[name] for row in free.labels]
     # A draw that kept its margin by itself is the same in both.
     same = [a for a, b in zip(kept.labels, free.labels, strict=True) if a["x"] == b["x"]]
     assert len(same) >= 3
