@@ -200,8 +200,11 @@ class IndenterKind(ABC):
 
 @dataclass(frozen=True)
 class Tilted:
-    """An indenter rotated about its x and then its y axis, and moved so that its lowest point is at
-    its origin.
+    """An indenter rotated about its x and then its y axis, and moved along z so that its lowest
+    point is at z = 0.
+
+    The point that was lowest stays above the place of the contact, so that small tilts move the
+    indenter by little.
 
     Attributes:
         indenter: the indenter that is rotated.
@@ -216,10 +219,8 @@ class Tilted:
         """Return the mesh of the whole rotated indenter; see `Indenter.mesh`."""
         whole = self.indenter.mesh(np.inf, facet_error)
         turned = whole.transformed(turn_about_axes(self.tilt_x, self.tilt_y))
-        size = np.ptp(turned.bounds, axis=0).max()
-        lowest = turned.vertices[turned.vertices[:, 2] <= turned.bounds[0, 2] + 1e-6 * size]
-        place = 0.5 * (lowest.min(axis=0) + lowest.max(axis=0))
-        return TriangleMesh(turned.vertices - place, turned.faces, turned.normals)
+        lowest = np.array([0.0, 0.0, turned.bounds[0, 2]])
+        return TriangleMesh(turned.vertices - lowest, turned.faces, turned.normals)
 
 
 def tilted(indenter: Indenter, tilt_x: float, tilt_y: float) -> Indenter:

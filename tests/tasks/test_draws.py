@@ -66,7 +66,9 @@ def test_a_tilted_cylinder_touches_with_its_end() -> None:
     mesh = tilted(Cylinder(2.0, 6.0), 0.0, 10.0).mesh(1.0)
     assert mesh.bounds[0, 2] == pytest.approx(0, abs=1e-9)
     lowest = mesh.vertices[mesh.vertices[:, 2] < 1e-6]
-    assert lowest[:, :2] == pytest.approx(np.zeros_like(lowest[:, :2]), abs=1e-9)
+    # The middle of its lowest line stays above the place.
+    end = 3 * np.cos(np.radians(10)), 0.0
+    assert lowest[:, :2] == pytest.approx(np.broadcast_to(end, lowest[:, :2].shape), abs=1e-9)
     # The other end of the lowest line is higher by the length times the sine.
     along = np.array([np.cos(np.radians(10)), 0, -np.sin(np.radians(10))])
     ends = mesh.vertices @ along
@@ -74,6 +76,11 @@ def test_a_tilted_cylinder_touches_with_its_end() -> None:
     assert mesh.bounds[1, 2] == pytest.approx(
         6 * np.sin(np.radians(10)) + 4 * np.cos(np.radians(10)), abs=0.01
     )
+
+
+def test_a_small_tilt_moves_an_indenter_by_little() -> None:
+    upright, tilting = Cylinder(2.0, 6.0), tilted(Cylinder(2.0, 6.0), 0.0, 1e-3)
+    assert tilting.mesh(np.inf).vertices == pytest.approx(upright.mesh(np.inf).vertices, abs=1e-3)
 
 
 def test_balls_stay_and_plates_add_their_tilts() -> None:
