@@ -41,7 +41,10 @@ def mjcf(body: SensorBody, folder: str) -> str:
             f'conaffinity="0" mass="0" rgba="{numbers(each.colour)}"/>'
         )
     for each in body.hulls:
-        friction = f' friction="{body.friction:g} 0.005 0.0001"' if each.is_gel else ""
+        friction = ""
+        if each.is_gel:
+            # Of two geoms, the one of higher priority gives the friction; else, the larger counts.
+            friction = f' friction="{body.friction:g} 0.005 0.0001" priority="1"'
         lines.append(
             f'      <geom name={quoteattr(each.name)} type="mesh" mesh={quoteattr(each.name)} '
             f'group="3" mass="0"{friction}/>'

@@ -42,6 +42,13 @@ def urdf(body: SensorBody, folder: str) -> str:
     return "\n".join(lines) + "\n"
 
 
+def without_friction(body: SensorBody) -> str:
+    """Return a sentence about the friction, which has no place in a URDF file."""
+    return (
+        f"URDF files contain no friction: set that of the gel, {body.friction:g}, in the simulator"
+    )
+
+
 def _mesh(kind: str, each: BodyMesh, folder: str) -> list[str]:
     lines = [f"    <{kind} name={quoteattr(each.name)}>"]
     file = quoteattr(f"{folder}/{each.name}.stl")

@@ -12,7 +12,7 @@ from optisense.folders import refuse_to_replace
 from optisense.registry import Registry, must_be
 from optisense.robots._body import SensorBody, sensor_body
 from optisense.robots._mjcf import mjcf
-from optisense.robots._urdf import urdf
+from optisense.robots._urdf import urdf, without_friction
 from optisense.workshop.mesh_formats import stl_bytes_of
 from optisense.writing import inside, written_together
 
@@ -28,14 +28,16 @@ class RobotFormat:
         suffix: suffix of the file name, with its dot.
         text: function that returns the content of the file, called with the sensor's body and the
             folder of the mesh files (NAME.stl, binary, m).
+        note: function that returns a sentence about what the file lacks; None if it lacks nothing.
     """
 
     suffix: str
     text: Callable[[SensorBody, str], str]
+    note: Callable[[SensorBody], str] | None = None
 
 
 MJCF = RobotFormat(".xml", mjcf)
-URDF = RobotFormat(".urdf", urdf)
+URDF = RobotFormat(".urdf", urdf, without_friction)
 
 
 ROBOT_FORMATS: Registry[RobotFormat] = Registry(
@@ -104,6 +106,7 @@ def export_robot(
             stage(final).write_bytes(data)
     if notes is not None:
         notes += body.notes
+        notes += [kind.note(body) for kind in kinds if kind.note is not None]
     return finals
 
 

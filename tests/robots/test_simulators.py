@@ -174,6 +174,20 @@ def test_the_touch_sensor_reads_the_weight_of_a_ball(made: Made) -> None:
     assert read == pytest.approx(GRAVITY * BALL_MASS, rel=0.01)
 
 
+def test_the_friction_of_the_gel_counts(tmp_path: Path) -> None:
+    """MuJoCo's own balls have a friction of 1."""
+    design = sensors.build("gelsight-mini")
+    material = design.materials[design.parts["gel"].material]
+    material.elasticity = material.elasticity.model_copy(update={"friction": 0.3})
+    notes: list[str] = []
+    mjcf, urdf, *_ = export_robot(design, tmp_path, ["mujoco", "urdf"], notes)
+    model = with_ball(Made(design, sensor_body(design), mjcf, urdf), -SUNK)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert {contact.friction[0] for contact in data.contact} == {0.3}
+    assert "that of the gel, 0.3" in notes[-1]
+
+
 def test_the_camera_looks_where_the_design_does(made: Made) -> None:
     """Points of the skin appear in MuJoCo's pinhole camera where the design's camera sees them."""
     camera = made.design.camera
