@@ -93,7 +93,7 @@ def dataset(
 
 
 def _print_summary(made: Dataset, count: int) -> None:
-    """Print the number of samples, and why others failed.
+    """Print the number of samples, why others failed, and which splits are empty.
 
     Raises:
         typer.Exit: there is no sample.
@@ -110,3 +110,6 @@ def _print_summary(made: Dataset, count: int) -> None:
         )
     if not len(made):
         raise typer.Exit(EXIT_FAILURE)
+    if made.empty_splits:
+        named = " and ".join(made.empty_splits)
+        output.print(f"no sample is in the split {named}: raise --count", style="yellow")

@@ -54,8 +54,8 @@ clear of a GelSight Mini's edge at one place of 4 to 12, depending on its rotati
 sample in 30,000 fails; a rejected place takes chief rays but no rendering."""
 
 DRAWING = 2
-"""Version of how samples follow from the seed. Datasets of another version, or of releases without
-this number, are not continued, since some of their samples would differ."""
+"""Version of how samples and their splits follow from the seed. Datasets of another version, or of
+releases without this number, are not continued, since some of their samples would differ."""
 
 LEAST_PIXELS = 4
 """Number of pixels below which a contact counts as unseen: two by two show if it slopes."""
@@ -387,6 +387,7 @@ class _Maker:
                     settings.seed,
                     drawn.indenter,
                     (drawn.spot[0], drawn.spot[1] * height / width),
+                    height / width,
                     settings.hold_out,
                 ),
             }

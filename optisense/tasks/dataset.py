@@ -186,6 +186,14 @@ class Dataset:
         """
         return self._arrays(CAMERA, CAMERA_ARRAYS)
 
+    @property
+    def empty_splits(self) -> list[str]:
+        """Names of the splits without samples; none for a dataset of release 0.1, which has no
+        splits.
+        """
+        used = {row["split"] for row in self.labels}
+        return [] if "" in used else [name for name in SPLITS if name not in used]
+
     def split(self, name: str) -> list[int]:
         """Return the indices of the samples of a split, for use in `dataset[number]`.
 

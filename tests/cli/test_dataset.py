@@ -30,6 +30,7 @@ def test_a_dataset_is_made_and_continued(tmp_path: Path) -> None:
     code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "2", *options)
     assert code == 0, text
     assert "2 samples" in text
+    assert "no sample is in the split" in text
     code, text = run("gelsight-mini-ideal", "--out", str(folder), "--count", "3", *options)
     assert code == 0, text
     made = Dataset.load(folder)
