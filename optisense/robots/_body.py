@@ -16,6 +16,7 @@ from optisense.design.projection import image_edges
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import as_manifold, of_manifold
+from optisense.geometry.surface import closest_points
 from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
 from optisense.robots._densities import density_of
 from optisense.workshop.export import file_name
@@ -27,6 +28,9 @@ KILOGRAMS = 1e-6
 """Mass of one mm^3 of a density of 1 g/cm^3, kg."""
 USUAL_FRICTION = 1.0
 """Coefficient of friction of a gel whose material gives none: that of the library's silicones."""
+ASIDE = 1e-2
+"""Distance (mm) by which the centroid of a skin is moved to the right to find the point next to it:
+far above the rounding of coordinates in mesh files (2e-6 mm), and far below the size of a skin."""
 WIDEST_PINHOLE = 170.0
 """Largest vertical angle (degrees) of the pinhole camera that stands for a fisheye. A pinhole sees
 less than 180 degrees, and near this limit nearly all of its picture shows the rim of its view."""
@@ -78,8 +82,9 @@ class SensorBody:
         camera: pose of the camera: x to the right and y down in the picture, z where it looks.
         camera_angle: vertical angle of view of a pinhole camera, degrees.
         resolution: width and height of the picture, pixels.
-        skin: pose of the skin: the origin is its point next to its centroid, z points out of the
-            sensor and x as near to the right of the picture as it can.
+        skin: pose of the skin: the origin is its point next to its centroid (of several, the one
+            farthest to the right in the picture), z points out of the sensor and x as near to the
+            right of the picture as it can, or to its top if z points to the right.
         skin_box: middle and half the sides of a box around the skin, in the skin's frame, m.
         friction: friction of the gel.
         notes: what a user must know, one sentence each.
@@ -272,20 +277,23 @@ def _body_mesh(name: str, mesh: TriangleMesh, shape: Shape) -> BodyMesh:
 
 
 def _skin_frame(skin: TriangleMesh, right: FloatArray, up: FloatArray) -> Frame:
-    """Return the pose of the skin at its point next to its centroid."""
-    import trimesh
+    """Return the pose of the skin at its point next to its centroid.
 
+    Of several points at the same distance, as on a tube, it is the one farthest to the right in
+    the picture.
+    """
     areas = np.linalg.norm(skin.face_vectors, axis=1)
     centroid = (areas[:, None] * skin.triangles.mean(axis=1)).sum(axis=0) / areas.sum()
-    surface = trimesh.Trimesh(skin.vertices, skin.faces, process=False)
-    proximity: Any = trimesh.proximity  # without types
-    nearest, _, face = proximity.closest_point_naive(surface, centroid[None])
+    # A little upward as well: two facets of a tube may be equally far to the right.
+    aside = centroid + ASIDE * (right + 0.05 * up)
+    face = int(np.nanargmin(np.linalg.norm(closest_points(skin, aside) - aside, axis=1)))
+    nearest = closest_points(skin, centroid)[face]
     # Faces of the sensing surface are wound so that their normals point into the sensor.
-    z = -skin.face_normals[int(face[0])]
+    z = -skin.face_normals[face]
     across = right if abs(right @ z) < 0.9 else up
     x = across - (across @ z) * z
     x /= np.linalg.norm(x)
-    return Frame(METRES * nearest[0], np.stack([x, np.cross(z, x), z], axis=1))
+    return Frame(METRES * nearest, np.stack([x, np.cross(z, x), z], axis=1))
 
 
 def _vertical_angle(design: SensorDesign) -> float:

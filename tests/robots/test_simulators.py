@@ -14,7 +14,7 @@ from optisense.design.projection import picture_places
 from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry.common_space import as_manifold
 from optisense.robots import RobotFormat, SensorBody, export_robot, sensor_body
-from optisense.robots._body import KILOGRAMS, mass_properties
+from optisense.robots._body import KILOGRAMS, _skin_frame, mass_properties
 from optisense.workshop.shapes import shapes
 
 mujoco = pytest.importorskip("mujoco")
@@ -126,6 +126,17 @@ def test_a_format_without_text_is_named(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(OwnCodeError, match=r"no_text' of the format '\.sdf' returned NoneType"):
         export_robot(sensors.build("gelsight-mini"), tmp_path, "silent")
     assert not list(tmp_path.iterdir())
+
+
+def test_the_frame_of_a_tube_does_not_depend_on_rounding() -> None:
+    design = sensors.build("gelsight360")
+    right, up, _ = design.camera.axes()
+    skin = next(each.mesh for each in shapes(design) if each.role == "sensing_surface")
+    for number in range(3):
+        noise = np.random.default_rng(number).normal(0.0, 1e-7, skin.vertices.shape)
+        frame = _skin_frame(skin.with_vertices(skin.vertices + noise), right, up)
+        assert frame.axes[:, 2] @ right > 0.99
+        assert frame.axes[:, 0] @ up > 0.9
 
 
 def test_a_weighed_sensor() -> None:
