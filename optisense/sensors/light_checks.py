@@ -1,5 +1,5 @@
-"""Checks of lights whose sizes the library knows: windows in parts, bodies in one another, and
-lights outside of the housing.
+"""Checks of lights whose sizes the library knows: windows in parts, bodies and windows in one
+another, and lights outside of the housing.
 """
 
 from __future__ import annotations
@@ -78,17 +78,20 @@ class WindowIn(NamedTuple):
 
 def light_problems(design: SensorDesign) -> list[Diagnostic]:
     """Return warnings about lights: windows that are partly in a part, lights closer together than
-    their bodies are wide, and lights from which no straight ray reaches the sensor.
+    their bodies are wide, windows that overlap, and lights from which no straight ray reaches the
+    sensor.
 
     Args:
         design: a design without errors.
     """
     meshes = design.deformed_meshes()
     problems = _buried(design, meshes)
+    crowded = set()
     for name, group in design.lights.items():
         where = design.where("lights", name)
         crowd = _crowded(group)
         if crowd is not None:
+            crowded.add(name)
             problems.append(
                 Diagnostic(
                     f"lights of group '{name}' {crowd}",
@@ -108,7 +111,7 @@ def light_problems(design: SensorDesign) -> list[Diagnostic]:
                     severity="warning",
                 )
             )
-    return problems
+    return problems + _overlapping(design, crowded)
 
 
 def windows_in(
@@ -152,6 +155,60 @@ def _crowded(group: LightGroup) -> str | None:
     if nearest >= min(package[:2]) - TOGETHER:
         return None
     return f"are {nearest:.2f} mm apart, but a {group.model} is {package[0]:g} x {package[1]:g} mm"
+
+
+def _overlapping(design: SensorDesign, crowded: set[str]) -> list[Diagnostic]:
+    """Return warnings about windows in nearly one plane that overlap, one for each two groups.
+
+    Rays that end there meet only one of the windows. Lights with the same window, such as the dies
+    of an RGB LED, count as one.
+
+    Args:
+        crowded: groups whose own lights are not compared, as there is a warning about them.
+    """
+    windows = [
+        (name, window) for name, group in design.lights.items() for window in _samples(group)
+    ]
+    windows = [(name, window) for name, window in windows if len(window) > 1]
+    if len(windows) < 2:
+        return []
+    middles = np.array([window[0] for _, window in windows])
+    reach = max(np.linalg.norm(window - window[0], axis=1).max() for _, window in windows)
+    found: dict[tuple[str, str], int] = {}
+    for i, j in sorted(cKDTree(middles).query_pairs(2.0 * reach)):
+        (one, first), (other, second) = windows[i], windows[j]
+        if one == other and one in crowded:
+            continue
+        if _overlap(first, second) and np.abs(first - second).max() > TOGETHER:
+            found[one, other] = found.get((one, other), 0) + 1
+    return [
+        Diagnostic(
+            f"windows of lights of group '{one}' overlap those of group '{other}' partly in "
+            f"{count} {'place' if count == 1 else 'places'}, where only one of two counts",
+            design.where("lights", one),
+            "Move them apart, or give both the same position, direction, up and size",
+            severity="warning",
+        )
+        for (one, other), count in found.items()
+    ]
+
+
+def _overlap(one: FloatArray, other: FloatArray) -> bool:
+    """Return whether two windows, samples (9, 3) each as of `_samples`, overlap, and the second lies
+    within `FLUSH` of the plane of the first (the test of separating axes).
+    """
+    sides = [np.roll(window[1:], -1, axis=0) - window[1:] for window in (one, other)]
+    faces = [np.cross(side[0], side[2]) for side in sides]
+    if np.abs((other - one[0]) @ faces[0]).max() > FLUSH * np.linalg.norm(faces[0]):
+        return False
+    for face, side in zip(faces, sides, strict=True):
+        axes = np.cross(side, face)
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        a, b = one @ axes.T, other @ axes.T
+        apart = np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0))
+        if apart.max() > -TOGETHER:
+            return False
+    return True
 
 
 def _buried(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -36,6 +38,21 @@ NOISE = 0.005
 """Relative error of an area that is counted in pixels, some 20,000 of them."""
 
 
+def seen(lamps: list[Emitter], groups: int) -> np.ndarray:
+    """Return the layers (groups, PIXELS, PIXELS) of the image of lamps at `DISTANCE`."""
+    scene = RayScene([window(number, lamp) for number, lamp in enumerate(lamps)])
+    camera = RayCamera((0, 0, 0), (0, 0, 1), (0, 1, 0), FOV, PIXELS, PIXELS)
+    pixel = dr.arange(mi.UInt32, PIXELS * PIXELS)
+    spots = mi.Point2f(pixel % PIXELS + 0.5, pixel // PIXELS + 0.5)
+    points, _ = find_visible_points(
+        scene, camera, pixel, dr.zeros(mi.UInt32, PIXELS * PIXELS), spots, 1, only_main=True
+    )
+    film = Film(PIXELS * PIXELS, groups)
+    film.count(pixel)
+    film.add_light(points, LampWindows.of(lamps))
+    return film.layers(PIXELS, PIXELS)[..., 0]
+
+
 @pytest.mark.parametrize("shape", [EmitterShape.RECTANGLE, EmitterShape.DISC])
 @pytest.mark.parametrize("exponent", [1.0, 4.0])
 @pytest.mark.parametrize("turned", [0.0, 0.6])
@@ -47,20 +64,21 @@ def test_a_window_sends_its_power_to_a_distant_camera(
     """
     axis = (0.0, float(np.sin(turned)), -float(np.cos(turned)))
     lamp = Emitter(0, (0, 0, DISTANCE), axis, (1, 0, 0), shape, (2.4, 2.4), exponent)
-    scene = RayScene([window(0, lamp)])
-    camera = RayCamera((0, 0, 0), (0, 0, 1), (0, 1, 0), FOV, PIXELS, PIXELS)
-    pixel = dr.arange(mi.UInt32, PIXELS * PIXELS)
-    spots = mi.Point2f(pixel % PIXELS + 0.5, pixel // PIXELS + 0.5)
-    points, _ = find_visible_points(
-        scene, camera, pixel, dr.zeros(mi.UInt32, PIXELS * PIXELS), spots, 1, only_main=True
-    )
-    film = Film(PIXELS * PIXELS, 1)
-    film.count(pixel)
-    film.add_light(points, LampWindows.of([lamp]))
-    radiance = film.layers(PIXELS, PIXELS)[0, ..., 0]
+    radiance = seen([lamp], 1)[0]
     side = 2 * np.tan(np.radians(FOV / 2)) / PIXELS
     intensity = (exponent + 1) / (2 * np.pi) * np.cos(turned) ** exponent
     assert radiance.sum() * side**2 * DISTANCE**2 == pytest.approx(intensity, rel=NOISE)
+
+
+def test_lights_of_several_groups_at_one_place_are_all_seen() -> None:
+    """The red and the blue die of an LED share a window; a third lamp has its own beside it."""
+    shape, size = EmitterShape.RECTANGLE, (0.8, 0.8)
+    red = Emitter(0, (0, 0, DISTANCE), (0, 0, -1), (1, 0, 0), shape, size)
+    blue = replace(red, group=1, direction=(0, 0, -2), exponent=3.0)
+    alone = replace(red, group=2, position=(1, 0, DISTANCE))
+    together = seen([red, alone, blue], 3)
+    for layer, lamp in zip(together, (red, blue, alone), strict=True):
+        assert np.array_equal(layer, seen([replace(lamp, group=0)], 1)[0]) and layer.any()
 
 
 def test_a_tabulated_window_shows_the_light_that_photons_carry_away() -> None:

@@ -69,6 +69,21 @@ def test_lights_closer_than_their_bodies(mini: SensorDesign) -> None:
     )
 
 
+def test_windows_of_two_groups_that_overlap(mini: SensorDesign) -> None:
+    """Lights of two groups at one place are the dies of one LED, which is fine."""
+    lights = mini.lights["green"].lights
+    x, y, z = lights[0].position
+    for shift, count in ((0.0, 0), (0.5, 1), (4.0, 0)):
+        beside = lights[0].model_copy(update={"position": (x, y + shift, z)})
+        blue = mini.lights["green"].model_copy(update={"lights": [beside]})
+        alone = with_green(mini, lights[:1])
+        both = alone.model_copy(update={"lights": {"green": alone.lights["green"], "blue": blue}})
+        found = messages(both)
+        assert len(found) == count and all(
+            "'green' overlap those of group 'blue'" in f for f in found
+        )
+
+
 def test_lights_outside_of_the_housing(mini: SensorDesign) -> None:
     """A wall before the green lights keeps their light away, unless it is white."""
     away = [

@@ -49,15 +49,15 @@ class Film:
 
     def add_light(self, points: VisiblePoints, lamps: LampWindows) -> None:
         """Add the windows of lamps that are seen directly."""
-        value, group, seen = lamps.radiance(points.light, points.towards_eye)
-        for number, total in enumerate(self.sums):
-            for k in range(3):
-                dr.scatter_add(
-                    total,
-                    points.weight[k] * value,
-                    points.pixel * 3 + k,
-                    seen & (group == number),
-                )
+        for value, group, seen in lamps.radiances(points.light, points.towards_eye):
+            for number, total in enumerate(self.sums):
+                for k in range(3):
+                    dr.scatter_add(
+                        total,
+                        points.weight[k] * value,
+                        points.pixel * 3 + k,
+                        seen & (group == number),
+                    )
 
     def layers(self, width: int, height: int) -> NDArray[np.float32]:
         """Return the layers (groups, h, w, 3): the sums divided by the number of samples."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import drjit as dr
@@ -23,6 +24,9 @@ MIN_COSINE = 0.01
 have light at 90 degrees, where a flat window has no area."""
 FLOATS_PER_WINDOW = 12
 """Number of floats of a window in the table; three gathers of four floats read them."""
+SAME_PLACE = 6
+"""Decimals to which positions (mm) and axes of two windows agree that are one: 1e-6 covers the
+rounding of numbers in files, and is far below `RAY_OFFSET`, at which windows are two for rays."""
 
 
 @dataclass(frozen=True)
@@ -37,12 +41,17 @@ class LampWindows:
         profiles: intensity (1/sr) of each table, of a power of 1 over all directions, on a grid of
             polar angles and of angles from the width axis.
         exist: whether any light has a window.
+        after: for each entry, the next one with the same window, in a ring; None if every light has
+            a window of its own.
+        most: largest number of lights that share a window.
     """
 
     rows: mi.Float
     groups: mi.UInt32
     profiles: mi.Float
     exist: bool
+    after: mi.UInt32 | None = None
+    most: int = 1
 
     @classmethod
     def of(cls, emitters: list[Emitter]) -> LampWindows:
@@ -66,7 +75,29 @@ class LampWindows:
             row[3] = scale / area if area > 0 else 0.0
         groups = np.array([0, *(emitter.group for emitter in emitters)])
         profiles = np.array(tables) if tables else np.zeros(1)
-        return cls(floats(rows), indices(groups), floats(profiles), bool(rows[:, 3].any()))
+        exist = bool(rows[:, 3].any())
+        rings = _rings(emitters)
+        most = max(map(len, rings), default=1)
+        if most < 2:
+            return cls(floats(rows), indices(groups), floats(profiles), exist)
+        after = np.zeros(len(rows), dtype=np.uint32)
+        for ring in rings:
+            after[ring] = np.roll(ring, -1)
+        return cls(floats(rows), indices(groups), floats(profiles), exist, indices(after), most)
+
+    def radiances(
+        self, light: mi.UInt32, direction: mi.Vector3f
+    ) -> Iterator[tuple[mi.Float, mi.UInt32, mi.Bool]]:
+        """Yield `radiance` of the lights whose windows rays end on, then of the other lights that
+        have the same window, such as the three colours of an RGB LED.
+        """
+        yield self.radiance(light, direction)
+        other, active = light, light > 0
+        for _ in range(self.most - 1):
+            assert self.after is not None
+            other = dr.gather(mi.UInt32, self.after, other, active)
+            active &= other != light
+            yield self.radiance(dr.select(active, other, 0), direction)
 
     def radiance(
         self, light: mi.UInt32, direction: mi.Vector3f
@@ -114,6 +145,17 @@ class LampWindows:
         )
         f, g = up - mi.Float(i), turn - mi.Float(j)
         return dr.lerp(dr.lerp(one, next_one, f), dr.lerp(other, next_other, f), g)
+
+
+def _rings(emitters: list[Emitter]) -> list[list[int]]:
+    """Return the numbers + 1 of the lights with each window."""
+    rings: dict[tuple[object, ...], list[int]] = {}
+    for number, emitter in enumerate(emitters):
+        if emitter.area > 0:
+            place = np.round([emitter.position, *emitter.frame], SAME_PLACE)
+            key = emitter.shape, emitter.size, *place.ravel().tolist()
+            rings.setdefault(key, []).append(number + 1)
+    return list(rings.values())
 
 
 def _grid(intensity: Intensity) -> FloatingArray:
