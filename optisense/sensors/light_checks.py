@@ -194,8 +194,8 @@ def _overlapping(design: SensorDesign, crowded: set[str]) -> list[Diagnostic]:
 
 
 def _overlap(one: FloatArray, other: FloatArray) -> bool:
-    """Return whether two windows, samples (9, 3) each as of `_samples`, overlap, and the second lies
-    within `FLUSH` of the plane of the first (the test of separating axes).
+    """Return whether two windows, samples (9, 3) each as of `_samples`, overlap (the test of
+    separating axes), of which the second lies within `FLUSH` of the plane of the first.
     """
     sides = [np.roll(window[1:], -1, axis=0) - window[1:] for window in (one, other)]
     faces = [np.cross(side[0], side[2]) for side in sides]

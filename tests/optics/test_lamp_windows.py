@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 from optisense.design.emitters import Intensity
+from optisense.geometry import TriangleMesh
 from optisense.optics.backend.sequences import sequence_4d
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film
-from optisense.optics.scene.assembly import window
+from optisense.optics.scene._lamp_places import off_faces, window
 from optisense.optics.scene.emitters import Emitter, EmitterShape, emit, emitter_table
 from optisense.optics.scene.lamp_windows import LampWindows
-from optisense.optics.scene.ray_scene import RayScene
+from optisense.optics.scene.ray_scene import Piece, Ray, RayScene
+from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points
 
 DISTANCE = 20.0
@@ -79,6 +81,26 @@ def test_lights_of_several_groups_at_one_place_are_all_seen() -> None:
     together = seen([red, alone, blue], 3)
     for layer, lamp in zip(together, (red, blue, alone), strict=True):
         assert np.array_equal(layer, seen([replace(lamp, group=0)], 1)[0]) and layer.any()
+
+
+@pytest.mark.parametrize(
+    ("gap", "first"), [(0.05, "wall"), (1e-4, "light 0"), (0.0, "light 0"), (-0.05, "light 0")]
+)
+def test_rays_meet_a_window_on_a_face_before_the_face(gap: float, first: str) -> None:
+    """A light ``gap`` in front of the wall of a box shines into it; photons start beyond the wall
+    if the gap is narrower than `RAY_OFFSET`. Another light faces away from the box.
+    """
+    box = TriangleMesh.box((-5, -5, -5), (5, 5, 5))
+    pieces = [Piece("wall", box.vertices, box.faces, Surface(SurfaceKind.DIELECTRIC, eta=1.4))]
+    lamp = Emitter(0, (-5 - gap, 1, 0.5), (1, 0, 0), None, EmitterShape.RECTANGLE, (1.0, 1.0))
+    away = replace(lamp, position=(5.01, 1, 0.5))
+    lamps = off_faces([lamp, away], pieces)
+    assert lamps[1] is away and (lamps[0] is lamp) == (abs(gap) > RAY_OFFSET)
+    pieces += [window(number, each) for number, each in enumerate(lamps)]
+    hit = RayScene(pieces).intersect(
+        Ray(mi.Point3f(0, 1, 0.5), mi.Vector3f(-1, 0, 0), mi.Bool(True))
+    )
+    assert pieces[int(hit.surface[0])].name == first
 
 
 def test_a_tabulated_window_shows_the_light_that_photons_carry_away() -> None:

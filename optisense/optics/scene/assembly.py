@@ -10,7 +10,6 @@ import numpy as np
 from optisense import library
 from optisense.design import Light, LightGroup, LightModel, SensorDesign
 from optisense.design.check import inside
-from optisense.design.lights import frame_of
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.priorities import carved
@@ -19,12 +18,9 @@ from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
 from optisense.geometry.seams import without_seams
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
+from optisense.optics.scene._lamp_places import off_faces, window
 from optisense.optics.scene._solids import Interface, Sheet, Solid
-from optisense.optics.scene.emitters import (
-    DISC_CORNERS,
-    Emitter,
-    EmitterShape,
-)
+from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import CLEAR, RGB, Region, Surface, SurfaceKind
@@ -190,7 +186,7 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
             surface = _opaque(design.materials.get(covers[sheet.name] or ""), ior)
         pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
-    emitters = _emitters(design, solids)
+    emitters = off_faces(_emitters(design, solids), pieces)
     for number, emitter in enumerate(emitters):
         if emitter.shape is not EmitterShape.POINT:
             pieces.append(window(number, emitter))
@@ -365,34 +361,3 @@ def _lamp(model: LightModel) -> Emitter:
     if window is None:
         return lamp
     return replace(lamp, shape=EmitterShape[window.shape.upper()], size=window.size)
-
-
-def window(number: int, emitter: Emitter) -> Piece:
-    """Return the emitting face of a light, which faces its direction; equal lights share one
-    object.
-    """
-    return _window_of(
-        number, emitter.shape, emitter.size, emitter.position, emitter.direction, emitter.up
-    )
-
-
-@lru_cache(maxsize=1024)
-def _window_of(
-    number: int,
-    shape: EmitterShape,
-    size: tuple[float, float],
-    position: tuple[float, float, float],
-    direction: tuple[float, float, float],
-    up: tuple[float, float, float] | None,
-) -> Piece:
-    s, t, _ = frame_of(direction, up)
-    half = np.array(size) / 2
-    if shape is EmitterShape.DISC:
-        turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
-        outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half
-    else:
-        outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
-    points = np.asarray(position) + outline[:, :1] * s + outline[:, 1:] * t
-    count = len(points)
-    faces = np.array([[0, k, k + 1] for k in range(1, count - 1)])
-    return Piece(f"light {number}", points, faces, Surface(SurfaceKind.LIGHT, light=number))

@@ -72,6 +72,12 @@ class Piece:
         return rows
 
     @cached_property
+    def boxes(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Return the lowest and the highest coordinates (3, m), mm, of each face."""
+        a, b, c = (self.vertices.T.astype(np.float32)[:, self.faces[:, i]] for i in range(3))
+        return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+    @cached_property
     def corners(self) -> NDArray[np.float32]:
         """Return the corner normals (m, 3, 4) on the side of the face normal, padded to four
         floats.
