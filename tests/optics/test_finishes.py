@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import optisense as ots
-from optisense.design import SensorDesign
+from optisense.design import Part, Role, SensorDesign
 from optisense.design.materials import Absorber, Conductor, Material
 from optisense.errors import DesignError
+from optisense.geometry import TriangleMesh
 from optisense.optics import OpticalModel
 from optisense.optics.drafts import DraftModel
 from optisense.optics.scene.assembly import assemble
@@ -88,6 +89,28 @@ def test_metal_paint_is_seen_from_within_the_solid() -> None:
     (paint,) = named(design, "guide.edge")
     assert paint.surface.kind is SurfaceKind.MIRROR
     assert paint.surface.metal_k == pytest.approx((4.0 / ACRYLIC,) * 3)
+
+
+def test_metal_reflects_as_in_the_media_on_its_sides() -> None:
+    """A slab below the guide, and its upper face alone, whose normal points away from the guide."""
+    design = mini("guide", {}, silver=Conductor(eta=(0.05,) * 3, k=(4.0,) * 3))
+    low, high = design.meshes["guide"].bounds
+    slab = TriangleMesh.box((low[0], low[1], low[2] - 1.0), (high[0], high[1], low[2]))
+    top = slab.with_faces(slab.faces[slab.face_normals[:, 2] > 0.5]).compacted()
+    found = {}
+    for name, mesh in (("slab", slab), ("sheet", top.flipped())):
+        part = Part(role=Role.MIRROR, mesh=f"meshes/{name}.obj", material="silver")
+        placed = design.model_copy(update={"parts": {**design.parts, name: part}})
+        placed.meshes[name] = mesh
+        found[name] = [
+            (area(piece), piece.surface.metal_k[0], piece.surface.eta)
+            for piece in sorted(named(placed, name), key=area)
+        ]
+    (alone,) = found["sheet"]
+    assert alone == pytest.approx((top.area, 4.0, ACRYLIC))
+    touching, bare = found["slab"]
+    assert touching == pytest.approx((top.area, 4.0 / ACRYLIC, 1 / ACRYLIC))
+    assert bare == pytest.approx((slab.area - top.area, 4.0, 1.0))
 
 
 def test_the_coating_wins_over_paint_and_what_it_covers_wholly_is_an_error() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -70,6 +72,22 @@ def test_refraction_follows_snell_and_fresnel(ray_kind: RayKind) -> None:
     ):  # radiance in the denser medium is larger by the square of the index
         assert np.allclose(weight, (1 - reflectance) / INDEX**2, rtol=1e-5)
         assert np.allclose(np.asarray(step.reflection.weight), reflectance, rtol=1e-5)
+
+
+@pytest.mark.parametrize("ray_kind", [RayKind.PHOTON, RayKind.CAMERA])
+def test_metal_reflects_as_in_the_medium_that_light_comes_from(ray_kind: RayKind) -> None:
+    """The normal points to air; from behind, in gel, light meets the same metal as from the front
+    of a surface of it in gel.
+    """
+    glued = replace(SILVER, eta=INDEX)
+    in_gel = replace(SILVER, metal_eta=(0.1 / INDEX,) * 3, metal_k=(4.0 / INDEX,) * 3)
+    assert np.all(met(glued, ray_kind).lobe.weight == met(SILVER, ray_kind).lobe.weight)
+    expected = met(in_gel, ray_kind).lobe.weight
+    ray = slanting()
+    ray.origin.z, ray.direction.z = -ray.origin.z, -ray.direction.z
+    place = mi.Point2f(0.5, 0.5) + dr.zeros(mi.Point2f, RAYS)
+    step = interact(wide(glued), ray, ray_kind, LobeSample(dr.zeros(mi.Float, RAYS), place))
+    assert np.allclose(np.asarray(step.lobe.weight), np.asarray(expected), rtol=1e-6)
 
 
 @pytest.mark.parametrize("ray_kind", RayKind)

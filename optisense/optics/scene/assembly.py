@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense import library
 from optisense.design import Light, LightGroup, LightModel, SensorDesign
-from optisense.design.check import inside
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.priorities import carved
@@ -19,7 +19,8 @@ from optisense.geometry.coplanar import merge_coplanar
 from optisense.geometry.seams import without_seams
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
 from optisense.optics.scene._lamp_places import off_faces, window
-from optisense.optics.scene._solids import Interface, Sheet, Solid
+from optisense.optics.scene._media_beside import PROBE, media_beside, solid_at, split_by_media
+from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece
@@ -33,10 +34,6 @@ FLAT = 1e-6
 """Largest difference between the components of corner and face normals (unit vectors) at which a
 mesh has flat facets: far above the rounding of normals in double precision (1e-15), and an angle of
 only 6e-5 degrees."""
-
-PROBE = 0.02
-"""Distance (mm) off a coating or a light at which the medium in front of it is looked up: ten times
-the distance below which faces touch, and no more than the thinnest film that a design holds."""
 
 
 @dataclass(frozen=True)
@@ -77,8 +74,8 @@ class AssemblyCache:
     finishes: ShapeCache = field(default_factory=ShapeCache)
     merged: list[tuple[TriangleMesh, TriangleMesh]] = field(default_factory=list)
     pieces: list[tuple[TriangleMesh, Piece]] = field(default_factory=list)
-    in_front: dict[str, str | None] = field(default_factory=dict)
-    """Name of the solid in front of each sheet; None for air."""
+    beside: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    """Numbers (m, 2) of the solids in front of and behind each face of each sheet; -1 for air."""
 
     def merge(self, mesh: TriangleMesh, before: AssemblyCache, bend: bool = False) -> TriangleMesh:
         """Return a part's mesh with its flat faces merged; unchanged if ``bend`` and an earlier
@@ -90,6 +87,35 @@ class AssemblyCache:
             known = mesh if any(bent) else None
         self.merged.append((mesh, _merged(mesh) if known is None else known))
         return self.merged[-1][1]
+
+    def media_beside(
+        self, mesh: TriangleMesh, solids: list[Solid], each: bool, before: AssemblyCache
+    ) -> NDArray[np.int64]:
+        """Return the numbers (m, 2) of the solids in front of and behind each face of a sheet; -1
+        for air. Known ones are reused.
+
+        Args:
+            each: whether they are looked up for each smooth patch of faces; else for the largest
+                face alone.
+            before: the cache of the assembly before.
+        """
+        places = [part for solid in solids for part in (solid.mesh, solid.priority)]
+        key = ("beside", mesh, each, *places)
+        return self.finishes.get_or_make(
+            before.finishes,
+            key,
+            lambda: media_beside(_piece("", mesh, Surface(SurfaceKind.MIRROR)), solids, each),
+        )
+
+    def split(
+        self, mesh: TriangleMesh, beside: NDArray[np.int64], before: AssemblyCache
+    ) -> list[tuple[tuple[int, int], TriangleMesh]]:
+        """Return the parts of a sheet of `split_by_media`; known ones are reused."""
+        return self.finishes.get_or_make(
+            before.finishes,
+            ("split", mesh, beside.tobytes()),
+            lambda: split_by_media(mesh, beside),
+        )
 
     def piece(
         self,
@@ -169,22 +195,26 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
         for frost, face in frosted(whole, frosts, solids, kept.finishes, old.finishes):
             name = "/".join(face.names) + "|" + face.outside + (frost and f":{frost}")
             pieces.append(kept.piece(name, face.mesh, _interface_surface(face), old, merge=True))
-    named: dict[str | None, Solid] = {solid.name: solid for solid in solids}
+    around = [*solids, AROUND]
     for sheet in sheets:
-        if media.bent and sheet.name in old.in_front:
-            before_it = named.get(old.in_front[sheet.name])
-        else:
-            before_it = _solid_before(sheet.mesh, solids)
-        kept.in_front[sheet.name] = None if before_it is None else before_it.name
-        ior = 1.0 if before_it is None else before_it.ior
-        if sheet.kind == Role.SENSING_SURFACE.value:
-            indices.append(ior)
-            absorptions.append(CLEAR if before_it is None else before_it.absorption)
-            surface = coating_surface(design.coating, ior, Region.SENSING)
+        is_skin = sheet.kind == Role.SENSING_SURFACE.value
+        material = None if is_skin else design.materials.get(covers[sheet.name] or "")
+        metal = material is not None and material.reflection().specularity > 0
+        beside = old.beside.get(sheet.name) if media.bent else None
+        if beside is None or len(beside) != len(sheet.mesh.faces):
+            beside = kept.media_beside(sheet.mesh, solids, metal, old)
+        kept.beside[sheet.name] = beside
+        if is_skin:
+            before_it = around[beside[0, 0]]
+            indices.append(before_it.ior)
+            absorptions.append(before_it.absorption)
+            surface = coating_surface(design.coating, before_it.ior, Region.SENSING)
             fine[len(pieces)] = kept.piece(sheet.name, meshes[sheet.name], surface, old)
-        else:
-            surface = _opaque(design.materials.get(covers[sheet.name] or ""), ior)
-        pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
+            pieces.append(kept.piece(sheet.name, sheet.mesh, surface, old))
+            continue
+        for (front, back), mesh in kept.split(sheet.mesh, beside, old):
+            surface = _opaque(material, around[front].ior, around[back].ior)
+            pieces.append(kept.piece(sheet.name, mesh, surface, old))
     sensing = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
     emitters = off_faces(_emitters(design, solids), pieces)
     for number, emitter in enumerate(emitters):
@@ -248,12 +278,14 @@ def is_mirror(reflection: Reflection) -> bool:
     return reflection.is_metal and reflection.roughness < SMOOTH_METAL
 
 
-def _opaque(material: Material | None, ior: float) -> Surface:
+def _opaque(material: Material | None, ior: float, ior_behind: float) -> Surface:
+    """Return the surface of an opaque sheet between media of two indices, in front and behind."""
     reflection = Reflection() if material is None else material.reflection()
     if reflection.is_black:
         return Surface(SurfaceKind.ABSORBER)
     kind = SurfaceKind.MIRROR if is_mirror(reflection) else SurfaceKind.OPAQUE
-    return _reflecting(kind, reflection.in_medium(ior), Region.OTHER)
+    surface = _reflecting(kind, reflection.in_medium(ior), Region.OTHER)
+    return replace(surface, eta=ior_behind / ior) if reflection.specularity > 0 else surface
 
 
 def _interface_surface(face: Interface) -> Surface:
@@ -272,14 +304,6 @@ def _refracting_sheet(medium: Medium, design: SensorDesign) -> Surface:
     """
     etas = medium.indices if design.dispersion else None
     return Surface(SurfaceKind.DIELECTRIC, eta=medium.ior, alpha=medium.roughness, etas=etas)
-
-
-def _solid_before(mesh: TriangleMesh, solids: list[Solid]) -> Solid | None:
-    """Return the solid on the side that the normal of the largest face points to; None for air."""
-    face = int(np.argmax(mesh.face_areas))
-    probe = (mesh.triangles[face].mean(axis=0) + PROBE * mesh.face_normals[face])[None]
-    around = [solid for solid in solids if inside(probe, solid.mesh)[0]]
-    return max(around, key=lambda solid: solid.priority) if around else None
 
 
 def _merged(mesh: TriangleMesh) -> TriangleMesh:
@@ -307,16 +331,13 @@ def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
 
 def _absorption_at(places: list[Light], solids: list[Solid]) -> list[RGB]:
     """Return the absorption coefficients (1/mm) at R, G, B of the medium in front of each light."""
-    found = [(-np.inf, CLEAR)] * len(places)
     if all(solid.absorption == CLEAR for solid in solids):
         return [CLEAR] * len(places)
     points = np.array([light.position for light in places])
     ways = np.array([light.direction for light in places])
     points += PROBE * ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    for solid in solids:
-        for number in np.flatnonzero(inside(points, solid.mesh)).tolist():
-            found[number] = max(found[number], (solid.priority, solid.absorption))
-    return [absorption for _, absorption in found]
+    around = [*solids, AROUND]
+    return [around[number].absorption for number in solid_at(points, solids).tolist()]
 
 
 def _emitters(design: SensorDesign, solids: list[Solid]) -> list[Emitter]:

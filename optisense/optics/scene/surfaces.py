@@ -42,11 +42,12 @@ class Surface:
     Attributes:
         kind: the interaction of light with the surface.
         eta: for a dielectric, the index on the inside (behind the face normal) over the index on
-            the outside.
+            the outside; for a metal, the index of the medium behind it over that in front of it.
         alpha: roughness (GGX alpha), 0 for smooth.
         specularity: weight of the metallic lobe of an opaque surface, 0 to 1.
         reflectance: reflectance of the diffuse lobe at R, G, B.
-        metal_eta, metal_k: real and imaginary part of the metal's refractive index at R, G, B.
+        metal_eta, metal_k: real and imaginary part of the metal's refractive index at R, G, B,
+            over the index of the medium in front of it.
         region: function of the surface in the sensor.
         light: number of the light whose emitting face the surface is.
         etas: values of ``eta`` at R, G, B; None if they do not differ.

@@ -213,8 +213,13 @@ def interact(
                 kept = kept / (ratio * ratio)
             weight = mi.Color3f(kept)
     if dr.hint(ray_kind is not RayKind.CHIEF, mode="scalar"):  # noqa: SIM102
-        if dr.hint(scattered, exclude=[scene, ray, ray_kind, hit, side, mirror, drawn, scattered]):
+        if dr.hint(
+            scattered, exclude=[scene, ray, ray_kind, hit, side, eta, mirror, drawn, scattered]
+        ):
             coating = coating_of(scene.table, hit.surface, scattered)
+            behind = dr.select(side > 0, 1, dr.rcp(eta))
+            coating.metal_eta *= behind
+            coating.metal_k *= behind
             cosine = dr.abs(dr.dot(ray.direction, hit.shading_normal))
             weight = fresnel_metal(cosine, coating.metal_eta, coating.metal_k)
             if dr.hint(ray_kind.scatters, mode="scalar"):

@@ -1,0 +1,75 @@
+"""The transparent solids at points and on both sides of opaque sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from optisense.array_types import FloatingArray
+from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
+from optisense.optics.scene._solids import Solid
+from optisense.optics.scene.ray_scene import Piece
+
+PROBE = 0.02
+"""Distance (mm) off a sheet or a light at which the medium beside it is looked up: ten times the
+distance below which faces touch, and no more than the thinnest film that a design holds."""
+
+
+def solid_at(points: FloatingArray, solids: Sequence[Solid]) -> NDArray[np.int64]:
+    """Return the number (n,) of the solid at each point (n, 3), mm; -1 for air."""
+    found = np.full(len(points), -1)
+    rank = np.full(len(points), -np.inf)
+    for number, solid in enumerate(solids):
+        here = inside(points, solid.mesh) & (solid.priority > rank)
+        found[here], rank[here] = number, solid.priority
+    return found
+
+
+def media_beside(sheet: Piece, solids: Sequence[Solid], each: bool) -> NDArray[np.int64]:
+    """Return the numbers (m, 2) of the solids in front of and behind each face of an opaque sheet;
+    -1 for air.
+
+    Args:
+        each: whether they are looked up beside the middle of the largest face of each flat or
+            smooth patch; else beside that of the largest face of all.
+    """
+    corners = sheet.vertices[sheet.faces]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(cross, axis=1)
+    normals = cross / np.where(size > 0, size, 1.0)[:, None]
+    patch = np.zeros(len(corners), dtype=np.int64)
+    if each and sheet.normals is None:  # parallel flat faces may lie at several levels
+        level = np.round(np.einsum("fi,fi->f", normals, corners[:, 0]) / PROBE).astype(np.int64)
+        levels = np.stack([sheet.patches, level], axis=1)
+        patch = np.unique(levels, axis=0, return_inverse=True)[1].reshape(-1)
+    elif each:
+        patch = sheet.patches
+    largest = np.zeros(patch.max() + 1, dtype=np.int64)
+    rising = np.argsort(-size, kind="stable")[::-1]
+    largest[patch[rising]] = rising  # the last one counts
+    middle, off = corners[largest].mean(axis=1), PROBE * normals[largest]
+    sides = [solid_at(middle + off, solids), solid_at(middle - off, solids)]
+    return np.stack(sides, axis=1)[patch]
+
+
+def split_by_media(
+    mesh: TriangleMesh, beside: NDArray[np.int64]
+) -> list[tuple[tuple[int, int], TriangleMesh]]:
+    """Return the parts of a sheet that lie between two media each, with the numbers of these.
+
+    Args:
+        beside: numbers (m, 2) of the media, as of `media_beside`.
+    """
+    if (beside == beside[0]).all():
+        return [((int(beside[0, 0]), int(beside[0, 1])), mesh)]
+    pairs, kind = np.unique(beside, axis=0, return_inverse=True)
+    return [
+        (
+            (int(front), int(back)),
+            mesh.with_faces(mesh.faces[kind.reshape(-1) == number]).compacted(),
+        )
+        for number, (front, back) in enumerate(pairs)
+    ]
