@@ -9,7 +9,7 @@ import pytest
 
 import optisense as ots
 from optisense.design import Part, Role, SensorDesign
-from optisense.design.materials import Absorber, Conductor, Material
+from optisense.design.materials import Absorber, Conductor, Dielectric, Material
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.optics import OpticalModel
@@ -66,6 +66,16 @@ def test_a_frosted_face_against_another_solid_is_rough_between_the_two() -> None
     assert {round(s.surface.eta, 4) for s in (gel, air)} <= {
         round(value, 4) for value in (GEL / ACRYLIC, ACRYLIC / GEL, ACRYLIC)
     }
+
+
+def test_a_frosted_face_between_media_of_one_index_scatters_nothing() -> None:
+    """The gel has the tray's index, and absorbs."""
+    frost = {"top": {"direction": (0, 0, 1), "within": 10, "roughness": 0.2}}
+    gel = Dielectric(ior=ACRYLIC, absorption=(0.01, 0.01, 0.01))
+    design = mini("tray", frost, acrylic=Dielectric(ior=ACRYLIC), gel=gel)
+    design.parts["gel"].material = "gel"
+    beside, air = sorted(named(design, ":tray.top"), key=area, reverse=True)
+    assert (beside.surface.eta, beside.surface.alpha, air.surface.alpha) == (1.0, 0.0, 0.2)
 
 
 def test_paint_takes_the_place_of_an_interface() -> None:

@@ -289,10 +289,12 @@ def _opaque(material: Material | None, ior: float, ior_behind: float) -> Surface
 
 
 def _interface_surface(face: Interface) -> Surface:
+    """Return the surface between two media; one that bends no light scatters none either."""
+    bends = face.ior_inside != face.ior_outside or face.etas not in (None, (1.0, 1.0, 1.0))
     return Surface(
         SurfaceKind.DIELECTRIC,
         eta=face.ior_inside / face.ior_outside,
-        alpha=face.roughness,
+        alpha=face.roughness if bends else 0.0,
         etas=face.etas,
         absorption=face.absorption,
     )
