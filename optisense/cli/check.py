@@ -66,16 +66,27 @@ def _print_views(design: SensorDesign) -> int:
     """
     try:
         from optisense.optics import OpticalModel
-        from optisense.optics.mirror_checks import CHECK_RAYS, mirror_problems, views_in_words
+        from optisense.optics.mirror_checks import (
+            CHECK_RAYS,
+            mirror_problems,
+            polished,
+            rough_mirror_problems,
+            views_in_words,
+        )
 
-        views = OpticalModel(design).views_by_mirrors(design.camera.size_at(CHECK_RAYS))
+        size = design.camera.size_at(CHECK_RAYS)
+        views = OpticalModel(design).views_by_mirrors(size)
+        problems = mirror_problems(design, views)
+        smooth = polished(design)
+        if smooth is not None:
+            views_if_smooth = OpticalModel(smooth).views_by_mirrors(size)
+            problems += rough_mirror_problems(design, views_if_smooth)
     except SetupError as error:  # the rest of the check needs no renderer
         output.print(f"note: its mirrors are not checked: {error}", style="yellow")
         return 0
     if views:
         sentence = f"Views of the sensing surface, by their mirrors: {views_in_words(views)}."
         output.print(sentence)
-    problems = mirror_problems(design, views)
     for problem in problems:
         output.print(f"warning: {problem}", style="yellow")
     return len(problems)

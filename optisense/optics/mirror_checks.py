@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from optisense.design import SensorDesign
+from optisense.design.materials import Conductor
 from optisense.design.parts import Role
 from optisense.design.problems import Diagnostic
-from optisense.optics.scene.assembly import is_mirror
+from optisense.optics.scene.assembly import SMOOTH_METAL, is_mirror
 
 CHECK_RAYS = 96
 """Number of chief rays of a check across the picture. A column of them is then 0.01 of all, a
@@ -62,6 +63,54 @@ def mirror_problems(design: SensorDesign, views: dict[frozenset[str], float]) ->
             )
             problems.append(Diagnostic(message, design.where("parts", name), hint, "warning"))
     return problems
+
+
+def polished(design: SensorDesign) -> SensorDesign | None:
+    """Return a design whose rough metal mirrors are smooth; None if it has no rough ones."""
+    smooth = dict(design.materials)
+    for name in _rough_mirrors(design):
+        material = design.parts[name].material or ""
+        reflection = design.materials[material].reflection()
+        smooth[material] = Conductor(eta=reflection.eta, k=reflection.k)
+    if all(smooth[name] is material for name, material in design.materials.items()):
+        return None
+    return design.model_copy(update={"materials": smooth})
+
+
+def rough_mirror_problems(
+    design: SensorDesign, views: dict[frozenset[str], float]
+) -> list[Diagnostic]:
+    """Return warnings about mirrors that are too rough for the camera to see by them.
+
+    Args:
+        design: a design with rough mirrors.
+        views: shares of the view of the `polished` design.
+    """
+    problems = []
+    for name, roughness in _rough_mirrors(design).items():
+        share = sum(part for way, part in views.items() if name in way)
+        if share >= LEAST_BY_MIRROR:
+            message = (
+                f"the camera sees nothing by the mirror '{name}' of roughness {roughness:g}; by a "
+                f"smooth one it would see {100 * share:.0f} % of its view of the sensing surface"
+            )
+            hint = f"Give the mirror's material a roughness below {SMOOTH_METAL:g}"
+            problems.append(Diagnostic(message, design.where("parts", name), hint, "warning"))
+    return problems
+
+
+def _rough_mirrors(design: SensorDesign) -> dict[str, float]:
+    """Return the roughness of the mirrors of metal that is too rough to reflect images."""
+    surfaces = {
+        name: design.materials[part.material].reflection()
+        for name, part in design.parts.items()
+        if part.role is Role.MIRROR and part.material is not None
+    }
+    return {
+        name: surface.roughness
+        for name, surface in surfaces.items()
+        if surface.is_metal and not is_mirror(surface)
+    }
 
 
 def views_in_words(views: dict[frozenset[str], float]) -> str:

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense import optics, sensors
 from optisense.cli import app
-from optisense.errors import SetupError
+from optisense.errors import RenderError, SetupError
 from optisense.search import SearchSpace
 
 
@@ -41,6 +41,18 @@ def test_mirrors_that_the_camera_looks_past_are_told(
     assert len(odd) == len(said)
     assert all(each in told for each, told in zip(said, odd, strict=True))
     assert text.endswith(f"No errors, {len(said)} warning{'s' if len(said) > 1 else ''}.")
+
+
+def test_a_mirror_that_is_too_rough_to_show_an_image_is_told(tmp_path: Path) -> None:
+    """Both mirrors of GelSight Svelte are of one material."""
+    for roughness, count in ((0.009, 0), (0.02, 2)):
+        svelte = sensors.load("gelsight-svelte")
+        rough = ots.set_value(svelte, "materials.mirror-silver.roughness", roughness)
+        ots.save_design(rough, tmp_path / f"{count}")
+        text, odd = checked(str(tmp_path / f"{count}"))
+        assert len(odd) == text.count(f"of roughness {roughness:g}; by a smooth one") == count
+    with pytest.raises(RenderError, match=r"roughness is below 0\.01"):
+        optics.OpticalModel(rough).render((), (32, 24), photons=1000)
 
 
 def test_mirrors_that_are_used_are_told_with_their_shares() -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from optisense.errors import RenderError
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
+from optisense.optics.scene.assembly import SMOOTH_METAL
 from optisense.optics.scene.ray_scene import Ray, RayScene
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.interact import RayKind, interact
@@ -276,5 +277,6 @@ def sees_nothing(rays: ChiefRays) -> RenderError:
     return RenderError(
         "the camera sees nothing of the sensing surface",
         where=f"of {rays.outcome.size} rays, {met}",
-        hint="Check the camera's position, direction and field of view, and what is in its way",
+        hint="Check the camera's position, direction and field of view, and what is in its way. "
+        f"Mirrors show an image if their roughness is below {SMOOTH_METAL:g}",
     )
