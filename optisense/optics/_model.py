@@ -36,6 +36,7 @@ from optisense.optics.radiance_cache.store import CacheStore
 from optisense.optics.radiance_cache.tracing_limits import TracingLimits
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.sensor_scenes import SensorScenes
+from optisense.optics.scene.surface_cells import fineness
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
@@ -352,7 +353,7 @@ class OpticalModel(RayModel):
         began: float,
         on_stage: StageCallback,
     ) -> ImageLayers:
-        from optisense.optics.imaging.sppm import render_sppm
+        from optisense.optics.imaging.sppm import FIRST_RADIUS, render_sppm
 
         wanted = photons or 16 * SCORE_PHOTONS
         lights = self.scenes.emitter_table.count
@@ -370,6 +371,7 @@ class OpticalModel(RayModel):
             view.camera,
             passes,
             coloured=self.scenes.coloured,
+            radius=FIRST_RADIUS * fineness(self.scenes.opaque),
             stop=stop,
         )
         return ImageLayers.from_sppm(result, view.rays, began)

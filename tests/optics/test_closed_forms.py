@@ -99,6 +99,17 @@ def test_a_point_light_over_a_plane_falls_with_the_square_and_the_cosine() -> No
         assert landings.power[from_axis < radius].sum() == pytest.approx(share, rel=4 * LANDED)
 
 
+def test_light_on_a_skin_of_2_mm_is_as_sharp_as_on_a_large_one() -> None:
+    height = 0.4
+    lamp = Emitter(0, (0.1, 0, height), (0, 0, -1), intensity=isotropic())
+    camera = looking_down(height=2.0)
+    scene = ReferenceScene([floor(GREY, 1.0)], [lamp], [(POWER,) * 3], camera)
+    points = scene.chief_rays().points.astype(float)
+    distance2 = height**2 + (points[..., 0] - 0.1) ** 2 + points[..., 1] ** 2
+    expected = 0.5 / np.pi * POWER / (4 * np.pi) * height / distance2**1.5
+    agrees(scene.pooled(PHOTONS).sum(axis=0)[..., 0], expected)
+
+
 def parallel_rectangle(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Form factor of a rectangle with a corner over a point, parallel; sides over distance."""
     a, b = np.sqrt(1 + x * x), np.sqrt(1 + y * y)

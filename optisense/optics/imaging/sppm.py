@@ -26,7 +26,8 @@ from optisense.optics.transport.photons import Emission, trace_photons
 
 FIRST_RADIUS = 0.3
 """Gather radius (mm) of the first pass. As the radius shrinks with each pass, it affects how fast
-noise falls and not the limit of the image. 0.3 mm is five pixels of GelSight Mini at 320 pixels."""
+noise falls and not the limit of the image. 0.3 mm is five pixels of GelSight Mini at 320 pixels.
+`OpticalModel.render` takes a smaller one on small sensing surfaces (see `fineness`)."""
 
 
 @dataclass

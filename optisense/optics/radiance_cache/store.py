@@ -23,7 +23,7 @@ from optisense.optics.radiance_cache.lit_scene import LitScene
 from optisense.optics.radiance_cache.smoothing import Kernels
 from optisense.optics.radiance_cache.tally import DENSE, CacheTally
 from optisense.optics.radiance_cache.tracing_limits import Passes, TracingLimits
-from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near
+from optisense.optics.scene.surface_cells import SurfaceCells, build_cells, cells_near, fineness
 from optisense.optics.transport.emission_guide import EmissionGuide, learn_guide, uniform_guide
 from optisense.optics.transport.photons import (
     Emission,
@@ -38,7 +38,8 @@ PILOT_PHOTONS = 300_000
 cells of the guide (see `GUIDE_CELLS`), and half of a pass."""
 CELL_SIZE = 0.5
 """Side (mm) of the surface cells: a third of the usual kernel radius (`REFERENCE_RADIUS`), so that
-the cells blur little. It is larger where the tally would exceed `MAX_TALLY_BYTES`."""
+the cells blur little. It is smaller on small sensing surfaces (see `fineness`), and larger where
+the tally would exceed `MAX_TALLY_BYTES`."""
 PILOT_CELL_SIZE = 1.0
 """Side (mm) of the cells that decide whether a pilot photon lands where the camera looks: half of
 `VIEW_MARGIN`."""
@@ -139,10 +140,10 @@ class CacheStore:
 
     @property
     def _raises(self) -> bool:
-        """Whether coarse bins have a raised plane: unless cells would be larger, or light grazes
-        and the volume flux takes the place of the raised plane.
+        """Whether coarse bins have a raised plane: unless cells would be larger, light grazes and
+        the volume flux takes the place of the raised plane, or the sensor is small.
         """
-        if not self.thorough or self._grazes:
+        if not self.thorough or self._grazes or self._small:
             return False
         bins = CURVED_BINS if self._curved else COARSE_BINS
         return 2 * self._tally_bytes(bins, self.cell_size) < MAX_TALLY_BYTES
@@ -169,10 +170,17 @@ class CacheStore:
             self._above = flux_layer_above(self.cells)
         return self._above
 
+    @property
+    def _small(self) -> bool:
+        """Whether raised plane and flux layer would be too high above the sensing surface: on pads
+        of 2 and 4 mm, contacts would be 5 to 20 % off with them, instead of 2 %.
+        """
+        return fineness(self._lit.opaque) < 1.0
+
     @cached_property
     def _grazes(self) -> bool:
-        """Whether much of the light in the camera's view is grazing."""
-        seen = self._seen_pilot
+        """Whether much of the light in the camera's view is grazing, and the flux layer is used."""
+        seen = None if self._small else self._seen_pilot
         return seen is not None and seen.grazing_share() > GRAZING_SHARE_LIMIT
 
     @property
@@ -240,7 +248,7 @@ class CacheStore:
             if self._grazes:
                 least *= np.sqrt(2)
             scale = self.cell_size / CELL_SIZE
-            size = max(self.cell_size, scale * least)
+            size = max(self.cell_size * fineness(self._lit.opaque), scale * least)
             normals = self._corner_normals if self._curved else None
             self._cells = build_cells(*self._opaque_mesh, size, normals)
         return self._cells

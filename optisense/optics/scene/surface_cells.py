@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import drjit as dr
@@ -14,6 +15,8 @@ from scipy.spatial import cKDTree
 from optisense.array_types import FloatingArray
 from optisense.geometry.surface_samples import surface_samples
 from optisense.optics.backend.arrays import floats, indices
+from optisense.optics.scene.ray_scene import Piece
+from optisense.optics.scene.surfaces import Region
 
 SAMPLES_ACROSS = 7
 """Number of samples of the surface along the side of a cell. Seven give the cell's area to a few
@@ -24,6 +27,9 @@ CREASE_COSINE = 0.5
 an edge between a wall and a top: light from beside the wall reaches the top and not the wall. With
 0.5, the normals differ by 60 degrees or more, which no smooth skin does within a cell."""
 
+LEAST_EXTENT = 10.0
+"""Extent (mm) of the sensing surface below which lengths such as the side of cells shrink with it.
+On a pad of 10 mm, cells of 0.5 mm are accurate to 3 %; on one of 4 mm, they would be 20 % off."""
 SEARCH_CELLS = 3
 """Distance from the surface, in cell sides, within which a point still finds the nearest cell: 1.5
 mm with cells of 0.5 mm, as presses are usually less than 1 mm deep."""
@@ -66,6 +72,16 @@ class SurfaceCells:
     areas: FloatingArray
     offset_growth: FloatingArray
     axes: FloatingArray
+
+
+def fineness(pieces: Sequence[Piece]) -> float:
+    """Return the factor, at most 1, on lengths that suit sensing surfaces of `LEAST_EXTENT` and
+    more: the longest side of the box around the sensing surface over that length.
+    """
+    skin = [piece.vertices for piece in pieces if piece.surface.region is Region.SENSING]
+    if not skin:
+        return 1.0
+    return min(1.0, float(np.ptp(np.concatenate(skin), axis=0).max()) / LEAST_EXTENT)
 
 
 def _twice_areas(
