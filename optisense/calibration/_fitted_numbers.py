@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optisense.calibration._solution import Solution
+from optisense.calibration.quantities import fits_all_powers
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
 
@@ -44,15 +45,18 @@ class FittedNumber:
 def with_known_total(
     chosen: Sequence[FitQuantity], solution: Solution, fitted: SensorDesign
 ) -> Solution:
-    """Return a solution with the covariance of powers whose sum is kept.
+    """Return a solution with the covariance of powers whose sum is kept, which it is if all powers
+    are fitted.
 
     Photographs determine the ratios of powers only. If the sum is kept, the error of one power
     changes all others: a power that alone is uncertain makes them uncertain, too.
     """
+    if not fits_all_powers(fitted, chosen):
+        return solution
     total = sum(group.flux * len(group.lights) for group in fitted.lights.values())
     powers, shares = [], []
     for index, each in enumerate(chosen):
-        if each.path.startswith("lights.") and each.path.endswith(".flux") and each.logarithmic:
+        if each.path.startswith("lights.") and each.path.endswith(".flux"):
             group = fitted.lights[each.path.split(".")[1]]
             powers.append(index)
             shares.append(group.flux * len(group.lights) / total if total > 0.0 else 0.0)

@@ -21,7 +21,7 @@ from optisense.calibration.families import LEDS
 from optisense.calibration.kept_renderings import KEPT_NOWHERE, KeptRenderings
 from optisense.calibration.model_pictures import model_pictures
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.quantities import designed, quantities_of
+from optisense.calibration.quantities import designed, fits_all_powers, quantities_of
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.result import Calibration
 from optisense.calibration.seen_contacts import check_shape
@@ -145,11 +145,14 @@ def _refuse_too_few(
 def _with_exposure(
     design: SensorDesign, chosen: Sequence[FitQuantity], steps: FloatArray, exposure: float
 ) -> tuple[SensorDesign, float]:
-    """Return the fitted design with the same total power of its lights as before, and its exposure.
+    """Return the fitted design and its exposure.
 
-    Photographs do not distinguish powers and exposure.
+    Photographs do not distinguish powers and exposure. If all powers are fitted, they get the same
+    total as before.
     """
     fitted = designed(design, chosen, steps)
+    if not fits_all_powers(design, chosen):
+        return fitted, exposure
     before = sum(group.flux * len(group.lights) for group in design.lights.values())
     after = sum(group.flux * len(group.lights) for group in fitted.lights.values())
     factor = before / after if after > 0.0 else 1.0

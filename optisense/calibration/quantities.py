@@ -8,6 +8,7 @@ mixed and stored; the others need a new rendering.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -76,7 +77,29 @@ def _asked(design: SensorDesign, path: str, low: float, high: float) -> FitQuant
             f"the range {low:g} to {high:g} of '{path}' does not contain its value, {value:g}",
             hint="Give a range about the design's value",
         )
+    if re.fullmatch(r"lights\.[^.]+\.flux", path):
+        return _asked_power(design, path, low, high)
     return FitQuantity(path, path, "", float(value), low, high, 0.25 * (high - low), renders=True)
+
+
+def _asked_power(design: SensorDesign, path: str, low: float, high: float) -> FitQuantity:
+    """Return the power of a light group, which changes pictures without a rendering."""
+    for each in FAMILIES["powers"].of(design):
+        if each.path == path:
+            return replace(each, low=low, high=high)
+    raise CalibrationError(
+        f"the power '{path}' is 0, and is fitted by factors",
+        where=design.where(path),
+        hint="Give the lights a power above 0",
+    )
+
+
+def fits_all_powers(design: SensorDesign, chosen: Sequence[FitQuantity]) -> bool:
+    """Return whether the powers of all light groups that shine are among the fitted numbers: the
+    exposure then follows from them, as photographs do not distinguish it from their sum.
+    """
+    fitted = {each.path for each in chosen}
+    return all(each.path in fitted for each in FAMILIES["powers"].of(design))
 
 
 def designed(

@@ -19,7 +19,7 @@ from optisense.calibration._fitted_numbers import fitted_numbers, with_known_tot
 from optisense.calibration._gauss_newton import LayeredFit
 from optisense.calibration._layered_pictures import LayeredPictures, layered_pictures
 from optisense.calibration._solution import Solution
-from optisense.calibration.calibrating import calibrate
+from optisense.calibration.calibrating import _with_exposure, calibrate
 from optisense.calibration.families import chosen_families
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.quantities import designed, quantities_of
@@ -176,6 +176,22 @@ def test_an_uncertain_power_makes_powers_of_a_kept_sum_uncertain() -> None:
     powers *= total / powers.sum(axis=1, keepdims=True)  # as many lights in each group
     assert [n.uncertainty for n in numbers[:3]] == pytest.approx(powers.std(axis=0), rel=0.03)
     assert scaled.covariance[3, 3] == solution.covariance[3, 3]
+
+
+def test_a_power_with_a_range_counts_once_and_changes_no_other() -> None:
+    design = ots.load("gelsight-mini-ideal")
+    chosen = quantities_of(design, [], [("lights.red.flux", 1.0, 8.0)])
+    assert [each.renders for each in chosen] == [False]  # the layers are mixed by its factor
+    fitted, exposure = _with_exposure(design, chosen, np.array([0.5]), 250.0)
+    assert exposure == 250.0
+    powers = {name: group.flux for name, group in fitted.lights.items()}
+    kept = {name: group.flux for name, group in design.lights.items()}
+    assert powers == kept | {"red": chosen[0].value(0.5)}
+    solution = Solution(np.zeros(1), np.zeros((0, 3)), np.eye(1), (0.0, 0.0), np.zeros(0))
+    assert with_known_total(chosen, solution, fitted) is solution
+    dark = set_value(design, "lights.red.flux", 0.0)
+    with pytest.raises(CalibrationError, match="is 0, and is fitted by factors"):
+        quantities_of(dark, [], [("lights.red.flux", 0.0, 8.0)])
 
 
 @pytest.mark.parametrize(
