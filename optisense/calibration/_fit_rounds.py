@@ -28,7 +28,7 @@ from optisense.calibration._view_slopes import view_changes, with_view
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.model_pictures import matched_exposure
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.quantities import designed
+from optisense.calibration.quantities import EXPOSURE, designed, fits_all_powers
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
@@ -91,7 +91,9 @@ class FitRounds:
         progress: Progress,
     ) -> None:
         self._design, self._model, self._settings = design, model, settings
-        self._chosen, self._kept, self._progress = chosen, kept, progress
+        self._kept, self._progress = kept, progress
+        extra = [] if fits_all_powers(design, chosen) else [EXPOSURE]
+        self._chosen = [*chosen, *extra]
         self._small = photographs.scaled(FIT_WIDTH)
         factor = self._small.size[0] / photographs.size[0]
         self._factor = factor
@@ -99,7 +101,7 @@ class FitRounds:
         count = len(photographs.presses)
         self.held_out = settings.indices_held_out(photographs)
         self._used = [index for index in range(count) if index not in self.held_out]
-        self._rendering = [number for number, each in enumerate(chosen) if each.renders]
+        self._rendering = [number for number, each in enumerate(self._chosen) if each.renders]
         self.exposure = 1.0
         self._done = 0
         self._bodily = [number for number in self._rendering if not chosen[number].views]
@@ -118,6 +120,7 @@ class FitRounds:
         a sensor's body. The last of several rounds keeps these numbers and fits the others to their
         true pictures: powers and the camera's processing that suit a linear prediction do not suit
         these. Rounds that are not rough render everything twice, to know the noise of the light.
+        The exposure is fitted along if the fitted powers do not determine it.
         """
         steps = np.zeros(len(self._chosen))
         small = self._small.subset(self._used)
@@ -148,6 +151,9 @@ class FitRounds:
             for index, moved in zip(self._used, solution.contacts, strict=True):
                 self._seen[index] = moved_contact(self._seen[index], moved)
         assert solution is not None
+        if EXPOSURE in self._chosen:
+            self.exposure *= EXPOSURE.value(float(solution.steps[-1]))
+            return solution.without_last()
         return solution
 
     def _solution(

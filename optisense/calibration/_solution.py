@@ -47,6 +47,10 @@ class Solution:
         scale = max(float(np.median(ratios)) / (2.0 * MEDIAN_SQUARE), 1.0)
         return replace(self, covariance=scale * self.covariance + np.diag(changes**2))
 
+    def without_last(self) -> Solution:
+        """Return the solution without its last quantity, whose uncertainty the others keep."""
+        return replace(self, steps=self.steps[:-1], covariance=self.covariance[:-1, :-1])
+
 
 def jackknife_covariance(matrices: FloatArray, scores: FloatArray) -> FloatArray:
     """Return the covariance (n, n) of the unknowns of a least-squares fit with priors.

@@ -340,6 +340,19 @@ def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
     assert list(found.design.lights) == list(design.lights)
 
 
+def test_a_power_is_found_relative_to_powers_that_are_kept(
+    mini: OpticalModel, small_photographs: Photographs
+) -> None:
+    """The exposure is fitted along: with that of the start, the other powers would be too large."""
+    power = mini.design.lights["red"].flux
+    start = set_value(mini.design, "lights.red.flux", 0.4 * power)
+    settings = CalibrationSettings(families=(), rounds=1, photons=20_000, held_out=())
+    chosen = quantities_of(start, [], [("lights.red.flux", 0.1 * power, 3.0 * power)])
+    (found,) = numbers_of_fit(start, small_photographs, chosen, settings)
+    assert found.after == pytest.approx(power, rel=0.06)
+    assert found.determined
+
+
 def test_a_row_of_lights_that_lies_lower_is_found(mini: OpticalModel) -> None:
     lower = -0.8  # mm; more than twice the step of the difference quotients
     real = ots.OpticalModel(with_lights_moved(mini.design, "blue", lower))
