@@ -138,11 +138,11 @@ class FitRounds:
             kept = self._bodily if 0 < number == self._settings.rounds - 1 else []
             if not kept:
                 slopes = self._slopes(small, seen, steps, number, layers)
-            if not rough:
+            if not rough or slopes:
                 again = self._layers(small, seen, steps, number, layers, AGAIN)
                 layers, noise = averaged(layers, again)
             self.report_step("fitting")
-            found = self._solution(small, seen, layers, steps, slopes, noise, kept)
+            found = self._solution(small, seen, layers, steps, slopes, rough, noise, kept)
             before, changes = changes, found.steps - steps
             changes[kept] = before[kept]
             if number:
@@ -163,6 +163,7 @@ class FitRounds:
         layers: LayeredPictures,
         steps: FloatArray,
         slopes: dict[int, PictureSlopes],
+        rough: bool,
         noise: LayeredPictures | None,
         kept: Sequence[int],
     ) -> Solution:
@@ -172,10 +173,10 @@ class FitRounds:
         Args:
             small, seen, layers, slopes: see `LayeredFit`.
             steps: (n,) start of the fit.
-            noise: sample of the noise of the layers; None in a rough round.
+            rough: whether the round is rough.
+            noise: sample of the noise of the layers, if it is known.
             kept: indices of the numbers that are not changed.
         """
-        rough = noise is None
         views = [number for number in self._rendering if self._chosen[number].views]
         contacts = np.zeros((len(seen), 3))
         if not views:
@@ -313,16 +314,19 @@ class FitRounds:
         for index in self._bodily:
             each = self._chosen[index]
             self.report_step(f"rendering another {each.words}")
-            low, high = np.clip(steps[index] + np.array([-DIFFERENCE, DIFFERENCE]), *each.limits())
+            lowest, highest = each.limits()
+            low = max(min(float(steps[index]) - DIFFERENCE, highest - 2.0 * DIFFERENCE), lowest)
+            high = min(low + 2.0 * DIFFERENCE, highest)
             same = None if each.moves_contacts else layers
-            ends = []
-            for value in (low, high):
-                other = steps.copy()
-                other[index] = value
-                moved = self._layers(small, seen, other, number, same)
-                ends.append([moved.background, *moved.presses])
             size = np.float32(high - low)
-            found[index] = PictureSlopes(
-                [(two - one) / size for one, two in zip(*ends, strict=True)]
-            )
+            quotients = []
+            for more in (0, AGAIN):
+                ends = []
+                for value in (low, high):
+                    other = steps.copy()
+                    other[index] = value
+                    moved = self._layers(small, seen, other, number, same, more)
+                    ends.append([moved.background, *moved.presses])
+                quotients.append([(two - one) / size for one, two in zip(*ends, strict=True)])
+            found[index] = PictureSlopes.of_two(*quotients)
         return found

@@ -13,6 +13,7 @@ scratches.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -29,6 +30,12 @@ from optisense.calibration._layered_pictures import (
     LayeredPictures,
     PictureSlopes,
     contact_slopes,
+)
+from optisense.calibration._noisy_slopes import slope_reduction
+from optisense.calibration._normal_equations import (
+    LinearEquations,
+    noise_energy,
+    normal_equations,
 )
 from optisense.calibration._solution import Solution, jackknife_covariance
 from optisense.calibration.model_pictures import levels_of
@@ -98,9 +105,6 @@ class RoughFit:
     blur: float = 0.0
 
 
-LinearEquations = tuple[list[int], FloatArray, FloatArray, FloatArray, NDArray[np.bool_]]
-
-
 class _Point(NamedTuple):
     """Steps of the numbers, changes of the contacts, and their pictures by `LayeredFit`."""
 
@@ -134,7 +138,7 @@ class LayeredFit:
             slopes: slopes of quantities that need a rendering, by index.
             rough: how pictures are compared in a rough round; None in the others.
             noise: errors of the layers by the noise of the light, a sample of them; None if they
-                are not known.
+                are not known. Noisy slopes are then reduced to their true part.
             kept: indices of quantities that are not changed.
         """
         self._noise = noise
@@ -143,6 +147,9 @@ class LayeredFit:
         self._blur = 0.0 if rough is None else rough.blur
         self._layers, self._chosen, self._exposure = layers, list(chosen), exposure
         self._start, self._slopes = start, slopes
+        self._seen = seen
+        self._noisy = [number for number, each in slopes.items() if each.noise]
+        self._reduction = np.zeros((len(chosen) + 3 * len(seen), len(self._noisy)))
         self._outline = None
         if layers.coverage is not None:
             others = [each.coverage for each in slopes.values() if each.coverage is not None]
@@ -168,17 +175,29 @@ class LayeredFit:
         """Number of quantities."""
         return len(self._chosen)
 
-    def pictures(self, steps: FloatArray, contacts: FloatArray) -> list[FloatArray]:
+    def pictures(
+        self, steps: FloatArray, contacts: FloatArray, noise: LayeredPictures | None = None
+    ) -> list[FloatArray]:
         """Return the levels (h, w, 3) of the background and of each press, within those that are
         compared.
 
         Args:
             steps: (n,) steps of the quantities, in plausible ranges from their starts.
             contacts: (presses, 3) changes of column, row (pixels) and the logarithm of the radius.
+            noise: added to the layers.
         """
-        return [self._shown(-1, steps, None)] + [
-            self._shown(index, steps, contacts[index]) for index in range(len(self._masks))
+        steps, contacts = self._reduced(steps, contacts)
+        return [self._shown(-1, steps, None, noise)] + [
+            self._shown(index, steps, contacts[index], noise) for index in range(len(self._masks))
         ]
+
+    def _reduced(self, steps: FloatArray, contacts: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the unknowns whose pictures by noisy slopes are those by the estimated true ones,
+        see `slope_reduction`.
+        """
+        moved = self._reduction @ (steps - self._start)[self._noisy]
+        change = moved[self.count :].reshape(-1, 3) * self._contact_spread
+        return steps + moved[: self.count], contacts + change
 
     def _shown(
         self,
@@ -226,7 +245,7 @@ class LayeredFit:
         point = self._point(steps, contacts)
         for _ in range(MOST_DESCENTS):
             scales = self._scales(point)
-            point = self._descend(point, scales)
+            point = self._descend(self._without_noise(point, scales), scales)
             # The errors are smaller now, and so are the scales of the residuals.
             if self._scales(point).like(scales):
                 break
@@ -241,6 +260,32 @@ class LayeredFit:
 
     def _point(self, steps: FloatArray, contacts: FloatArray) -> _Point:
         return _Point(steps, contacts, self.pictures(steps, contacts))
+
+    def _without_noise(self, point: _Point, scales: Scales) -> _Point:
+        """Return the point with pictures by slopes that are reduced by their noise there."""
+        if not self._noisy or self._noise is None:
+            return point
+        self._reduction[:] = 0.0
+        point = self._point(point.steps, point.contacts)
+        half = self._half(self._noise)
+        energy = noise_energy(
+            self._linear(point, scales),
+            half._linear(half._point(point.steps, point.contacts), scales),
+            len(self._reduction),
+        )
+        matrix, _ = self._normal(point, scales)
+        self._reduction = slope_reduction(matrix, energy, self._noisy)
+        return self._point(point.steps, point.contacts)
+
+    def _half(self, noise: LayeredPictures) -> LayeredFit:
+        """Return the fit to one of the two renderings whose mean this fit has."""
+        half = copy(self)
+        half._layers = self._layers.with_noise(noise)
+        half._slopes = {number: each.half() for number, each in self._slopes.items()}
+        half._contact_slopes = [
+            contact_slopes(half._layers, index, place) for index, place in enumerate(self._seen)
+        ]
+        return half
 
     def _descend(self, point: _Point, scales: Scales) -> _Point:
         """Return the point of the least cost that is found from another one."""
@@ -309,15 +354,15 @@ class LayeredFit:
         return Scales.of_errors(errors, expected, self._masks, self._pixels)
 
     def _noise_of(self, point: _Point) -> list[FloatArray]:
-        """Return a sample of the light's noise, levels (h, w, 3), in background and responses."""
+        """Return a sample of the light's noise, levels (h, w, 3), in background and responses; 0 in
+        a rough round.
+        """
         steps, contacts, pictures = point
-        if self._noise is None:
+        if self._noise is None or self._pixels is not None:
             return [np.zeros_like(shown) for shown in pictures]
-        ground = self._shown(-1, steps, None, self._noise) - pictures[0]
-        return [ground] + [
-            self._shown(index, steps, contacts[index], self._noise) - shown - ground
-            for index, shown in enumerate(pictures[1:])
-        ]
+        noisy = self.pictures(steps, contacts, self._noise)
+        ground, *pressed = (one - two for one, two in zip(noisy, pictures, strict=True))
+        return [ground] + [each - ground for each in pressed]
 
     def _residuals(self, pictures: list[FloatArray], index: int, scales: Scales) -> FloatArray:
         """Return the residuals (k, 3) of the background (index -1), or those near a contact."""
@@ -338,13 +383,8 @@ class LayeredFit:
 
     def _normal(self, point: _Point, scales: Scales) -> tuple[FloatArray, FloatArray]:
         """Return matrix and gradient of the normal equations."""
-        size = self.count + 3 * len(self._masks)
-        matrix, gradient = np.zeros((size, size)), np.zeros(size)
-        for unknowns, jacobian, weight, residual, _ in self._linear(point, scales):
-            flat = jacobian.reshape(-1, len(unknowns))
-            weighted = flat * weight.reshape(-1, 1)
-            matrix[np.ix_(unknowns, unknowns)] += weighted.T @ flat
-            gradient[unknowns] += weighted.T @ residual.ravel()
+        size, whole = self.count + 3 * len(self._masks), np.zeros(self._real.shape[:2], np.int64)
+        (matrix,), (gradient,) = normal_equations(self._linear(point, scales), size, whole)
         return matrix + np.eye(size), gradient + self._prior(point)
 
     def _prior(self, point: _Point) -> FloatArray:
@@ -352,12 +392,7 @@ class LayeredFit:
         return np.concatenate([point.steps, (point.contacts / self._contact_spread).ravel()])
 
     def _linear(self, point: _Point, scales: Scales) -> Iterator[LinearEquations]:
-        """Yield the linear equations of the background and of each press.
-
-        They are: the indices of the n unknowns on which they depend, the derivatives (k, 3, n) of
-        the residuals, their weights (k, 3), the residuals (k, 3), and the mask (h, w) of the k
-        pixels.
-        """
+        """Yield the linear equations of the background and of each press."""
         steps, contacts, pictures = point
         n = self.count
         masks = [np.ones(self._real.shape[:2], dtype=bool), *self._masks]
@@ -383,16 +418,8 @@ class LayeredFit:
         height, width = self._real.shape[:2]
         rows, columns = (BLOCKS * np.mgrid[:height, :width] / width).astype(np.int64)
         blocks = BLOCKS * rows + columns
-        count, size = int(blocks.max()) + 1, self.count + 3 * len(self._masks)
-        matrices, scores = np.zeros((count, size, size)), np.zeros((count, size))
-        for unknowns, jacobian, weight, residual, mask in self._linear(point, scales):
-            for block in np.unique(blocks[mask]):
-                own = blocks[mask] == block
-                flat = jacobian[own].reshape(-1, len(unknowns))
-                weighted = flat * weight[own].reshape(-1, 1)
-                matrices[block][np.ix_(unknowns, unknowns)] += weighted.T @ flat
-                scores[block, unknowns] += weighted.T @ residual[own].ravel()
-        return jackknife_covariance(matrices, scores)
+        size = self.count + 3 * len(self._masks)
+        return jackknife_covariance(*normal_equations(self._linear(point, scales), size, blocks))
 
     def _moved(
         self, steps: FloatArray, contacts: FloatArray, number: int
@@ -404,12 +431,12 @@ class LayeredFit:
         return by, self.pictures(other, contacts)
 
     def _contact_moved(self, point: _Point, index: int) -> list[list[FloatArray]]:
-        steps, contacts, pictures = point
+        steps, contacts = self._reduced(point.steps, point.contacts)
         found = []
         for axis in range(3):
             other = contacts[index].copy()
             other[axis] += STEP * self._contact_spread[axis]
-            changed = list(pictures)
+            changed = list(point.pictures)
             changed[index + 1] = self._shown(index, steps, other)
             found.append(changed)
         return found

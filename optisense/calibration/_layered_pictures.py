@@ -52,6 +52,15 @@ class LayeredPictures:
     contacts: tuple[Contact, ...]
     coverage: NDArray[np.float64] | None = field(default=None, repr=False)
 
+    def with_noise(self, noise: LayeredPictures) -> LayeredPictures:
+        """Return the layers with others added to them, which are a sample of their noise."""
+        presses = zip(self.presses, noise.presses, strict=True)
+        return replace(
+            self,
+            background=self.background + noise.background,
+            presses=tuple(one + two for one, two in presses),
+        )
+
 
 @dataclass(frozen=True)
 class PictureSlopes:
@@ -60,10 +69,27 @@ class PictureSlopes:
     Attributes:
         layers: derivatives (groups, h, w, 3) of the background and of each press.
         coverage: derivative (h, w) of the coverage; None if it does not change.
+        noise: sample of the noise of `layers`, in the same form; empty if they have none.
     """
 
     layers: Sequence[FloatArray] = field(repr=False)
     coverage: NDArray[np.float64] | None = field(default=None, repr=False)
+    noise: Sequence[FloatArray] = field(default=(), repr=False)
+
+    @staticmethod
+    def of_two(one: Sequence[FloatArray], other: Sequence[FloatArray]) -> PictureSlopes:
+        """Return the mean of derivatives from two renderings with independent noise."""
+        half = np.float32(0.5)
+        pairs = list(zip(one, other, strict=True))
+        return PictureSlopes(
+            [half * (a + b) for a, b in pairs], noise=[half * (a - b) for a, b in pairs]
+        )
+
+    def half(self) -> PictureSlopes:
+        """Return those of the first of the two renderings; these, if they have no noise."""
+        if not self.noise:
+            return self
+        return PictureSlopes([a + b for a, b in zip(self.layers, self.noise, strict=True)])
 
 
 def layered_pictures(

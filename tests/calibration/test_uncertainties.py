@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 import optisense as ots
 from optisense.calibration import Photographs
 from optisense.calibration._gauss_newton import LayeredFit
-from optisense.calibration._layered_pictures import LayeredPictures, averaged
+from optisense.calibration._layered_pictures import LayeredPictures, PictureSlopes, averaged
 from optisense.calibration._solution import jackknife_covariance
 from optisense.calibration.quantities import quantities_of
 from optisense.calibration.seen_contacts import SeenContact
@@ -89,3 +89,59 @@ def test_dark_places_mislead_no_fit_that_knows_the_noise_of_the_light(
     without, with_noise = (float(np.sqrt((error**2).mean())) for error in errors)
     assert with_noise < 0.7 * without, (without, with_noise)
     assert (np.abs(errors[1]) < 3.0 * deviations).all(), errors[1] / deviations
+
+
+def test_noise_of_slopes_is_no_information(
+    photographs: Photographs, seen: list[SeenContact], layers: LayeredPictures
+) -> None:
+    """Slopes from two renderings show a true change, or nothing but noise."""
+    rng = np.random.default_rng(6)
+    chosen = quantities_of(
+        ots.load("gelsight-mini-ideal"), ("powers",), [("coating.specularity", 0.0, 0.4)]
+    )
+    still, start, off = np.zeros((len(seen), 3)), np.zeros(4), 1.5
+    pictures = [layers.background, *layers.presses]
+    rows, columns = np.mgrid[: pictures[0].shape[1], : pictures[0].shape[2]] / 20.0
+    pattern = 0.02 * (np.sin(rows) * np.cos(columns))[..., None]
+    true = [(pattern * each).astype(np.float32) for each in pictures]
+
+    def noisy(size: float) -> list[np.ndarray]:  # type: ignore[type-arg]
+        return [
+            (size * each * rng.standard_normal(each.shape)).astype(np.float32) for each in pictures
+        ]
+
+    moved = replace(
+        layers,
+        background=layers.background + np.float32(off) * true[0],
+        presses=tuple(
+            each + np.float32(off) * slope
+            for each, slope in zip(layers.presses, true[1:], strict=True)
+        ),
+    )
+    made = LayeredFit(photographs, seen, moved, chosen, 250.0, start, {})
+    levels = [
+        np.clip(np.round(each + rng.standard_normal(each.shape)), 0, 255).astype(np.uint8)
+        for each in made.pictures(start, still)
+    ]
+    presses = [
+        replace(press, picture=picture)
+        for press, picture in zip(photographs.presses, levels[1:], strict=True)
+    ]
+    real = replace(photographs, background=levels[0], presses=tuple(presses))
+    mean, noise = averaged(layers, layers)
+    found = []
+    for signal, size in ((1.0, 0.002), (0.0, 0.01)):
+        two = [
+            [
+                np.float32(signal) * slope + error
+                for slope, error in zip(true, noisy(size), strict=True)
+            ]
+            for _ in range(2)
+        ]
+        slopes = {3: PictureSlopes.of_two(*two)}
+        fit = LayeredFit(real, seen, mean, chosen, 250.0, start, slopes, None, noise)
+        solution = fit.solve(start, still)
+        found.append((solution.steps[3], np.sqrt(solution.covariance[3, 3])))
+    (step, deviation), (_, unknown) = found
+    assert abs(step - off) < 1.5 * deviation < 0.1  # with all of the noise, 2.2 deviations less
+    assert unknown > 0.9  # with all of the noise, 0.04
