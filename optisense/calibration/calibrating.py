@@ -70,6 +70,7 @@ def calibrate(
         design = with_single_lights(design)
     full, seen, notes = usable(photographs, refine=chosen_settings.refine)
     chosen = quantities_of(design, chosen_settings.families, chosen_settings.asked)
+    chosen_settings.check_held_out(photographs, full)
     held_out = chosen_settings.indices_held_out(full)
     notes += notes_on_kinds(design, chosen_settings.families)
     notes += _refuse_too_few(full, chosen, held_out)

@@ -55,18 +55,31 @@ class CalibrationSettings:
         last = number >= self.rounds - 1
         return self.photons if last else max(round(EARLIER_PHOTONS * self.photons), 1)
 
-    def indices_held_out(self, photographs: Photographs) -> list[int]:
-        """Return the indices of the presses that are held out.
+    def check_held_out(self, photographs: Photographs, shown: Photographs) -> None:
+        """Check the names of the presses that are held out.
+
+        Args:
+            photographs: all photographs.
+            shown: those that show a contact.
 
         Raises:
-            CalibrationError: there is no press of a name.
+            CalibrationError: there is no press of a name, or it shows no contact.
         """
         names = [press.name for press in photographs.presses]
-        if self.held_out is None:
-            return list(range(HELD_OUT - 1, len(names), HELD_OUT))
-        for name in self.held_out:
+        for name in self.held_out or ():
             if name not in names:
                 raise CalibrationError(
                     f"there is no press '{name}' to hold out", hint=suggestion(name, names)
                 )
+            if all(press.name != name for press in shown.presses):
+                raise CalibrationError(
+                    f"press '{name}' shows no contact, and tests nothing",
+                    hint="Hold out another one",
+                )
+
+    def indices_held_out(self, photographs: Photographs) -> list[int]:
+        """Return the indices of the presses that are held out, see `check_held_out`."""
+        names = [press.name for press in photographs.presses]
+        if self.held_out is None:
+            return list(range(HELD_OUT - 1, len(names), HELD_OUT))
         return [index for index, name in enumerate(names) if name in self.held_out]

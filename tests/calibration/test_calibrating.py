@@ -220,6 +220,12 @@ def test_too_few_photographs_are_refused_before_the_work(photographs: Photograph
     with pytest.raises(CalibrationError, match=r"no press 'press-1\.png'") as raised:
         calibrate(ots.load("gelsight-mini-ideal"), photographs, misspelt)
     assert "press-01.png" in (raised.value.hint or "")
+    empty = replace(photographs.presses[0], name="empty.png", picture=photographs.background)
+    more = replace(photographs, presses=(*photographs.presses, empty))
+    with pytest.raises(CalibrationError, match=r"'empty\.png' shows no contact"):
+        calibrate(
+            ots.load("gelsight-mini-ideal"), more, CalibrationSettings(held_out=("empty.png",))
+        )
 
 
 def test_a_design_is_fitted_and_marked(small_photographs: Photographs, tmp_path: Path) -> None:
