@@ -37,6 +37,10 @@ LABEL_OFF = 0.6
 of the radii, from which on the label is doubted. Hand labels are off by a tenth.
 """
 
+SAME_PLACE = 1.0 / 6.0
+"""Distance of contacts from their middle, in radii, up to which they are at the same place, and so
+within a third of a radius of each other: a ball that is pressed in anew by hand is farther off."""
+
 
 @dataclass(frozen=True)
 class SeenContact:
@@ -127,6 +131,7 @@ class ContactFinder:
         found = []
         twice = 0
         denied: list[FoundContact] = []
+        every: list[FoundContact] = []
         for press in self._presses:
             seen = free = self._strongest(press)
             if press.centre is not None:
@@ -140,6 +145,7 @@ class ContactFinder:
             if seen is None:
                 found.append(f"{press.name}: it shows no contact and is left out")
                 continue
+            every.append(seen)
             if seen.asymmetry > DOUBTFUL:
                 found.append(
                     f"{press.name}: its difference from the background does not look like the "
@@ -162,7 +168,7 @@ class ContactFinder:
                     f"{press.name}: its label has a radius of {size:.0f} pixels, and the contact "
                     f"in the picture one of {shown:.0f}"
                 )
-        common = _common_place(denied)
+        common, repeated = _common_place(denied, LABEL_OFF), _common_place(every, SAME_PLACE)
         if 2 * twice > len(self._presses):
             found.insert(0, _background_contact("most photographs show two"))
         elif common is not None:
@@ -174,6 +180,12 @@ class ContactFinder:
                     "they have no label"
                 ),
             )
+        elif repeated is not None:
+            column, row = repeated
+            found.append(
+                f"most presses are at the same place, column {column:.0f}, row {row:.0f}; presses "
+                "at different places contain more information"
+            )
         return found
 
 
@@ -183,16 +195,15 @@ def _background_contact(reason: str) -> str:
     )
 
 
-def _common_place(contacts: Sequence[FoundContact]) -> tuple[float, float] | None:
-    """Return the place that more than half of the contacts share, or None if there are not two."""
+def _common_place(contacts: Sequence[FoundContact], near: float) -> tuple[float, float] | None:
+    """Return the place from which more than half of the contacts are at most `near` radii away, or
+    None if there are not two such contacts.
+    """
     if len(contacts) < 2:
         return None
     column, row = np.median([each.centre for each in contacts], axis=0).tolist()
-    near = [
-        each for each in contacts
-        if math.dist(each.centre, (column, row)) < LABEL_OFF * each.radius
-    ]  # fmt: skip
-    return (column, row) if len(near) >= 2 and 2 * len(near) > len(contacts) else None
+    count = sum(math.dist(each.centre, (column, row)) < near * each.radius for each in contacts)
+    return (column, row) if count >= 2 and 2 * count > len(contacts) else None
 
 
 def check_shape(photographs: Photographs, model: OpticalModel) -> None:

@@ -284,6 +284,18 @@ def test_a_contact_of_the_background_is_told_where_labels_deny_it(
     assert "several photographs show one at column" in words[0]
 
 
+def test_presses_at_one_place_are_told(photographs: Photographs) -> None:
+    rng = np.random.default_rng(3)
+    one = photographs.presses[0]
+    again = [
+        replace(one, picture=np.clip(one.picture + rng.integers(-1, 2, one.picture.shape), 0, 255))
+        for _ in range(2)
+    ]
+    presses = [replace(press, picture=press.picture.astype(np.uint8)) for press in again]
+    some = replace(photographs, presses=(one, *presses, photographs.presses[1]))
+    assert "most presses are at the same place" in ContactFinder(some).doubts()[0]
+
+
 def test_impossible_contacts_are_refused(mini: OpticalModel, photographs: Photographs) -> None:
     rays = mini.chief_rays(photographs.size)
     press = photographs.presses[0]
