@@ -101,7 +101,7 @@ def measure(name: str) -> dict[str, Any]:
             {
                 "number": each.words,
                 "unit": each.unit,
-                "start": number.before,
+                "start": each.start,
                 "hidden": truth,
                 "found": number.after,
                 "uncertainty": number.uncertainty,

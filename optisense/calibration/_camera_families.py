@@ -115,6 +115,7 @@ def tone(design: SensorDesign) -> list[FitQuantity]:
         FitQuantity(
             "camera.tone_curve.gamma", "exponent of the tone curve", "", start, 0.5, 5.0,
             GAMMA_RANGE, True, home="camera.tone_curve",
+            guessed=not isinstance(curve, GammaCurve),
         )
     ]  # fmt: skip
 
@@ -146,7 +147,7 @@ def shading(design: SensorDesign) -> list[FitQuantity]:
     found = [
         FitQuantity(
             f"camera.shading.{name}", f"lens shading of {letter} in the image corners", "", start,
-            0.0, 0.95, FALLOFF_RANGE, home="camera.shading",
+            0.0, 0.95, FALLOFF_RANGE, home="camera.shading", guessed=own is None,
         )
         for channel, name, letter, start in (
             (1, "falloff", "G", green), (0, "red_falloff", "R", red), (2, "blue_falloff", "B", blue)
@@ -155,7 +156,7 @@ def shading(design: SensorDesign) -> list[FitQuantity]:
     ]  # fmt: skip
     outwards = FitQuantity(
         "camera.shading.power", "exponent of the lens shading by the distance from the middle", "",
-        power, 1.0, 8.0, SHADING_RANGE, True, home="camera.shading",
+        power, 1.0, 8.0, SHADING_RANGE, True, home="camera.shading", guessed=own is None,
     )  # fmt: skip
     return [*found, outwards]
 

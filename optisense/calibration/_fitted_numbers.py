@@ -28,7 +28,8 @@ class FittedNumber:
 
     Attributes:
         path, words, unit: see `FitQuantity`.
-        before, after: values before and after the fit.
+        before: value before the fit; None if the design has no such number.
+        after: value after the fit.
         uncertainty: standard deviation of the value.
         determined: whether the photographs constrain it more than its plausible range does.
     """
@@ -36,10 +37,15 @@ class FittedNumber:
     path: str
     words: str
     unit: str
-    before: float
+    before: float | None
     after: float
     uncertainty: float
     determined: bool
+
+    @property
+    def before_words(self) -> str:
+        """Value before the fit, in words."""
+        return "none" if self.before is None else f"{self.before:.4g}"
 
 
 def with_known_total(
@@ -82,8 +88,8 @@ def fitted_numbers(
             value, error = value * scale, error * scale
         found.append(
             FittedNumber(
-                each.path, each.words, each.unit, each.start, value, error,
-                bool(deviation < UNDETERMINED),
+                each.path, each.words, each.unit, None if each.guessed else each.start, value,
+                error, bool(deviation < UNDETERMINED),
             )
         )  # fmt: skip
     return tuple(found)

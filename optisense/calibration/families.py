@@ -218,6 +218,7 @@ def _edges(design: SensorDesign) -> list[FitQuantity]:
             ROUGH_START if known is None else known, 0.0, 1.0, ROUGH_RANGE, False, True, False,
             rough,
             f"parts.{parts[0]}.faces",
+            guessed=known is None,
         )
     ]  # fmt: skip
 

@@ -35,6 +35,7 @@ class FitQuantity:
         home: path under which the design records the source of the number; `path` if empty.
         views: whether it only changes what the camera sees of the skin, so that the derivatives of
             pictures follow from chief rays.
+        guessed: whether the design has no such number, so that the start is a guess.
     """
 
     path: str
@@ -52,6 +53,7 @@ class FitQuantity:
     )
     home: str = ""
     views: bool = False
+    guessed: bool = False
 
     def value(self, step: float) -> float:
         """Return the number at a distance of `step` plausible ranges from its start."""

@@ -74,7 +74,7 @@ def print_calibration(found: Calibration) -> None:
     for each in found.numbers:
         table.add_row(
             each.words,
-            f"{each.before:.4g}",
+            each.before_words,
             f"{each.after:.4g}",
             f"{each.uncertainty:.2g}",
             each.unit if each.determined else f"{each.unit} (not determined)".strip(),

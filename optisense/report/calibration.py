@@ -103,7 +103,7 @@ def render_calibration(found: Calibration) -> str:
         numbers=[
             (
                 each.words,
-                f"{each.before:.4g}",
+                each.before_words,
                 f"{each.after:.4g}",
                 f"{each.uncertainty:.2g}",
                 each.unit,

@@ -173,8 +173,9 @@ def words(result: dict[str, Any]) -> list[str]:
     lines.append(f"Not explained of {held}: {before:.0f} % before, {after:.0f} % after")
     for row in result["numbers"]:
         doubt = "" if row["determined"] else ", not determined"
+        start = "none" if row["before"] is None else f"{row['before']:.4g}"
         lines.append(
-            f"{row['words']}: {row['before']:.4g} → {row['after']:.4g} ± "
+            f"{row['words']}: {start} → {row['after']:.4g} ± "
             f"{row['uncertainty']:.2g} {row['unit']}".rstrip()
             + doubt
         )

@@ -168,6 +168,8 @@ def test_an_uncertain_power_makes_powers_of_a_kept_sum_uncertain() -> None:
     fitted = designed(design, chosen, steps)
     scaled = with_known_total(chosen, solution, fitted)
     numbers = fitted_numbers(chosen, scaled, fitted)
+    assert numbers[3].before is None  # the design has no tone curve
+    assert numbers[0].before == design.lights["red"].flux
     drawn = steps + deviations * np.random.default_rng(1).standard_normal((20_000, 4))
     powers = np.array(
         [[each.value(row[index]) for index, each in enumerate(chosen[:3])] for row in drawn]
