@@ -119,7 +119,8 @@ class FitRounds:
         Each round takes new difference quotients, because pictures are not linear in the numbers of
         a sensor's body. The last of several rounds keeps these numbers and fits the others to their
         true pictures: powers and the camera's processing that suit a linear prediction do not suit
-        these. Rounds that are not rough render everything twice, to know the noise of the light.
+        these. Rounds with quotients, and those that are not rough, render everything twice, to know
+        the noise of the light.
         The exposure is fitted along if the fitted powers do not determine it.
         """
         steps = np.zeros(len(self._chosen))
