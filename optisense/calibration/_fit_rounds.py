@@ -25,10 +25,11 @@ from optisense.calibration._layered_pictures import (
 )
 from optisense.calibration._solution import Solution
 from optisense.calibration._view_slopes import view_changes, with_view
+from optisense.calibration.families import EXPOSURE
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.model_pictures import matched_exposure
 from optisense.calibration.photographs import Photographs
-from optisense.calibration.quantities import EXPOSURE, designed, fits_all_powers
+from optisense.calibration.quantities import designed, fits_all_powers
 from optisense.calibration.quantity import FitQuantity
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings

@@ -65,6 +65,14 @@ ground edges have about 0.4.
 INDEX_RANGE = 0.015
 """Plausible range of a refractive index; literature on one silicone differs by up to 0.04."""
 
+EXPOSURE = FitQuantity(
+    "exposure", "exposure of the photographs", "", 1.0, 1e-3, 1e3, POWER_RANGE, True,
+    change=lambda design, value: design,
+)  # fmt: skip
+"""Factor on the first guess of the exposure, which is fitted if powers are kept: the guess is that
+of the design before the fit, and other numbers would make up for its error. Its range is that of a
+power, whose effect is the same."""
+
 
 @dataclass(frozen=True)
 class Family:

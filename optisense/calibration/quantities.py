@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from optisense.array_types import FloatArray
-from optisense.calibration.families import FAMILIES, POWER_RANGE
+from optisense.calibration.families import EXPOSURE, FAMILIES
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign, get_value, set_value
 from optisense.design.lenses.radial_shading import RadialShading
@@ -32,14 +32,6 @@ STARTS: dict[str, Any] = {
 }
 """Components that a camera without them gets before its numbers are set; these have no effect, or
 their numbers are all set."""
-
-EXPOSURE = FitQuantity(
-    "exposure", "exposure of the photographs", "", 1.0, 1e-3, 1e3, POWER_RANGE, True,
-    change=lambda design, value: design,
-)  # fmt: skip
-"""Factor on the first guess of the exposure, which is fitted if powers are kept: the guess is that
-of the design before the fit, and other numbers would make up for its error. Its range is that of a
-power, whose effect is the same."""
 
 
 def quantities_of(
