@@ -35,7 +35,13 @@ POINTS_STEP = 4
 """Step in which the number of grid points along a side grows, and the smallest number, with which
 an overlap finer than the grid still has a point on each side."""
 SEARCH_POINTS = 96
-"""Number of grid points along a side of the first grid, which finds the extent of the overlap."""
+"""Number of grid points along a side of the first grid, which covers the indenter."""
+FEWEST_STEPS = 12
+"""Number of steps of the first grid across an overlap below which its extent is searched again on
+a grid of its size: the extent of an overlap that has more is known to a sixth."""
+ROUNDING = 1e-6
+"""Distance (mm) by which the extent of an overlap exceeds the vertices and edges found in it, so
+that it is never a point."""
 
 
 class NoFootprintError(ContactError):
@@ -100,21 +106,13 @@ def footprint(
     pose[:3, :3] = axes.T
     pose[:3, 3] = -axes.T @ spot.point
     body, plane = indenter.transformed(pose), skin.vertex_normals().transformed(pose)
-    low, high = body.bounds[:, :2]
-    x, y = (np.linspace(a, b, SEARCH_POINTS) for a, b in zip(low, high, strict=True))
-    rough = _overlap(body, plane, x, y)
-    inside = rough > 0.0
-    if not inside.any():
+    spans = _extent(body, plane)
+    if spans is None:
         raise NoFootprintError(
             "an indenter does not reach the sensing surface",
             where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*spot.point),
             hint="Press deeper, or check the indenter's shape: it may have a hole there",
         )
-    columns, rows = np.flatnonzero(inside.any(axis=0)), np.flatnonzero(inside.any(axis=1))
-    spans = [
-        (grid[max(some[0] - 1, 0)], grid[min(some[-1] + 1, len(grid) - 1)])
-        for grid, some in ((x, columns), (y, rows))
-    ]
     sizes = [MARGIN * (b - a) for a, b in spans]
     pitch = min(min(sizes) / points_across, COARSEST_PITCH)
     pitch = _step_below(max(pitch, max(sizes) / MAX_POINTS, FINEST_PITCH))
@@ -136,6 +134,64 @@ def footprint(
             "radius of 1.5 mm is sphere:1.5",
         )
     return Footprint(spot.point, axes, x, y, overlap, thickness)
+
+
+def _extent(body: TriangleMesh, skin: TriangleMesh) -> list[tuple[float, float]] | None:
+    """Return the lowest and highest x, and those of y (mm), of the overlap of an indenter and a
+    skin in the frame of a contact; None if they do not overlap.
+
+    The overlap is searched on a grid and at the vertices and edges of the indenter, and then again
+    on a grid that covers what was found, if that has few points of the first grid.
+    """
+    first, last = body.bounds[:, :2]
+    face_low, face_high = body.face_bounds
+    for _ in range(2):
+        x, y = (np.linspace(a, b, SEARCH_POINTS) for a, b in zip(first, last, strict=True))
+        height = heights(outer_faces(skin, x, y), x, y, highest=True)
+        rows, columns = np.nonzero(height > heights(body, x, y))
+        met = np.column_stack([x[columns], y[rows]])
+        step = np.array([x[1] - x[0], y[1] - y[0]])
+        low = met.min(axis=0, initial=np.inf) - step
+        high = met.max(axis=0, initial=-np.inf) + step
+        beyond = ((face_low[:, :2] < low) | (face_high[:, :2] > high)).any(axis=1)
+        beyond &= face_low[:, 2] < height.max()
+        places = _places_below(body.triangles[beyond], height, x, y)
+        low = np.minimum(low, places.min(axis=0, initial=np.inf) - ROUNDING)
+        high = np.maximum(high, places.max(axis=0, initial=-np.inf) + ROUNDING)
+        if not (low < high).all():
+            return None
+        first, last = np.maximum(low, first), np.minimum(high, last)
+        if ((last - first) >= FEWEST_STEPS * step).all():
+            break
+    return [(float(a), float(b)) for a, b in zip(first, last, strict=True)]
+
+
+def _places_below(
+    triangles: FloatArray, height: FloatArray, x: FloatArray, y: FloatArray
+) -> FloatArray:
+    """Return (n, 2) x and y (mm) of the corners of triangles below a skin, and of the places where
+    their edges cross the skin.
+
+    Args:
+        triangles: (faces, 3, 3) corners in the frame of a contact, mm.
+        height: (rows, columns) heights (mm) of the skin on a grid, which are interpolated; minus
+            infinity where there is no skin.
+        x, y: (columns,) and (rows,) coordinates of the grid, mm.
+    """
+    known = np.where(np.isfinite(height), height, NO_OVERLAP)
+    column = ((triangles[..., 0] - x[0]) / (x[1] - x[0])).clip(0.0, len(x) - 1)
+    row = ((triangles[..., 1] - y[0]) / (y[1] - y[0])).clip(0.0, len(y) - 1)
+    left = np.minimum(column.astype(np.int64), len(x) - 2)
+    front = np.minimum(row.astype(np.int64), len(y) - 2)
+    right, back = column - left, row - front
+    before = (1.0 - right) * known[front, left] + right * known[front, left + 1]
+    behind = (1.0 - right) * known[front + 1, left] + right * known[front + 1, left + 1]
+    gap = triangles[..., 2] - (1.0 - back) * before - back * behind
+    next_gap, ends = np.roll(gap, -1, axis=1), np.roll(triangles, -1, axis=1)
+    crossing = (gap < 0.0) != (next_gap < 0.0)
+    share = (gap[crossing] / (gap[crossing] - next_gap[crossing]))[:, None]
+    edges = (1.0 - share) * triangles[crossing] + share * ends[crossing]
+    return np.concatenate([triangles[gap < 0.0], edges])[:, :2]
 
 
 def _step_below(pitch: float) -> float:

@@ -198,6 +198,27 @@ def test_an_indenter_that_does_not_reach_the_skin_is_told():
         gel(lambda _: lifted).pressed([contact])
 
 
+def test_small_features_of_a_large_mesh_are_pressed_too():
+    plate = [TriangleMesh.box((-30.0, -30.0, 1.5), (30.0, 30.0, 3.0))]
+    pins = [
+        TriangleMesh.box((x - half, y - half, 0.0), (x + half, y + half, 2.0))
+        for x, y, half in ((0.0, 0.0, 0.8), (4.0, 0.7, 0.2))
+    ]
+    alone, both = (
+        press(Contact(MeshIndenter(TriangleMesh.joined(parts)), at=(0.0, 0.0), depth=0.3))
+        for parts in (pins, plate + pins)
+    )
+    assert both.contacts[0].force == pytest.approx(alone.contacts[0].force, rel=0.01)
+    # Only the tip of a pyramid, smaller than the first grid's distance of points, is in the gel.
+    corners = np.array([(4, 4, 4), (-4, 4, 4), (-4, -4, 4), (4, -4, 4), (0, 0, 0)], dtype=float)
+    sides = np.array([(1, 0, 4), (2, 1, 4), (3, 2, 4), (0, 3, 4)])
+    tip = MeshIndenter(TriangleMesh(corners, sides))
+    shallow, deep = (
+        press(Contact(tip, at=(0.1, 0.2), depth=depth)).contacts[0].force for depth in (0.04, 0.4)
+    )
+    assert deep == pytest.approx(100.0 * shallow, rel=0.1)  # forces under cones grow by depth^2
+
+
 @pytest.mark.parametrize(
     ("indenter", "load", "size"),
     [
