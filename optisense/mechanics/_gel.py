@@ -40,7 +40,13 @@ light in the gel."""
 LEAST_FORCE_SHARE = 1e-6
 """Share of the wanted force that replaces a force of 0 before its logarithm is taken."""
 FORCE_TOLERANCE = 2e-4
-"""Relative error of the depth at which a wanted force counts as found: 0.03 % of the force."""
+"""Relative error of a force at which the search for its depth ends: a fifth of the error of the
+force of a ball."""
+DEPTH_TOLERANCE = 1e-6
+"""Relative error of the depth at which this search ends if the force jumps there, as it does where
+the grid of the contact changes."""
+FORCE_ERROR = 0.01
+"""Relative error of a force above which it is refused: about that of forces on a thick layer."""
 
 KEPT_DEPTHS = 256
 """Number of contacts whose depth by force a gel keeps; an entry is a few numbers."""
@@ -240,8 +246,8 @@ class Gel:
         Contacts without a force are returned unchanged.
 
         Raises:
-            ContactError: the gel is too thin for the force, or the indenter too small for its
-                model.
+            ContactError: the gel is too thin for the force, the indenter too small for its model,
+                or no depth from `LEAST_DEPTH` on gives the force.
         """
         if contact.force is None:
             return contact
@@ -269,17 +275,32 @@ class Gel:
                 hint=f"Give a force up to {greatest:.3g} N",
             )
 
+        if (least := force(LEAST_DEPTH)) > wanted * (1.0 + FORCE_ERROR):
+            raise ContactError(
+                f"a force of {wanted:g} N is less than an indenter takes at the least depth of "
+                f"the model of the gel, {LEAST_DEPTH:g} mm, where it takes {least:.3g} N",
+                hint=f"Give a force from {least:.3g} N on",
+            )
+
         # Forces of smooth indenters grow about as depth^1.5; the root is found in logarithms.
         def excess(log_depth: float) -> float:
             found = max(force(math.exp(log_depth)), LEAST_FORCE_SHARE * wanted)
-            return math.log(found / wanted)
+            ratio = math.log(found / wanted)
+            return 0.0 if abs(ratio) < FORCE_TOLERANCE else ratio
 
         from scipy.optimize import brentq  # takes a quarter of a second to load
 
         low, high = math.log(LEAST_DEPTH), math.log(limit)
         if excess(low) >= 0.0:
             return at(LEAST_DEPTH)
-        return at(math.exp(float(brentq(excess, low, high, xtol=FORCE_TOLERANCE))))
+        depth = math.exp(float(brentq(excess, low, high, xtol=DEPTH_TOLERANCE)))
+        if abs((found := force(depth)) / wanted - 1.0) > FORCE_ERROR:
+            raise ContactError(
+                f"no depth gives a force of {wanted:g} N: the force of the indenter jumps there, "
+                f"at {depth:.4g} mm, to or from {found:.4g} N",
+                hint=f"Give a force of {found:.4g} N",
+            )
+        return at(depth)
 
     def _layer(self, spot: SurfacePoint) -> float:
         """Return the thickness (mm) of the layer that a contact at a point is pressed into."""

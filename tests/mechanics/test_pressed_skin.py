@@ -35,6 +35,14 @@ TOP = TriangleMesh.grid((20.0, 16.0)).flipped()  # looks into the gel below it
 BLOCK = TriangleMesh.box((-10.0, -8.0, -4.25), (10.0, 8.0, 0.0))
 SURFACE = SensingSurface(TOP, (0, 0, 0), (1, 0, 0), (0, 1, 0))
 
+TIP = MeshIndenter(
+    TriangleMesh(
+        np.array([(4, 4, 4), (-4, 4, 4), (-4, -4, 4), (4, -4, 4), (0, 0, 0)], dtype=float),
+        np.array([(1, 0, 4), (2, 1, 4), (3, 2, 4), (0, 3, 4)]),
+    )
+)
+"""A pyramid that stands on its tip."""
+
 
 def gel(placed=lambda contact: place(contact, SURFACE, BLOCK)):
     return Gel(SURFACE, TOP, [BLOCK], GEL, placed)
@@ -210,11 +218,8 @@ def test_small_features_of_a_large_mesh_are_pressed_too():
     )
     assert both.contacts[0].force == pytest.approx(alone.contacts[0].force, rel=0.01)
     # Only the tip of a pyramid, smaller than the first grid's distance of points, is in the gel.
-    corners = np.array([(4, 4, 4), (-4, 4, 4), (-4, -4, 4), (4, -4, 4), (0, 0, 0)], dtype=float)
-    sides = np.array([(1, 0, 4), (2, 1, 4), (3, 2, 4), (0, 3, 4)])
-    tip = MeshIndenter(TriangleMesh(corners, sides))
     shallow, deep = (
-        press(Contact(tip, at=(0.1, 0.2), depth=depth)).contacts[0].force for depth in (0.04, 0.4)
+        press(Contact(TIP, at=(0.1, 0.2), depth=depth)).contacts[0].force for depth in (0.04, 0.4)
     )
     assert deep == pytest.approx(100.0 * shallow, rel=0.1)  # forces under cones grow by depth^2
 
@@ -281,6 +286,14 @@ def test_a_force_finds_its_depth():
     found = gel().at_depth(pushed)
     assert found.force is None
     assert press(found).contacts[0].force == pytest.approx(0.5, rel=2e-3)
+
+
+def test_a_small_force_is_found_or_refused():
+    pad = gel()
+    found = pad.at_depth(Contact(TIP, at=(0.0, 0.0), force=3e-4))
+    assert pad.pressed([found]).contacts[0].force == pytest.approx(3e-4, rel=5e-4)
+    with pytest.raises(ContactError, match=r"less than .* at the least depth .*Give a force from"):
+        pad.at_depth(Contact(Plane(0.0, 0.0, 6.0), at=(0.0, 0.0), force=1e-5))
 
 
 def test_a_force_beyond_what_the_gel_takes_is_told():
