@@ -136,9 +136,9 @@ def footprint(
     return Footprint(spot.point, axes, x, y, overlap, thickness)
 
 
-def _extent(body: TriangleMesh, skin: TriangleMesh) -> list[tuple[float, float]] | None:
-    """Return the lowest and highest x, and those of y (mm), of the overlap of an indenter and a
-    skin in the frame of a contact; None if they do not overlap.
+def _extent(body: TriangleMesh, skin: TriangleMesh) -> FloatArray | None:
+    """Return the lowest and highest x, and those of y, as (2, 2) array (mm), of the overlap of an
+    indenter and a skin in the frame of a contact; None if they do not overlap.
 
     The overlap is searched on a grid and at the vertices and edges of the indenter, and then again
     on a grid that covers what was found, if that has few points of the first grid.
@@ -163,7 +163,7 @@ def _extent(body: TriangleMesh, skin: TriangleMesh) -> list[tuple[float, float]]
         first, last = np.maximum(low, first), np.minimum(high, last)
         if ((last - first) >= FEWEST_STEPS * step).all():
             break
-    return [(float(a), float(b)) for a, b in zip(first, last, strict=True)]
+    return np.column_stack([first, last])
 
 
 def _places_below(
