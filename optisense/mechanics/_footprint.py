@@ -58,6 +58,8 @@ class Footprint:
         x, y: (columns,) and (rows,) grid coordinates in this frame, mm.
         overlap: (rows, columns) overlap along z (mm), negative where there is a gap; `NO_OVERLAP`
             where there is no skin or no indenter.
+        depth: depth (mm) to which the indenter is pressed in. It differs from the greatest overlap
+            if the skin is curved, or if the deepest place of the indenter is between grid points.
         thickness: thickness (mm) of the gel under the contact, or of the flat layer to which the
             gel is compared.
     """
@@ -67,6 +69,7 @@ class Footprint:
     x: FloatArray
     y: FloatArray
     overlap: FloatArray
+    depth: float
     thickness: float
 
     @property
@@ -84,6 +87,7 @@ def footprint(
     indenter: TriangleMesh,
     skin: TriangleMesh,
     spot: SurfacePoint,
+    depth: float,
     thickness: float,
     points_across: int = POINTS_ACROSS,
 ) -> Footprint:
@@ -94,6 +98,7 @@ def footprint(
             if its exact shape is smooth.
         skin: the undeformed sensing surface, in the same frame.
         spot: the place of the contact on the skin.
+        depth: depth of the contact, mm.
         thickness: thickness of the gel there, mm.
         points_across: number of grid points across the shorter side of the overlap, within the
             bounds on their distance (`FINEST_PITCH`, `COARSEST_PITCH`).
@@ -133,7 +138,7 @@ def footprint(
             hint="Check the unit: lengths of indenters and depths are in mm, so a ball with a "
             "radius of 1.5 mm is sphere:1.5",
         )
-    return Footprint(spot.point, axes, x, y, overlap, thickness)
+    return Footprint(spot.point, axes, x, y, overlap, depth, thickness)
 
 
 def _extent(body: TriangleMesh, skin: TriangleMesh) -> FloatArray | None:

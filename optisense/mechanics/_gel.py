@@ -201,10 +201,11 @@ class Gel:
                     mesh,
                     self._surface.mesh,
                     spot,
+                    self.at_depth(contact).depth,
                     self._layer(spot),
                     COARSE_POINTS_ACROSS if self._coarse else POINTS_ACROSS,
                 )
-                for spot, mesh in zip(spots, placed, strict=True)
+                for contact, spot, mesh in zip(contacts, spots, placed, strict=True)
             ]
             for number, (place, mesh) in enumerate(zip(places, placed, strict=True)):
                 if isinstance(contacts[number].indenter, MeshIndenter):

@@ -154,7 +154,7 @@ class PressedSkin:
         """
         return [
             {
-                "depth_mm": round(float(contact.place.overlap.max()), 6),
+                "depth_mm": round(contact.place.depth, 6),
                 "force_n": round(contact.force, 6),
                 "area_mm2": round(contact.area, 6),
                 "greatest_pressure_mpa": round(float(contact.pressure.max()), 6),

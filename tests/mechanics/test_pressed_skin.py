@@ -288,6 +288,11 @@ def test_a_force_finds_its_depth():
     assert press(found).contacts[0].force == pytest.approx(0.5, rel=2e-3)
 
 
+def test_numbers_of_a_press_have_its_depth():
+    numbers = press(Contact(TIP, at=(0.0, 0.0), depth=0.05)).in_numbers()[0]
+    assert numbers["depth_mm"] == 0.05
+
+
 def test_a_small_force_is_found_or_refused():
     pad = gel()
     found = pad.at_depth(Contact(TIP, at=(0.0, 0.0), force=3e-4))
