@@ -19,6 +19,9 @@ of a convex indenter lies inside the overlap, except on thin gels that bulge by 
 POINTS_ACROSS = 64
 """Number of grid points across the shorter side of a contact. The error of a ball's force is then
 0.1 %, and that of its contact radius 0.2 %."""
+NARROW_SHARE = 0.125
+"""Number of grid points across the mean width of an overlap, as a share of the number across a
+contact: features of textures and thin rods at an angle to the grid have 8 points across."""
 FINEST_PITCH = 0.01
 """Smallest distance (mm) of grid points: a tenth of the finest textures that cameras resolve."""
 COARSEST_PITCH = 0.1
@@ -119,16 +122,15 @@ def footprint(
             hint="Press deeper, or check the indenter's shape: it may have a hole there",
         )
     sizes = [MARGIN * (b - a) for a, b in spans]
-    pitch = min(min(sizes) / points_across, COARSEST_PITCH)
-    pitch = _step_below(max(pitch, max(sizes) / MAX_POINTS, FINEST_PITCH))
-    x, y = (
-        (a + b) / 2 + pitch * (np.arange(n) - (n - 1) / 2)
-        for (a, b), n in (
-            (span, POINTS_STEP * max(math.ceil(size / pitch / POINTS_STEP), 1))
-            for span, size in zip(spans, sizes, strict=True)
-        )
-    )
+    least = max(max(sizes) / MAX_POINTS, FINEST_PITCH)
+    pitch = _step_below(max(min(min(sizes) / points_across, COARSEST_PITCH), least))
+    x, y = (_points(span, size, pitch) for span, size in zip(spans, sizes, strict=True))
     overlap = _overlap(body, plane, x, y)
+    share = _points_across(overlap) / (NARROW_SHARE * points_across)
+    if share < 1.0 and pitch > least:
+        pitch = _step_below(max(pitch * share, least))
+        x, y = (_points(span, size, pitch) for span, size in zip(spans, sizes, strict=True))
+        overlap = _overlap(body, plane, x, y)
     if not (overlap > 0.0).any():
         (left, right), (front, back) = spans
         raise NoFootprintError(
@@ -197,6 +199,23 @@ def _places_below(
     share = (gap[crossing] / (gap[crossing] - next_gap[crossing]))[:, None]
     edges = (1.0 - share) * triangles[crossing] + share * ends[crossing]
     return np.concatenate([triangles[gap < 0.0], edges])[:, :2]
+
+
+def _points(span: FloatArray, size: float, pitch: float) -> FloatArray:
+    """Return coordinates (mm) of grid points that cover a size around the middle of a span."""
+    number = POINTS_STEP * max(math.ceil(size / pitch / POINTS_STEP), 1)
+    return np.asarray(span.mean() + pitch * (np.arange(number) - (number - 1) / 2))
+
+
+def _points_across(overlap: FloatArray) -> float:
+    """Return the mean width of an overlap in grid points: its area divided by half its perimeter.
+
+    The perimeter follows by Crofton's formula from the number of neighbours of which only one lies
+    in the overlap.
+    """
+    inside = overlap > 0.0
+    rims = sum(int(np.count_nonzero(np.diff(inside, axis=axis))) for axis in (0, 1))
+    return 8.0 / math.pi * np.count_nonzero(inside) / max(rims, 1)
 
 
 def _step_below(pitch: float) -> float:

@@ -288,6 +288,15 @@ def test_a_force_finds_its_depth():
     assert press(found).contacts[0].force == pytest.approx(0.5, rel=2e-3)
 
 
+def test_thin_rods_touch_alike_in_each_direction():
+    along, across = (
+        press(Contact(Cylinder(0.1, 5.0), at=(0.0, 0.0), depth=0.02, rotation=angle)).contacts[0]
+        for angle in (0.0, 40.0)
+    )
+    assert across.area == pytest.approx(along.area, rel=0.05)
+    assert across.force == pytest.approx(along.force, rel=0.02)
+
+
 def test_numbers_of_a_press_have_its_depth():
     numbers = press(Contact(TIP, at=(0.0, 0.0), depth=0.05)).in_numbers()[0]
     assert numbers["depth_mm"] == 0.05
