@@ -60,8 +60,9 @@ class Contact:
             the direction of the x axis.
         force: force (N) along the inward normal, instead of `depth`, which then follows from the
             elasticity of the gel.
-        shift: (2,) displacement (mm) along u and v by which the indenter has moved to this place
-            after it was pressed in; the elastic skin follows as far as friction allows.
+        shift: (2,) displacement (mm) along u and v (see `SensingSurface.directions`) by which the
+            indenter has moved to this place after it was pressed in; the elastic skin follows as
+            far as friction allows.
         twist: rotation (degrees) about the outward normal, counter-clockwise seen from outside,
             after the indenter was pressed in.
     """
@@ -267,36 +268,20 @@ def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> f
     return float(hits.distance[leaving][0])
 
 
-def surface_axes(
-    inward: NDArray[np.float64],
-    surface: SensingSurface,
-    along: tuple[float, float, float] | None = None,
-) -> NDArray[np.float64]:
-    """Return the axes (3, 3) as columns x, y, z at a place of a surface; z points outward and x
-    along u.
-
-    Args:
-        inward: (3,) unit normal there.
-        along: direction in the design's frame that x follows instead of u.
-    """
-    z = -inward
-    way = surface.u_axis
-    if along is not None:
-        way = np.asarray(along, dtype=np.float64)
-        way = way / np.linalg.norm(way)
-    x = way - (way @ z) * z
-    if np.linalg.norm(x) < 1e-6:  # the surface has turned by 90 degrees since the origin
-        x = np.cross(surface.v_axis, z)
-    x = x / np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
 def _axes(
     inward: NDArray[np.float64], surface: SensingSurface, contact: Contact
 ) -> NDArray[np.float64]:
     """Return the indenter's rotated axes (3, 3) as columns: x near u or `along`, z outward."""
     z = -inward
-    x, y, _ = surface_axes(inward, surface, contact.along).T
+    way = surface.u_axis
+    if contact.along is not None:
+        way = np.asarray(contact.along, dtype=np.float64)
+        way = way / np.linalg.norm(way)
+    x = way - (way @ z) * z
+    if np.linalg.norm(x) < 1e-6:  # the surface has turned by 90 degrees since the origin
+        x = np.cross(surface.v_axis, z)
+    x = x / np.linalg.norm(x)
+    y = np.cross(z, x)  # opposite to v: these axes are right-handed seen from outside, u and v not
     a = math.radians(contact.rotation)
     return np.column_stack(
         [math.cos(a) * x + math.sin(a) * y, math.cos(a) * y - math.sin(a) * x, z]

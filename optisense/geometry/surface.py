@@ -75,13 +75,31 @@ class SensingSurface:
         self.v_axis = _in_plane(np.asarray(v_axis, dtype=np.float64), [normal, self.u_axis], "v")
         self._points = lru_cache(maxsize=KEPT_POINTS)(self._point_found)
 
+    def directions(self, inward: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
+        """Return the unit tangents (..., 3) along which u and v grow, for inward normals.
+
+        They are the axes at the origin, turned by the smallest rotation that takes the normal there
+        to the given one. They are perpendicular to each other everywhere, and exact on flat and on
+        cylindrical surfaces.
+
+        Args:
+            inward: (..., 3) unit normals into the gel.
+        """
+        normals = np.asarray(inward, dtype=np.float64)
+        halfway = normals + self._inward
+        cosine = np.maximum(1.0 + normals @ self._inward, 1e-12)
+        u, v = (
+            axis - ((normals @ axis) / cosine)[..., None] * halfway
+            for axis in (self.u_axis, self.v_axis)
+        )
+        return u, v
+
     def tangents(self, inward: NDArray[np.floating]) -> tuple[FloatArray, FloatArray]:
         """Return two perpendicular unit tangents (..., 3) of the surface for inward normals.
 
-        The frame at the origin, with `u_axis` as its first tangent, is turned by the smallest
-        rotation that takes the normal there to the given one. The tangents of neighbouring places
-        are therefore similar all over a dome, except where the surface has turned by 180 degrees.
-        Projections of `u_axis` would change their sign where the surface faces its direction.
+        The first one is that of `directions`. The tangents of neighbouring places are therefore
+        similar all over a dome, except where the surface has turned by 180 degrees. Projections of
+        `u_axis` would change their sign where the surface faces its direction.
 
         On a fingertip, whose wall surrounds its axis, the first tangent points along the meridian
         instead, away from the tip. Lights around the axis then have similar directions in the
@@ -91,9 +109,7 @@ class SensingSurface:
             inward: (..., 3) unit normals into the gel.
         """
         normals = np.asarray(inward, dtype=np.float64)
-        halfway = normals + self._inward
-        cosine = np.maximum(1.0 + normals @ self._inward, 1e-12)
-        first = self.u_axis - ((normals @ self.u_axis) / cosine)[..., None] * halfway
+        first, _ = self.directions(normals)
         if self._has_wall:
             meridian = self._inward - (normals @ self._inward)[..., None] * normals
             length = np.linalg.norm(meridian, axis=-1, keepdims=True)

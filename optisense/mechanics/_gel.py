@@ -14,7 +14,7 @@ from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import Contact, MeshIndenter, SensingSurface, TriangleMesh
-from optisense.geometry.contact import gel_under, locate, surface_axes
+from optisense.geometry.contact import gel_under, locate
 from optisense.geometry.surface import SurfacePoint
 from optisense.mechanics._contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics._deformed_mesh import SkinMesh, skin_mesh
@@ -124,7 +124,7 @@ def _drag(contact: Contact, surface: SensingSurface, place: Footprint) -> Drag |
     """Return the drag of a contact in the frame of its footprint; None if it has none."""
     if contact.shift == (0.0, 0.0) and contact.twist == 0.0:
         return None
-    u, v, _ = surface_axes(-place.axes[:, 2], surface).T
+    u, v = surface.directions(-place.axes[:, 2])
     along = contact.shift[0] * u + contact.shift[1] * v
     return Drag((place.axes.T @ along)[:2], math.radians(contact.twist))
 

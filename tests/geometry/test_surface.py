@@ -51,6 +51,15 @@ def test_on_a_ball_straight_ways_are_great_circles() -> None:
         np.testing.assert_allclose(surface.point_at(u, v).point, expected, atol=1e-2)
 
 
+def test_u_and_v_turn_with_a_cylinder_also_beyond_its_side() -> None:
+    surface = bent(5.0, ball=False)
+    for place in (2.0, 9.0):  # bent down by 23 and by 103 degrees
+        ends = [surface.point_at(place + step, 0.0).point for step in (-0.5, 0.5)]
+        u, v = surface.directions(surface.point_at(place, 0.0).inward)
+        np.testing.assert_allclose(u, ends[1] - ends[0], atol=0.02)
+        np.testing.assert_allclose(v, [0, 1, 0], atol=1e-9)
+
+
 def test_tangents_turn_with_the_surface_without_a_jump_on_a_dome() -> None:
     surface = bent(9.0, ball=True)
     polar, azimuth = np.meshgrid(np.radians(np.linspace(0, 100, 51)), np.linspace(-4, 4, 401))

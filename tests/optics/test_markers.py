@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,6 +68,22 @@ def test_dots_around_a_contact_move_outward(model: OpticalModel, touched: Tactil
     moved = (places.after - places.before) * [18.6 / 160, -18.6 / 160]
     flat = distance > 3.0  # perspective shows deep dots elsewhere
     assert moved[flat] == pytest.approx(motion[flat], abs=0.02)
+
+
+def test_a_dragged_ball_takes_the_skin_along_u_and_v(model: OpticalModel) -> None:
+    ball = Contact(Sphere(3.0), depth=0.5, shift=(0.05, 0.1), twist=2.0)
+    pressed = model.pressed([ball])
+    surface = model.surface
+    axes = np.stack([surface.u_axis, surface.v_axis])
+    middle, right = (surface.point_at(u, 0.0) for u in (0.0, 0.5))
+    points = np.stack([middle.point, right.point])
+    moved = pressed.maps(points, np.stack([middle.inward, right.inward])).displacement
+    at_rest = model.pressed([replace(ball, shift=(0.0, 0.0), twist=0.0)])
+    moved -= at_rest.maps(points, np.stack([middle.inward, right.inward])).displacement
+    assert axes @ moved[0] == pytest.approx([0.05, 0.1], abs=1e-3)
+    # Seen from outside, u turned counter-clockwise by 90 degrees is -v.
+    turned = axes @ (moved[1] - moved[0])
+    assert turned == pytest.approx([0.0, -0.5 * np.radians(2.0)], abs=1e-3)
 
 
 def test_nothing_moves_without_a_contact(model: OpticalModel) -> None:
