@@ -16,6 +16,7 @@ from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact import refuse_no_contacts
 from optisense.mechanics import ELASTIC, SKINS, PressedSkin, SkinMesh
+from optisense.mechanics.skins import refuse_drags
 from optisense.optics._ray_model import RayModel
 from optisense.optics._skin_view import VIEW_ACROSS, SkinView, is_size
 from optisense.optics.backend.interrupts import reraise_interrupts
@@ -205,12 +206,13 @@ class OpticalModel(RayModel):
             The image; ``interrupted`` is set if Ctrl-C ended the tracing early.
 
         Raises:
-            ContactError: a contact is off the surface or deeper than the gel, or `contacts` is no
-                list of contacts.
+            ContactError: a contact is off the surface or deeper than the gel, or has a shift or a
+                twist on a conforming skin, or `contacts` is no list of contacts.
             RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
         """
         refuse_no_contacts(contacts)
         _check_choices(estimator, skin, noise, seconds, seed)
+        refuse_drags(contacts, skin)
         _check_pixels(resolution)
         number = None if photons is None else _photons_of(photons)
         began = time.perf_counter()

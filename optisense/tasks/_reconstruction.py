@@ -19,6 +19,7 @@ from optisense.array_types import FloatArray
 from optisense.errors import TaskError
 from optisense.geometry import Contact, Cylinder, MeshIndenter, Sphere, TriangleMesh
 from optisense.json_values import json_ready
+from optisense.mechanics.skins import refuse_drags
 from optisense.reading.tilts import angles_between
 from optisense.tasks._calibration import LEAST_PIXELS, CalibratedSensor, ReconstructionSettings
 
@@ -203,7 +204,8 @@ def reconstruct(
         progress: function that is called with the number of pictures taken and their total number.
 
     Raises:
-        ContactError: an object is off the surface or deeper than the gel.
+        ContactError: an object is off the surface or deeper than the gel, or has a shift or a
+            twist on a conforming skin.
         TaskError: an object is not seen, too few presses are seen, or a setting is invalid.
     """
     settings = settings or ReconstructionSettings()
@@ -214,6 +216,7 @@ def reconstruct(
         if progress is not None:
             progress(done, count)
 
+    refuse_drags(wanted.values(), settings.skin)
     for contact in wanted.values():
         model.place(contact)  # so that errors are reported before any work
     sensor = CalibratedSensor(model, settings, report)

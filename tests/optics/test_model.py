@@ -17,6 +17,7 @@ from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
 from optisense.optics.radiance_cache._direction_bins import COARSE_BINS
 from optisense.sensors import build
+from optisense.tasks import ReconstructionSettings, reconstruct
 
 PIXELS = (80, 60)
 PHOTONS = 150_000
@@ -297,6 +298,15 @@ def test_an_impossible_limit_or_seed_is_refused(given: Any) -> None:
 def test_an_unknown_skin_is_refused() -> None:
     with pytest.raises(RenderError, match="no kind of skin 'rubber'"):
         model().render([BALL], resolution=PIXELS, photons=PHOTONS, skin="rubber")
+
+
+@pytest.mark.parametrize("motion", [{"shift": (0.0, 0.1)}, {"twist": 5.0}])
+def test_a_conforming_skin_refuses_to_be_dragged(motion: dict[str, Any]) -> None:
+    ball = Contact(Sphere(1.5), **motion)
+    with pytest.raises(ContactError, match="a shift or a twist"):
+        model().render([ball], PIXELS, PHOTONS, skin="conforming")
+    with pytest.raises(ContactError, match="a shift or a twist"):
+        reconstruct(model(), ReconstructionSettings(skin="conforming"), {"ball": ball})
 
 
 def test_run_settings_tell_the_force() -> None:
