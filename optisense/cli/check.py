@@ -41,6 +41,8 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         output.print(f"note: {sentence}")
     if any(part.role == "mirror" for part in sensor.parts.values()):
         warnings += _print_views(sensor)
+    if sensor.markers is not None:
+        warnings += _print_markers(sensor)
     if contacts:
         from optisense.optics import OpticalModel
 
@@ -90,6 +92,24 @@ def _print_views(design: SensorDesign) -> int:
     for problem in problems:
         output.print(f"warning: {problem}", style="yellow")
     return len(problems)
+
+
+def _print_markers(design: SensorDesign) -> int:
+    """Print how many markers lie off the skin.
+
+    Returns:
+        The number of warnings.
+    """
+    try:
+        from optisense.optics import OpticalModel
+
+        found = OpticalModel(design).marker_notes()
+    except SetupError as error:  # the rest of the check needs no renderer
+        output.print(f"note: its markers are not checked: {error}", style="yellow")
+        return 0
+    for note in found:
+        output.print(f"warning: {note}", style="yellow")
+    return len(found)
 
 
 def _describe(design: SensorDesign) -> int:

@@ -88,6 +88,7 @@ def render(
         interrupt.raise_if_requested()
         line.begin(BUILDING)
         model = OpticalModel(sensor, variant=variant)
+        print_notes(model.marker_notes())
         interrupt.raise_if_requested()
 
         def report_progress(progress: RenderProgress) -> None:

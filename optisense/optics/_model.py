@@ -29,7 +29,7 @@ from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.image_layers import ImageLayers
 from optisense.optics.imaging.known_view import KnownView
 from optisense.optics.imaging.lamp_images import LampImages
-from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor
+from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor, off_skin_notes
 from optisense.optics.imaging.sampling import PixelImportance, SamplingPlan
 from optisense.optics.imaging.tactile_image import RADIANCE_UNIT, TactileImage
 from optisense.optics.radiance_cache.lit_scene import LitScene
@@ -251,11 +251,14 @@ class OpticalModel(RayModel):
         ended = time.perf_counter()
         on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
         image = self._image(layers, view, contacts)
+        notes = self._design.camera.shape_notes((camera.width, camera.height))
+        if self._design.markers is not None and image.markers is not None:
+            notes += off_skin_notes(self._design.markers, image.markers.coordinates)
         image.settings = {
             "design": self._design.name,
             "seed": seed,
             "resolution": [camera.width, camera.height],
-            "notes": self._design.camera.shape_notes((camera.width, camera.height)),
+            "notes": notes,
             "estimator": estimator,
             "units": {"radiance": RADIANCE_UNIT, "length": "mm"},
             "photons": layers.photons,

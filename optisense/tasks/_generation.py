@@ -280,7 +280,10 @@ class _Maker:
             "versions": image.settings["versions"],
             "units": {"length": "mm", "angle": "degrees", "radiance": "mW/(mm^2 sr)"},
             "columns": NUMBER_COLUMNS,
-            "notes": self._model.design.camera.shape_notes(self._resolution),
+            "notes": [
+                *self._model.design.camera.shape_notes(self._resolution),
+                *self._model.marker_notes(),
+            ],
             "camera": camera_model(self._model.design.camera, rays),
         }
         write_json(self._folder / INFO, info, "the dataset")  # last: makes the folder a dataset

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from optisense import OpticalModel, load
-from optisense.design import Markers
+from optisense.cli.app import app
+from optisense.design import Markers, save_design
 from optisense.errors import OptiSenseError
 from optisense.geometry import Contact, Sphere
 from optisense.optics.imaging.markers import MarkerDots, _between_pixels, ink_factor
@@ -104,9 +106,17 @@ def test_a_table_of_them_is_saved_and_goes_with_them(
     assert not (tmp_path / "markers.csv").exists()
 
 
-def test_dots_beyond_the_edge_are_left_out(model: OpticalModel) -> None:
-    markers = Markers(places=[(0.0, 0.0), (50.0, 0.0)], radius=0.2)
-    assert len(MarkerDots.on(markers, model.surface).points) == 1
+def test_dots_beyond_the_edge_are_left_out_with_a_note(model: OpticalModel, tmp_path: Path) -> None:
+    design = model.design.copy()
+    design.markers = Markers(places=[(0.0, 0.0), (50.0, 0.0)], radius=0.2)
+    assert len(MarkerDots.on(design.markers, model.surface).points) == 1
+    notes = OpticalModel(design).render([], (16, 12), photons=2_000).settings["notes"]
+    assert notes == ["1 of 2 markers lies off the sensing surface, and no picture has them"]
+    assert model.marker_notes() == []
+    save_design(design, tmp_path / "dotted")
+    run = CliRunner().invoke(app, ["check", str(tmp_path / "dotted")])
+    assert f"warning: {notes[0]}" in " ".join(run.stdout.split())
+    assert "1 warning" in run.stdout
 
 
 @pytest.mark.parametrize(

@@ -143,6 +143,20 @@ class MarkerDots:
         return MarkerPlaces(self.coordinates, self.pixels(at_rest), after, displacement)
 
 
+def off_skin_notes(markers: Markers, on_skin: FloatArray) -> list[str]:
+    """Return a note on the markers that lie off the skin; none if all lie on it.
+
+    Args:
+        on_skin: (n, 2) coordinates of those on it, as of `MarkerDots`.
+    """
+    every = len(markers.coordinates())
+    off = every - len(on_skin)
+    if off == 0:
+        return []
+    lie = "lies" if off == 1 else "lie"
+    return [f"{off} of {every} markers {lie} off the sensing surface, and no picture has them"]
+
+
 def ink_factor(markers: Markers, coating: CoatingModel) -> FloatArray:
     """Return the ratio (3,) of the reflectance of a dot's ink to that of the coating at normal
     incidence, for R, G, B.
