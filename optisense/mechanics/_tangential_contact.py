@@ -29,15 +29,14 @@ class Drag(NamedTuple):
     twist: float
 
     def displacement(self, x: FloatArray, y: FloatArray) -> FloatArray:
-        """Return the displacement (2, rows, columns), mm, of sticking skin at x and y."""
+        """Return the displacement (2, rows, columns), mm, of sticking skin at x and y.
+
+        It is that of many small turns in a row, all about the places where the skin is at rest: the
+        twist times the distance from the axis, at right angles to it. The chord of the whole turn
+        would vanish after a full one, and the torque with it.
+        """
         across, along = np.meshgrid(x, y)
-        cosine, sine = np.cos(self.twist), np.sin(self.twist)
-        return np.stack(
-            [
-                self.shift[0] + across - (cosine * across + sine * along),
-                self.shift[1] + along - (cosine * along - sine * across),
-            ]
-        )
+        return np.stack([self.shift[0] - self.twist * along, self.shift[1] + self.twist * across])
 
 
 def solve_shear(

@@ -66,6 +66,14 @@ def test_a_turned_ball_takes_the_torque_of_reissner_and_sagoci(hertz):
     assert torque == pytest.approx(16 / 3 * GEL.shear_modulus * a**3 * angle, rel=0.03)
 
 
+@pytest.mark.parametrize("twist", [180.0, 360.0])
+def test_a_ball_that_is_turned_far_slips_everywhere(twist):
+    contact = pressed(twist=twist).contacts[0]
+    distance = np.hypot(contact.place.x, contact.place.y[:, None])
+    slipping = 0.5 * (contact.pressure * distance).sum() * contact.place.pitch**2
+    assert contact.torque == pytest.approx(slipping, rel=1e-3)
+
+
 def test_the_skin_under_a_dragged_ball_goes_along_and_less_beside_it():
     dragged, resting = pressed(friction=2.0, shift=(0.1, 0.0)), pressed()
     points = np.array([[0.0, 0.0, -0.6], [2.5, 0.0, 0.0], [6.0, 0.0, 0.0]])
