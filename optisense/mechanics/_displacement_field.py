@@ -163,21 +163,30 @@ class DisplacementField:
             result[known] += self._beyond.value(x[known], y[known])
         return result
 
+    def normal(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the displacement (3, n), mm, outward of points of the tangent plane."""
+        return np.stack([np.zeros(len(x)), np.zeros(len(x)), -self.depth(x, y)])
+
+    def sheared(self, shear: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Return the displacement (3, n), mm, along x and y of points of the tangent plane by a
+        shear (2, rows, columns), MPa, alone.
+        """
+        splines = [
+            (GridSpline(along_x, *start), GridSpline(along_y, *start))
+            for (response, _, start), each in zip(self._loads, self._on_grids(shear), strict=True)
+            for along_x, along_y in [response.tangential(each)]
+        ]
+        beyond = None
+        if self._patch is not None:
+            loads = np.concatenate([shear, np.zeros((1, *self._pressure.shape))])
+            beyond = tangential_beyond(self._patch, loads, self.place, self._shear_modulus)
+        found = _along(splines, beyond, x, y)
+        return np.concatenate([found, np.zeros((1, len(x)))])
+
     def tangential(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the displacement (2, n), mm, of points of the tangent plane along x and y."""
-        result = np.zeros((2, len(x)))
-        (near, near_y), (far, far_y) = self._tangential_splines
-        close = near.holds(x, y)
-        reached = ~close & far.holds(x, y)
-        for where, splines in ((close, (near, near_y)), (reached, (far, far_y))):
-            if where.any():
-                for k, spline in enumerate(splines):
-                    result[k, where] = spline.value(x[where], y[where])
-        if self._patch is not None:
-            known = self._tangential_beyond[0].holds(x, y)
-            for k, spline in enumerate(self._tangential_beyond):
-                result[k, known] += spline.value(x[known], y[known])
-        return result
+        beyond = None if self._patch is None else self._tangential_beyond
+        return _along(self._tangential_splines, beyond, x, y)
 
     @cached_property
     def _fine(self) -> LimitedSpline:
@@ -202,19 +211,19 @@ class DisplacementField:
 
     @cached_property
     def _tangential_splines(self) -> list[tuple[GridSpline, GridSpline]]:
-        """Return splines of the displacements along x and y on the fine and the coarse grid."""
+        shears = [None, None] if self.shear is None else self._on_grids(self.shear)
         found = []
-        shears: list[FloatArray | None] = [None, None]
-        if self.shear is not None:
-            _, (wide, _, start) = self._loads
-            shears[0] = np.pad(self.shear, ((0, 0), *((self._ring, self._ring),) * 2))
-            shears[1] = np.stack(
-                [binned(s, self.place, start[:2], start[2], wide.shape) for s in self.shear]
-            )
         for (response, pressure, start), shear in zip(self._loads, shears, strict=True):
             along_x, along_y, _ = response.displacement(pressure, shear)
             found.append((GridSpline(along_x, *start), GridSpline(along_y, *start)))
         return found
+
+    def _on_grids(self, shear: FloatArray) -> list[FloatArray]:
+        """Return a shear (2, rows, columns) on the fine and the coarse grid."""
+        _, (wide, _, start) = self._loads
+        coarse = [binned(each, self.place, start[:2], start[2], wide.shape) for each in shear]
+        ring = self._ring
+        return [np.pad(shear, ((0, 0), (ring, ring), (ring, ring))), np.stack(coarse)]
 
     def pressure(self, x: FloatArray, y: FloatArray) -> FloatArray:
         """Return the pressure (n,), MPa, at points of the tangent plane."""
@@ -320,3 +329,30 @@ def tangential_beyond(
     coarse = np.stack([binned(a, place, start, pitch, patch.shape) for a in loads])
     along_x, along_y = patch.tangential(coarse * pitch**2 / shear_modulus)
     return GridSpline(along_x, *start, pitch), GridSpline(along_y, *start, pitch)
+
+
+def _along(
+    splines_of_grids: list[tuple[GridSpline, GridSpline]],
+    beyond: tuple[GridSpline, GridSpline] | None,
+    x: FloatArray,
+    y: FloatArray,
+) -> FloatArray:
+    """Return the displacement (2, n), mm, along x and y at points of the tangent plane.
+
+    Args:
+        splines_of_grids: its splines on the fine and on the coarse grid.
+        beyond: splines of the contribution of the gel's shape, if it has one.
+    """
+    result = np.zeros((2, len(x)))
+    (near, near_y), (far, far_y) = splines_of_grids
+    close = near.holds(x, y)
+    reached = ~close & far.holds(x, y)
+    for where, splines in ((close, (near, near_y)), (reached, (far, far_y))):
+        if where.any():
+            for k, spline in enumerate(splines):
+                result[k, where] = spline.value(x[where], y[where])
+    if beyond is not None:
+        known = beyond[0].holds(x, y)
+        for k, spline in enumerate(beyond):
+            result[k, known] += spline.value(x[known], y[known])
+    return result

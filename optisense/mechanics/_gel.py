@@ -18,6 +18,7 @@ from optisense.geometry.contact import gel_under, locate
 from optisense.geometry.surface import SurfacePoint
 from optisense.mechanics._contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics._deformed_mesh import SkinMesh, skin_mesh
+from optisense.mechanics._dragged_skin import dragged
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._footprint import POINTS_ACROSS, Footprint, NoFootprintError, footprint
 from optisense.mechanics._gel_patches import GelPatches
@@ -221,7 +222,7 @@ class Gel:
                 _drag(contact, self._surface, place)
                 for contact, place in zip(contacts, places, strict=True)
             ]
-            pressed = press(places, self._elasticity, patches, drags)
+            pressed = dragged(press(places, self._elasticity, patches), drags, patches)
             warned = tuple(
                 replace(each, warning=self._rims.warning(each.place, patch))
                 for each, patch in zip(pressed.contacts, patches, strict=True)

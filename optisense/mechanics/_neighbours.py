@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from optisense.array_types import FloatArray
-from optisense.mechanics._displacement_field import DisplacementField
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._grid_spline import GridSpline
 
@@ -17,8 +16,15 @@ SPARSE = 4
 contacts are computed: a sixteenth of a contact, over which they change little."""
 
 
+ALONG, OUTWARD = (0, 1), 2
+"""Numbers of the axes of a footprint: x and y along the skin, and z out of the sensor."""
+
+
 class Neighbours:
-    """The displacements of each contact's grid by the other contacts."""
+    """The displacements (mm) of each contact's grid by the other contacts.
+
+    They are given and returned along the axes of a contact's footprint.
+    """
 
     def __init__(self, places: Sequence[Footprint]) -> None:
         """Set the footprints of all contacts, none of which is solved yet."""
@@ -26,25 +32,37 @@ class Neighbours:
         self._points = [_sparse(place) for place in places]
         self._caused: list[dict[int, FloatArray]] = [{} for _ in places]
 
-    def set_field(self, number: int, field: DisplacementField) -> None:
-        """Set the displacement of a contact that was solved, which replaces an earlier one."""
+    def set_displacement(
+        self, number: int, moved: Callable[[FloatArray, FloatArray], FloatArray]
+    ) -> None:
+        """Set the displacement by a contact that was solved, which replaces an earlier one.
+
+        Args:
+            moved: function that returns the displacement (3, n) at coordinates x and y (n,) of the
+                contact's tangent plane.
+        """
         others = [k for k in range(len(self._places)) if k != number]
         if not others:
             return
         place = self._places[number]
         local = place.local(np.concatenate([self._points[k].reshape(-1, 3) for k in others]))
-        depths = field.depth(local[:, 0], local[:, 1])
+        every = moved(local[:, 0], local[:, 1])
         self._caused[number] = {}
         for k in others:
             shape = self._points[k].shape[:2]
-            depth, depths = np.split(depths, [shape[0] * shape[1]])
-            upright = max(float(place.axes[:, 2] @ self._places[k].axes[:, 2]), 0.0)
-            self._caused[number][k] = upright * depth.reshape(shape)
+            each, every = np.split(every, [shape[0] * shape[1]], axis=1)
+            turn = self._places[k].axes.T @ place.axes
+            found = turn @ each if turn[2, 2] > 0.0 else np.zeros_like(each)
+            self._caused[number][k] = found.reshape(3, *shape)
 
-    def at(self, number: int) -> FloatArray:
-        """Return the inward displacement (rows, columns), mm, on a contact's grid due to others."""
+    def at(self, number: int, axis: int) -> FloatArray:
+        """Return the displacement (rows, columns), mm, on a contact's grid due to others.
+
+        Args:
+            axis: axis along which it is returned, one of `ALONG` or `OUTWARD`.
+        """
         place = self._places[number]
-        caused = [at_places[number] for at_places in self._caused if number in at_places]
+        caused = [at_places[number][axis] for at_places in self._caused if number in at_places]
         if not caused:
             return np.zeros(place.overlap.shape)
         x, y = np.meshgrid(place.x, place.y)

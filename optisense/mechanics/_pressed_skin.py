@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,13 +14,12 @@ from optisense.errors import ContactError
 from optisense.mechanics._displacement_field import (
     DisplacementField,
     grid_response,
-    tangential_beyond,
 )
 from optisense.mechanics._elasticity import Elasticity
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._gel_patch import GelPatch
 from optisense.mechanics._grid_spline import GridSpline, binned
-from optisense.mechanics._neighbours import Neighbours
+from optisense.mechanics._neighbours import OUTWARD, Neighbours
 from optisense.mechanics._normal_contact import (
     TOLERANCE,
     NormalContact,
@@ -28,7 +27,6 @@ from optisense.mechanics._normal_contact import (
     solve_normal_contact,
 )
 from optisense.mechanics._relaxation import Relaxation
-from optisense.mechanics._tangential_contact import Drag, solve_shear
 
 SETTLED = 1e-4
 """Change (mm) of the displacements that contacts cause at each other at which the iteration over
@@ -216,9 +214,8 @@ def press(
     places: Sequence[Footprint],
     elasticity: Elasticity,
     patches: Sequence[GelPatch | None] | None = None,
-    drags: Sequence[Drag | None] | None = None,
 ) -> PressedSkin:
-    """Press indenters into a gel without friction, and then drag them with friction.
+    """Press indenters into a gel without friction.
 
     Around each contact the gel is a flat layer of the local thickness, bonded to a rigid base,
     corrected for its shape by a patch. Contacts change each other's overlap, so they are solved in
@@ -227,10 +224,9 @@ def press(
     Args:
         places: the footprint of each indenter on the undeformed skin.
         patches: the gel's shape around each place; None where it is a flat layer.
-        drags: the motion of each indenter along the skin after its press; None without one.
 
     Raises:
-        ContactError: a pressure or a shear does not converge; the error tells the residual.
+        ContactError: a pressure does not converge; the error tells the residual.
     """
     contacts: list[Pressed | None] = [None] * len(places)
     overlaps = [place.overlap for place in places]
@@ -239,7 +235,7 @@ def press(
     for _ in range(MAX_SWEEPS):
         change = 0.0
         for i, place in enumerate(places):
-            overlap = place.overlap - neighbours.at(i)
+            overlap = place.overlap + neighbours.at(i, OUTWARD)
             before = contacts[i]
             if before is not None:
                 moved = float(np.abs(overlap - overlaps[i]).max())
@@ -253,48 +249,16 @@ def press(
             patch = None if patches is None else patches[i]
             solved = _pressed(place, overlap, elasticity, patch, before, tolerances[i])
             contacts[i] = solved
-            neighbours.set_field(i, solved.field)
+            neighbours.set_displacement(i, solved.field.normal)
         if change < SETTLED or len(places) == 1:
             break
     else:
-        _refuse_unsettled("the pressures under several indenters", MAX_SWEEPS, change)
+        refuse_unsettled("the pressures under several indenters", MAX_SWEEPS, change)
     done = [each for each in contacts if each is not None]
-    for i, drag in enumerate(drags or ()):
-        if drag is not None:
-            patch = None if patches is None else patches[i]
-            done[i] = _dragged(done[i], drag, elasticity, patch)
     return PressedSkin(tuple(done), elasticity)
 
 
-def _dragged(
-    contact: Pressed, drag: Drag, elasticity: Elasticity, patch: GelPatch | None
-) -> Pressed:
-    """Return a contact after a drag; shear and the correction for the gel's shape are iterated."""
-    place = contact.place
-    response = grid_response(contact.pressure.shape, place.pitch, place.thickness, elasticity)
-    wanted = drag.displacement(place.x, place.y)
-    shear = solve_shear(response, contact.pressure, elasticity.friction, wanted)
-    x, y = (each.ravel() for each in np.meshgrid(place.x, place.y))
-    beyond = np.zeros_like(wanted)
-    relaxation = Relaxation(beyond)
-    for _ in range(MAX_TURNS):
-        if patch is None or not shear.any():
-            break
-        loads = np.concatenate([shear, np.zeros((1, *place.overlap.shape))])
-        splines = tangential_beyond(patch, loads, place, elasticity.shear_modulus)
-        found = np.stack([each.value(x, y) for each in splines]).reshape(wanted.shape)
-        change = float(np.abs(found - beyond).max())
-        beyond = relaxation.next(found)
-        shear = solve_shear(response, contact.pressure, elasticity.friction, wanted - beyond, shear)
-        if change < SETTLED:
-            break
-    else:
-        _refuse_unsettled("the shear under an indenter", MAX_TURNS, change)
-    contact.field.shear = shear
-    return replace(contact, shear=shear)
-
-
-def _refuse_unsettled(what: str, turns: int, change: float) -> None:
+def refuse_unsettled(what: str, turns: int, change: float) -> None:
     """Refuse the result of an iteration that ends far from its solution.
 
     Args:
@@ -361,7 +325,7 @@ def _pressed(
         if change < SETTLED or stalled:
             break
     else:
-        _refuse_unsettled("the pressure under an indenter", MAX_TURNS, change)
+        refuse_unsettled("the pressure under an indenter", MAX_TURNS, change)
     field = DisplacementField(place, overlap - beyond, solved.pressure, elasticity, spline, patch)
     return Pressed(place, solved.pressure, field, beyond=values)
 

@@ -9,6 +9,7 @@ from optisense.errors import ContactError
 from optisense.geometry import Contact, Plane, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
 from optisense.mechanics import Elasticity, Gel
+from optisense.mechanics import _dragged_skin as dragged_skin
 from optisense.mechanics import _normal_contact as normal_contact
 from optisense.mechanics import _pressed_skin as pressed_skin
 from optisense.mechanics import _tangential_contact as tangential_contact
@@ -39,7 +40,7 @@ def press(at=MIDDLE, neighbour=None, **motion):
         ),
         (pressed_skin, "MAX_TURNS", 1, {"at": CORNER}, r"moved the skin by (\S+) mm"),
         (
-            pressed_skin,
+            dragged_skin,
             "MAX_TURNS",
             3,
             {"at": BESIDE_SIDES, "shift": (0.5, 0.5)},

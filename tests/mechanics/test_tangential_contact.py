@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.errors import ContactError
-from optisense.geometry import Contact, SensingSurface, Sphere, TriangleMesh
+from optisense.geometry import Contact, MeshIndenter, SensingSurface, Sphere, TriangleMesh
 from optisense.geometry.contact import place
 from optisense.geometry.contact_text import parse_contact
 from optisense.mechanics import Elasticity, Gel
@@ -21,9 +21,13 @@ SURFACE = SensingSurface(TOP, (0, 0, 0), (1, 0, 0), (0, 1, 0))
 
 
 def pressed(friction=0.5, **motion):
+    return pressed_in([Contact(Sphere(3.0), at=(0.0, 0.0), depth=0.6, **motion)], friction)
+
+
+def pressed_in(contacts, friction=0.5):
     gel = Elasticity(0.4, 0.49, friction)
     body = Gel(SURFACE, TOP, [BLOCK], gel, lambda contact: place(contact, SURFACE, BLOCK))
-    return body.pressed([Contact(Sphere(3.0), at=(0.0, 0.0), depth=0.6, **motion)])
+    return body.pressed(contacts)
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +89,29 @@ def test_the_skin_under_a_dragged_ball_goes_along_and_less_beside_it():
     assert moved[0][:, 2] == pytest.approx(moved[1][:, 2], abs=1e-9)
     assert dragged.contacts[0].shear_force[0] > 0.05
     assert dragged.contacts[0].force == resting.contacts[0].force
+
+
+def test_two_balls_that_are_dragged_together_are_dragged_as_one_body():
+    drag = {"depth": 0.5, "shift": (0.05, 0.0)}
+    sides = -1.6, 1.6
+    pair = pressed_in([Contact(Sphere(1.5), at=(x, 0.0), **drag) for x in sides])
+    ball = Sphere(1.5).mesh(1.5, 1e-3)
+    body = TriangleMesh.joined([ball.transformed(translation(x)) for x in sides])
+    (whole,) = pressed_in([Contact(MeshIndenter(body), at=(0.0, 0.0), **drag)]).contacts
+    along = sum(contact.shear_force[0] for contact in pair.contacts)
+    assert along == pytest.approx(whole.shear_force[0], rel=0.02)  # each alone: 16 % more
+    # The skin under each ball moves with it, whatever the other one does.
+    points = np.array([[x, 0.0, -0.5] for x in sides])
+    inward = np.tile([0.0, 0.0, -1.0], (2, 1))
+    at_rest = pressed_in([Contact(Sphere(1.5), at=(x, 0.0), depth=0.5) for x in sides])
+    moved = pair.maps(points, inward).displacement - at_rest.maps(points, inward).displacement
+    assert moved[:, 0] == pytest.approx(0.05, abs=1e-3)
+
+
+def translation(x):
+    pose = np.eye(4)
+    pose[0, 3] = x
+    return pose
 
 
 def test_friction_bounds_the_force_and_none_gives_none():
