@@ -349,6 +349,13 @@ class OpticalModel(RayModel):
         untouched = self.chief_rays((camera.width, camera.height))
         return factor.astype(np.float32), dots.places(untouched, material, moved)
 
+    def marker_notes(self) -> list[str]:
+        """Return a note on the design's markers that lie off the skin; none if all lie on it."""
+        markers = self._design.markers
+        if markers is None:
+            return []
+        return off_skin_notes(markers, MarkerDots.on(markers, self.surface).coordinates)
+
     def _render_sppm(
         self,
         view: ContactView,

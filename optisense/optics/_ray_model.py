@@ -15,7 +15,6 @@ from optisense.optics._skin_view import SkinView, ray_camera
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import keep_freed_memory
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging.markers import MarkerDots, off_skin_notes
 from optisense.optics.scene.assembly import Assembly, assemble
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene
@@ -210,13 +209,6 @@ class RayModel:
             return trace_chief_rays(self._deformed_scenes(contacts).full, camera)
         placed = [self.place(contact) for contact in contacts]
         return trace_chief_rays(self.scenes.with_indenters(placed), camera, fine.sensing_faces)
-
-    def marker_notes(self) -> list[str]:
-        """Return a note on the design's markers that lie off the skin; none if all lie on it."""
-        markers = self._design.markers
-        if markers is None:
-            return []
-        return off_skin_notes(markers, MarkerDots.on(markers, self.surface).coordinates)
 
     def views_by_mirrors(self, resolution: tuple[int, int]) -> dict[frozenset[str], float]:
         """Return the shares of the camera's view by set of mirrors.
