@@ -65,6 +65,32 @@ class SquareRoot(CameraResponse):
         return np.sqrt(linear)
 
 
+class Halved(FullWellResponse):
+    """A sensor that reads half of the light."""
+
+    kind: Literal["test-halved"] = "test-halved"  # type: ignore[assignment]
+
+    def respond(self, exposed: Any, width: int | None = None) -> Any:
+        return 0.5 * super().respond(exposed, width)
+
+
+class FilledByHalf(FullWellResponse):
+    """A sensor whose pixels take half of the light."""
+
+    kind: Literal["test-filled-by-half"] = "test-filled-by-half"  # type: ignore[assignment]
+
+    def filled(self, exposed: Any, width: int | None = None) -> Any:
+        return super().filled(0.5 * exposed, width)
+
+
+@pytest.mark.parametrize("response", [Halved(), FilledByHalf()])
+def test_whatever_a_kind_overrides_counts_with_stray_light(response: CameraResponse) -> None:
+    light = np.full((4, 4, 3), 0.6, dtype=np.float32)
+    assert PictureChain(response).respond(light) == pytest.approx(0.3)
+    stray = PictureChain(response, stray_light=(0.1, 0.1, 0.1))
+    assert stray.respond(light) == pytest.approx(0.4)
+
+
 def test_an_image_is_stored_as_its_camera_does() -> None:
     light = np.random.default_rng(2).random((5, 7, 3)).astype(np.float32)
     chain = PictureChain(SquareRoot())

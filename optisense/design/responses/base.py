@@ -19,6 +19,9 @@ EXPOSURE_TARGET = 0.55
 the brightest channel; it leaves room for highlights.
 """
 
+_READINGS = {"respond", "filled"}
+"""Methods that turn exposed levels into those of the sensor; a kind may override either or both."""
+
 
 class CameraResponse(KindModel):
     """Conversion of linear radiance into the picture that a camera stores; each kind is a subclass.
@@ -55,6 +58,20 @@ class CameraResponse(KindModel):
             width: number of pixels across the whole picture, if `exposed` is a part of it.
         """
         return self.respond(exposed, width)
+
+    def light_in_pixels(self, exposed: FloatingArray, width: int | None = None) -> FloatingArray:
+        """Return the levels (h, w, 3) of light in the sensor's pixels, to which noise is added.
+
+        They are those of `filled`, or of `respond` if a subclass of another kind overrides only
+        that: the inherited `filled` would leave the override out.
+
+        Args:
+            exposed: exposed levels (h, w, 3) of the picture or a part of it.
+            width: number of pixels across the whole picture, if `exposed` is a part of it.
+        """
+        last = next(kind for kind in type(self).__mro__ if vars(kind).keys() & _READINGS)
+        reading = self.filled if "filled" in vars(last) else self.respond
+        return reading(exposed, width)
 
     def full_level(self) -> float:
         """Return the exposed level above which a channel is overexposed."""

@@ -147,7 +147,7 @@ class PictureChain:
         place = window or PictureWindow.whole(*exposed.shape[:2])
         if self.is_plain:
             return self.response.respond(exposed, place.width)
-        level = self.response.filled(self._on_sensor(exposed, place), place.width)
+        level = self.response.light_in_pixels(self._on_sensor(exposed, place), place.width)
         return self._processed(self._read(level, place, seed), place)
 
     def linear(self, exposed: FloatingArray) -> NDArray[np.float32]:
