@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import closing
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,8 +19,6 @@ from optisense.errors import ContactError, TaskError
 from optisense.folders import LOCK_FILE, FolderLock, held
 from optisense.geometry import Contact, Indenter
 from optisense.library import with_own_lights
-from optisense.mechanics import CONFORMING
-from optisense.optics.estimators import current_name
 from optisense.picture_files import write_picture
 from optisense.reading.camera_noise import add_camera_noise
 from optisense.reading.untouched import UntouchedSurface
@@ -33,12 +31,12 @@ from optisense.tasks._records import CsvTable, refuse_differences, write_whole
 from optisense.tasks._splits import split_of
 from optisense.tasks.dataset import BACKGROUND, CAMERA, DESIGN, Dataset
 from optisense.tasks.dataset_tables import (
+    COLUMNS,
     FAILURES,
     INFO,
     LABELS,
     NUMBER_COLUMNS,
     SCHEMA_VERSION,
-    columns_of,
     read_failures,
     read_info,
     read_labels,
@@ -90,7 +88,7 @@ def generate(
         The dataset. Contacts that could not be made are among its failures.
 
     Raises:
-        TaskError: the folder holds a dataset with other settings.
+        TaskError: the folder holds a dataset with other settings, or of another release.
         FolderInUseError: another process is writing to the folder.
         ContactError, MeshError: an indenter cannot be read.
         OutputError: the folder holds something else, or a file cannot be written.
@@ -137,13 +135,11 @@ class _Maker:
         self._exposure = self._exposure_of_all(lock)
         rays = model.chief_rays(self._resolution)
         self._untouched = UntouchedSurface.of(rays)
-        if not (folder / CAMERA).exists():  # release 0.1 wrote no such file
-            self._write_arrays(CAMERA, ray_arrays(rays))
         self._places = Places.of(model, self._resolution)
         self._larger_than_view = {
             text for text, each in self._indenters.items() if not self._fits(each)
         }
-        self._labels = CsvTable(folder / LABELS, columns_of(folder))
+        self._labels = CsvTable(folder / LABELS, COLUMNS)
         self._failures = CsvTable(folder / FAILURES, ("index", "reason"))
         self._labelled = {row["index"] for row in read_labels(folder)}
         self._failed = {int(row["index"]) for row in read_failures(folder)}
@@ -236,17 +232,16 @@ class _Maker:
     def _exposure_of_all(self, lock: FolderLock) -> float:
         """Check or write the data common to all samples; return the exposure."""
         info_file = self._folder / INFO
-        before = read_info(self._folder) if info_file.exists() else None
-        if before is not None and "skin" not in before["settings"]:
-            # Release 0.1 had the conforming skin only; its datasets are continued with it.
-            self._settings = replace(self._settings, skin=CONFORMING)
         common = self._common()
-        if before is not None:
-            kept = before["settings"]  # release 0.1 had no margin and other estimator names
-            kept["contacts"].setdefault("margin", 0.0)
-            kept["estimator"] = current_name(kept["estimator"])
-            kept.setdefault("skin", CONFORMING)
-            kept.setdefault("hold_out", [])
+        if info_file.exists():
+            before = read_info(self._folder)
+            if before.get("drawing") != DRAWING:
+                raise TaskError(
+                    "the dataset was made by another release, which drew contacts and splits in "
+                    "another way",
+                    where=str(self._folder),
+                    hint="Start a new folder; this dataset can be read, but not be continued",
+                )
             known = {key: before.get(key) for key in common}
             known["design"] = design_values(load_design(self._folder / DESIGN))
             now = common | {"design": design_values(with_own_lights(self._model.design))}

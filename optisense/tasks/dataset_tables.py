@@ -11,7 +11,7 @@ from optisense.errors import TaskError
 from optisense.tasks._records import read_object, read_rows
 from optisense.tasks._splits import SPLITS
 from optisense.text import brief
-from optisense.untrusted_files import COPY_AGAIN, MOST_TABLE, first_problem, read_text
+from optisense.untrusted_files import COPY_AGAIN, first_problem
 
 SCHEMA_VERSION = 1
 """Version of the format of a dataset's folder; it is raised when older programs cannot read it."""
@@ -39,8 +39,7 @@ NUMBER_COLUMNS = {
     "pressure": "MPa, the greatest; empty for a conforming skin",
 }
 LATER_COLUMNS = {"force": "", "area": "", "pressure": "", "cut": "-1", "split": ""}
-"""Columns that tables of release 0.1 lack, with their default values; such tables can be read, and
-are continued without these columns."""
+"""Columns that tables of release 0.1 lack, with their default values; such tables can be read."""
 COLUMNS = (
     "file_name",
     "index",
@@ -54,9 +53,6 @@ COLUMNS = (
     "split",
 )
 """Columns of `LABELS`; the first is the one that common loaders of image folders expect."""
-FIRST_COLUMNS = tuple(name for name in COLUMNS if name not in LATER_COLUMNS)
-"""Columns of `LABELS` in release 0.1."""
-
 
 FiniteNumber = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -153,13 +149,6 @@ def read_failures(folder: Path) -> list[dict[str, str]]:
 
 
 ROW_AGAIN = "Delete the line; the command that made the dataset then makes the sample again"
-
-
-def columns_of(folder: Path) -> tuple[str, ...]:
-    """Return the columns of `LABELS` in a folder: all, or those of release 0.1 in its file."""
-    path = folder / LABELS
-    begun = read_text(path, MOST_TABLE, TaskError, "the table") if path.exists() else ""
-    return FIRST_COLUMNS if begun.startswith(",".join(FIRST_COLUMNS) + "\n") else COLUMNS
 
 
 def _typed(row: dict[str, str], where: str) -> dict[str, Any]:

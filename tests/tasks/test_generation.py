@@ -196,18 +196,6 @@ def test_other_settings_and_other_designs_are_refused(made: Dataset, mini: Optic
     assert len(Dataset.load(made.folder)) == COUNT
 
 
-def test_samples_of_another_drawing_are_not_mixed_in(
-    made: Dataset, mini: OpticalModel, tmp_path: Path
-) -> None:
-    folder = Path(shutil.copytree(made.folder, tmp_path / "older"))
-    info = json.loads((folder / "dataset.json").read_text())
-    del info["drawing"]
-    (folder / "dataset.json").write_text(json.dumps(info))
-    with pytest.raises(TaskError, match="drawing"):
-        generate(mini, folder, COUNT + 1, SETTINGS)
-    assert len(Dataset.load(folder)) == COUNT
-
-
 def test_where_numbers_come_from_does_not_matter(made: Dataset) -> None:
     same: SensorDesign = load("gelsight-mini-ideal")
     same.provenance.clear()
@@ -331,20 +319,6 @@ def test_an_indenter_larger_than_the_view_keeps_no_margin(
     assert all(edge_distance(sample.mask) == 0 for sample in made)
 
 
-def test_a_dataset_of_a_release_without_margins_goes_on_without_one(
-    mini: OpticalModel, tmp_path: Path
-) -> None:
-    settings = DatasetSettings(ContactDraw(margin=0.0), resolution=(60, 45), photons=FEW)
-    generate(mini, tmp_path / "old", 1, settings)
-    file = tmp_path / "old" / "dataset.json"
-    info = json.loads(file.read_text())
-    del info["settings"]["contacts"]["margin"]
-    file.write_text(json.dumps(info))
-    assert len(generate(mini, tmp_path / "old", 2, settings)) == 2
-    with pytest.raises(TaskError, match=r"margin: 0 -> 0\.02"):
-        generate(mini, tmp_path / "old", 2, replace(settings, contacts=ContactDraw()))
-
-
 def test_samples_tell_their_points_splits_and_whether_they_are_cut(
     made: Dataset, mini: OpticalModel
 ) -> None:
@@ -384,10 +358,11 @@ def test_contacts_that_the_edge_cuts_are_told(mini: OpticalModel, tmp_path: Path
         DatasetSettings(draw, hold_out=("plane",))
 
 
-def test_a_dataset_of_release_0_1_opens_and_goes_on(mini: OpticalModel, tmp_path: Path) -> None:
-    """It has neither splits nor rays; the rays are written when it goes on."""
-    settings = DatasetSettings(resolution=(60, 45), photons=FEW)
-    folder = generate(mini, tmp_path / "old", 1, settings).folder
+def test_a_dataset_of_release_0_1_is_read_but_not_continued(
+    made: Dataset, mini: OpticalModel, tmp_path: Path
+) -> None:
+    """It has neither splits nor rays nor margins, and its contacts were drawn in another way."""
+    folder = Path(shutil.copytree(made.folder, tmp_path / "old"))
     table = (folder / "metadata.csv").read_text().splitlines()
     later = [table[0].split(",").index(name) for name in LATER_COLUMNS]
     kept = [
@@ -396,11 +371,17 @@ def test_a_dataset_of_release_0_1_opens_and_goes_on(mini: OpticalModel, tmp_path
     ]
     (folder / "metadata.csv").write_text("\n".join(kept) + "\n")
     (folder / "camera.npz").unlink()
+    info = json.loads((folder / "dataset.json").read_text())
+    del info["drawing"], info["settings"]["contacts"]["margin"]
+    (folder / "dataset.json").write_text(json.dumps(info))
+    before = files(folder)
+    with pytest.raises(TaskError, match="by another release") as refused:
+        generate(mini, folder, COUNT + 1, SETTINGS)
+    assert "new folder" in str(refused.value) and files(folder) == before
     old = Dataset.load(folder)
+    assert len(old) == COUNT and np.array_equal(old[1].depth, made[1].depth)
     assert old.labels[0]["split"] == "" and old.labels[0]["cut"] == -1
     with pytest.raises(TaskError, match="has no splits"):
         old.split("train")
     with pytest.raises(TaskError, match=r"lacks the file 'camera\.npz'"):
         old.camera_rays()
-    longer = generate(mini, folder, 2, settings)
-    assert len(longer) == 2 and longer.camera_rays()["points"].shape == (45, 60, 3)
