@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from optisense.design.camera import Camera
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
-from optisense.design.projection import directions, picture_places
+from optisense.design.projection import directions, picture_places, within_view
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import common_space
@@ -84,9 +84,11 @@ def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]
 
 
 def straight_rays(camera: Camera) -> NDArray[np.float64]:
-    """Return unit vectors (k, 3) of rays through a grid of `SAMPLES` points of the picture."""
+    """Return unit vectors (k, 3) of rays through those of a grid of `SAMPLES` points of the picture
+    that show something.
+    """
     across, down = np.meshgrid(np.linspace(0.0, 1.0, SAMPLES[0]), np.linspace(0.0, 1.0, SAMPLES[1]))
-    return directions(camera, across, down).reshape(-1, 3)
+    return directions(camera, across, down)[within_view(camera, across, down)]
 
 
 def skin_distances(

@@ -6,12 +6,13 @@ assumed.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.arrangement import in_picture, skin_distances, straight_rays
+from optisense.design.arrangement import SAMPLES, in_picture, skin_distances, straight_rays
 from optisense.design.camera import Camera
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
@@ -95,7 +96,7 @@ def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
         ]
     if camera.projection == "equidistant":
         folds = folding_angle(camera)
-        across = angle_across(camera) if folds is None or folds >= 180.0 else camera.fov
+        across = angle_across(camera) if folds is None else camera.fov
         if across <= WIDEST_FISHEYE + ROUNDED:
             return []
         return [
@@ -258,7 +259,8 @@ def view_shares(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> ViewSh
         np.minimum.at(closest, hits.ray, hits.distance)
         closer = closest < nearest - BEFORE
         nearest[closer], hider[closer] = closest[closer], number
-    picture = float(np.isfinite(skin_distances(design, meshes, straight_rays(camera))).mean())
+    shown = np.isfinite(skin_distances(design, meshes, straight_rays(camera)))
+    picture = np.count_nonzero(shown) / math.prod(SAMPLES)
     counts = np.bincount(hider + 1, minlength=len(blockers) + 1) / max(1, len(some))
     counts *= len(inside) / len(points)
     hidden = {name: float(n) for name, n in zip(blockers, counts[1:], strict=True) if n > 0.0}
@@ -293,16 +295,6 @@ def uniqueness_problems(design: SensorDesign) -> list[Diagnostic]:
     angle = folding_angle(design.camera)
     if angle is None:
         return []
-    if angle >= 180.0:
-        return [
-            Diagnostic(
-                "the picture reaches more than 180 degrees off the lens's axis, where it shows the "
-                "same directions again",
-                design.where("camera", "fov"),
-                "Give a smaller field of view (fov): it is that across the width, and the corners "
-                "are farther off the axis, as are top and bottom of a tall picture",
-            )
-        ]
     return [
         Diagnostic(
             f"the lens's distortion folds {angle:.3g} degrees off its axis, inside the picture: "

@@ -6,6 +6,7 @@ A position in the picture is given by shares: 0 to 1 across from the left and do
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.design.camera import Camera
@@ -59,15 +60,29 @@ def ideal_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatA
 def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
     """Return unit vectors (..., 3) in the viewing directions of positions in the picture.
 
+    A fisheye shows nothing at positions that would be more than 180 degrees off its axis; they get
+    the direction at 180 degrees.
+
     Args:
         across, down: positions (...) in the picture, in shares of its width and height.
     """
     x, y = ideal_places(camera, across, down)
     height = np.hypot(x, y)
-    angle = height if camera.projection == "equidistant" else np.arctan(height)
+    angle = np.minimum(height, np.pi) if camera.projection == "equidistant" else np.arctan(height)
     scale = np.sin(angle) / np.maximum(height, 1e-300)
     scale = np.where(height < 1e-12, 1.0, scale)
     return np.stack([x * scale, -y * scale, np.cos(angle)], axis=-1) @ camera.axes()
+
+
+def within_view(camera: Camera, across: FloatArray, down: FloatArray) -> NDArray[np.bool_]:
+    """Return a mask (...) of the positions that show something: a fisheye shows nothing at those
+    that would be more than 180 degrees off its axis.
+
+    Args:
+        across, down: positions (...) in the picture, in shares of its width and height.
+    """
+    height = np.hypot(*ideal_places(camera, across, down))
+    return np.asarray((height <= np.pi) | (camera.projection != "equidistant"))
 
 
 def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -120,19 +135,18 @@ def folding_angle(camera: Camera) -> float | None:
     """Return the angle off the axis at which a lens folds within the picture, degrees.
 
     Beyond this angle the distortion has no inverse: two directions are shown at one position, and
-    others nowhere. Beyond 180 degrees, a fisheye shows the directions of smaller angles again.
+    others nowhere.
 
     Returns:
         Angle, or None for a lens that shows each point of the picture once.
     """
     lens = camera.distortion
+    if lens is None:
+        return None
     along = np.linspace(0.0, 1.0, FOLD_PLACES)
     across, down = np.meshgrid(along, along)
     shown = shown_places(camera, across, down)
     ideal = ideal_places(camera, across, down)
-    again = camera.projection == "equidistant" and bool((np.hypot(*ideal) > np.pi).any())
-    if lens is None:
-        return 180.0 if again else None
     numbers = lens.coefficients()
     with np.errstate(all="ignore"):
         off = np.hypot(*(np.array(lens.distort(ideal[0], ideal[1], numbers)) - shown))
@@ -141,9 +155,7 @@ def folding_angle(camera: Camera) -> float | None:
         a, b, c, d = lens.jacobian(way * ideal[0], way * ideal[1], numbers)
         unfolded = (a * d - b * c > 0.0).all(axis=0)
     bad = ~(found & unfolded)
-    if bad.any():
-        return _first_fold(camera, shown[:, bad])
-    return 180.0 if again else None
+    return _first_fold(camera, shown[:, bad]) if bad.any() else None
 
 
 def _first_fold(camera: Camera, shown: FloatArray) -> float:

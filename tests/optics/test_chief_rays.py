@@ -118,6 +118,18 @@ def test_a_fisheye_maps_angle_to_radius_evenly() -> None:
     assert rays.points[0, 32, 1] > 0 > rays.points[47, 32, 1]
 
 
+@pytest.mark.parametrize(("fov", "pixels"), [(280.0, (48, 48)), (200.0, (20, 80))])
+def test_a_fisheye_sees_nothing_beyond_180_degrees(fov: float, pixels: tuple[int, int]) -> None:
+    room = box("room", (-4, -4, -4), (4, 4, 4), COATING, inward=True)
+    rays = trace([room], camera(fov=fov, equidistant=True, position=(0, 0, 0), pixels=pixels))
+    width, height = pixels
+    x = 2 * (np.arange(width) + 0.5) / width - 1
+    y = (height - 2 * (np.arange(height) + 0.5)) / width
+    shows = 0.5 * fov * np.hypot(*np.meshgrid(x, y)) <= 180.0
+    assert 0.3 < shows.mean() < 0.99 and np.array_equal(rays.hit, shows)
+    assert (rays.outcome[~shows] == RayOutcome.ESCAPED).all()
+
+
 def test_face_numbers_are_those_of_the_mesh_hit() -> None:
     room = box("room", (-4, -4, -4), (4, 4, 4), COATING, inward=True)
     rays = trace([room], camera(fov=120, position=(0.3, 0.2, 0.1)))

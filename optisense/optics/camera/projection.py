@@ -11,6 +11,10 @@ import numpy as np
 
 from optisense.design.lenses import LensDistortion
 
+OUT_OF_SIGHT = 1e4
+"""Distance (mm) from the camera at which rays start that see nothing, and lead away from it: more
+than the size of any sensor."""
+
 
 class Pose(NamedTuple):
     """The pose and lens of a camera: position (mm), unit axes of the image, field of view across
@@ -92,6 +96,9 @@ class RayCamera:
         """Return the origins (3, n), mm, and unit directions (3, n) of the rays through film
         positions.
 
+        A fisheye shows nothing at positions that would be more than 180 degrees off its axis: their
+        rays start `OUT_OF_SIGHT` and escape.
+
         Args:
             x, y: film positions (n,) in pixels from the top left corner.
             pose: the pose to use, for derivatives with respect to it; the camera's own if None.
@@ -112,8 +119,11 @@ class RayCamera:
         else:
             tangent = dr.tan(half)
             direction = right * (u * tangent) + up * (v * tangent) + forward
+        direction = dr.normalize(direction)
         origin = position + dr.zeros(mi.Vector3f, dr.width(direction))
-        return origin, dr.normalize(direction)
+        if self.equidistant:
+            origin += dr.select(angle > dr.pi, OUT_OF_SIGHT, 0) * direction
+        return origin, direction
 
     def _undistorted(
         self,
