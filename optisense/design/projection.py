@@ -5,6 +5,9 @@ A position in the picture is given by shares: 0 to 1 across from the left and do
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -140,9 +143,25 @@ def folding_angle(camera: Camera) -> float | None:
     Returns:
         Angle, or None for a lens that shows each point of the picture once.
     """
-    lens = camera.distortion
-    if lens is None:
+    if camera.distortion is None:
         return None
+    data = camera.model_dump_json(include={"fov", "projection", "resolution", "distortion"})
+    return _folding_angle(_Lens(camera, data))
+
+
+@dataclass(frozen=True)
+class _Lens:
+    """Camera that is compared by the values that decide where its lens folds."""
+
+    camera: Camera = field(compare=False)
+    data: str
+
+
+@lru_cache(maxsize=16)
+def _folding_angle(distorted: _Lens) -> float | None:
+    camera = distorted.camera
+    lens = camera.distortion
+    assert lens is not None
     along = np.linspace(0.0, 1.0, FOLD_PLACES)
     across, down = np.meshgrid(along, along)
     shown = shown_places(camera, across, down)
