@@ -13,6 +13,7 @@ from optisense.errors import TaskError
 from optisense.geometry import Contact, Indenter
 from optisense.geometry.contact_text import INDENTER_FORM, parse_indenter
 from optisense.geometry.indenter_kinds import tilted
+from optisense.tasks._splits import Cell, cell_of
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays, OpticalModel
@@ -95,6 +96,10 @@ class Places:
     def middle(self) -> FloatArray:
         """Return the place (3,), mm, that the picture shows nearest to its middle."""
         return self._points[self._middle]
+
+    def cells(self, aspect: float) -> frozenset[Cell]:
+        """Return the cells in which there are places, for a picture of a height over its width."""
+        return frozenset(cell_of(spot, aspect) for spot in self._spots.tolist())
 
     def draw(self, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         """Draw a place; return its point (3,), mm, and its position (2,) in shares of the image."""

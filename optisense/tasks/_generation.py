@@ -28,7 +28,7 @@ from optisense.tasks._dataset_settings import DatasetSettings
 from optisense.tasks._digests import file_digest
 from optisense.tasks._draws import DrawnContact, Places, is_cut, keeps_margin
 from optisense.tasks._records import CsvTable, refuse_differences, write_whole
-from optisense.tasks._splits import split_of
+from optisense.tasks._splits import cell_of, split_of
 from optisense.tasks.dataset import BACKGROUND, CAMERA, DESIGN, Dataset
 from optisense.tasks.dataset_tables import (
     COLUMNS,
@@ -136,6 +136,7 @@ class _Maker:
         rays = model.chief_rays(self._resolution)
         self._untouched = UntouchedSurface.of(rays)
         self._places = Places.of(model, self._resolution)
+        self._cells = self._places.cells(self._resolution[1] / self._resolution[0])
         self._larger_than_view = {
             text for text, each in self._indenters.items() if not self._fits(each)
         }
@@ -384,8 +385,8 @@ class _Maker:
                 "split": split_of(
                     settings.seed,
                     drawn.indenter,
-                    (drawn.spot[0], drawn.spot[1] * height / width),
-                    height / width,
+                    cell_of(drawn.spot, height / width),
+                    self._cells,
                     settings.hold_out,
                 ),
             }

@@ -4,25 +4,40 @@ from __future__ import annotations
 
 import hashlib
 import math
-from itertools import product
+from collections.abc import Collection, Sequence
 
 TRAIN, VALIDATION, TEST = "train", "validation", "test"
 
 SPLITS = (TRAIN, VALIDATION, TEST)
 
 SHARES = (0.8, 0.1, 0.1)
-"""Shares of all cells in the training, validation and test split, usual for some 1000 samples."""
+"""Shares of the cells that show skin in the training, validation and test split, usual for some
+1000 samples."""
 
 CELLS = 8
 """Number of square cells across the picture; on a GelSight Mini they are 2.5 mm wide, wider than
 most contacts, so that few presses have one of another split beside them."""
 
 
+Cell = tuple[int, int]
+"""Column and row of a cell, from 0 at the left and at the upper edge."""
+
+
+def cell_of(spot: Sequence[float], aspect: float) -> Cell:
+    """Return the cell of a position in the picture.
+
+    Args:
+        spot: position, as shares of the picture's width and height.
+        aspect: height of the picture over its width.
+    """
+    return math.floor(CELLS * spot[0]), math.floor(CELLS * (spot[1] * aspect))
+
+
 def split_of(
     seed: int,
     indenter: str,
-    spot: tuple[float, float],
-    aspect: float,
+    cell: Cell,
+    cells: Collection[Cell],
     hold_out: tuple[str, ...] = (),
 ) -> str:
     """Return the split of a press.
@@ -33,26 +48,25 @@ def split_of(
 
     Args:
         indenter: text of the indenter, as given.
-        spot: position of the place in the picture, as shares of its width from the left and from
-            the upper edge.
-        aspect: height of the picture over its width.
+        cell: cell of the place.
+        cells: all cells in which the camera sees skin.
         hold_out: indenters that are in the test split only.
     """
     if indenter in hold_out:
         return TEST
-    rows = max(math.ceil(CELLS * aspect - 1e-9), 1)
-    column, row = (math.floor(CELLS * each) for each in spot)
-    return _shuffled(seed, rows).get((column, row), TRAIN)
+    return _shuffled(seed, cells).get(cell, TRAIN)
 
 
-def _shuffled(seed: int, rows: int) -> dict[tuple[int, int], str]:
-    """Return the validation and test cells (column, row) of a picture; the shares of all splits are
-    exact to half a cell, and none is empty.
+def _shuffled(seed: int, cells: Collection[Cell]) -> dict[Cell, str]:
+    """Return the validation and test cells. The shares of all splits are exact to half a cell, and
+    each split has a cell if there are three or more; of fewer, all are training cells.
     """
-    cells = sorted(product(range(CELLS), range(rows)), key=lambda cell: _digest(seed, *cell))
-    validation, test = (max(round(share * len(cells)), 1) for share in SHARES[1:])
-    return dict.fromkeys(cells[:validation], VALIDATION) | dict.fromkeys(
-        cells[validation : validation + test], TEST
+    if len(cells) < len(SPLITS):
+        return {}
+    ranked = sorted(cells, key=lambda cell: _digest(seed, *cell))
+    validation, test = (max(round(share * len(ranked)), 1) for share in SHARES[1:])
+    return dict.fromkeys(ranked[:validation], VALIDATION) | dict.fromkeys(
+        ranked[validation : validation + test], TEST
     )
 
 
