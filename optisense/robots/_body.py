@@ -31,6 +31,9 @@ USUAL_FRICTION = 1.0
 ASIDE = 1e-2
 """Distance (mm) by which the centroid of a skin is moved to the right to find the point next to it:
 far above the rounding of coordinates in mesh files (2e-6 mm), and far below the size of a skin."""
+UPWARD = 0.05
+"""Share of `ASIDE` by which the centroid is moved upward as well, since two facets of a tube may be
+equally far to the right. It is small, so that right decides before up, yet above rounding."""
 WIDEST_PINHOLE = 170.0
 """Largest vertical angle (degrees) of the pinhole camera that stands for a fisheye. A pinhole sees
 less than 180 degrees, and near this limit nearly all of its picture shows the rim of its view."""
@@ -284,8 +287,7 @@ def _skin_frame(skin: TriangleMesh, right: FloatArray, up: FloatArray) -> Frame:
     """
     areas = np.linalg.norm(skin.face_vectors, axis=1)
     centroid = (areas[:, None] * skin.triangles.mean(axis=1)).sum(axis=0) / areas.sum()
-    # A little upward as well: two facets of a tube may be equally far to the right.
-    aside = centroid + ASIDE * (right + 0.05 * up)
+    aside = centroid + ASIDE * (right + UPWARD * up)
     face = int(np.nanargmin(np.linalg.norm(closest_points(skin, aside) - aside, axis=1)))
     nearest = closest_points(skin, centroid)[face]
     # Faces of the sensing surface are wound so that their normals point into the sensor.

@@ -181,8 +181,8 @@ def camera_model(camera: Camera, rays: ChiefRays) -> dict[str, Any]:
 
     Returns:
         "as_designed" and "fitted", and a "note" on a distortion that OpenCV's coefficients can't
-        state; None for a camera that no pinhole describes: a fisheye, a very
-        wide view, or one that sees part of the skin from behind, as over mirrors.
+        state; None for a camera that no pinhole describes: a fisheye, a very wide view, or one that
+        sees part of the skin from behind, as over mirrors.
     """
     height, width = rays.hit.shape
     pair = _seen(rays)
