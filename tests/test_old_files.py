@@ -1,4 +1,4 @@
-"""Folders that release 0.1 wrote are read and continued.
+"""Folders that release 0.1 wrote are read, and studies are continued.
 
 `assets/study-v1` is a grid of three trials with a uniform manufacturing error, which was called
 "even" then; `assets/dataset-v1` has two samples of the estimator that was called "field". Both are
@@ -7,17 +7,16 @@ of the design in `assets/design-v1`, which has a test of its own.
 
 from __future__ import annotations
 
-import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from optisense.cli.app import app
-from optisense.optics.backend.versions import versions
 from optisense.search import ManufacturingErrors, Study, ToleranceDistribution
-from optisense.tasks._generation import DRAWING
+from optisense.tasks import Dataset
 
 ASSETS = Path(__file__).parent / "assets"
 
@@ -54,17 +53,17 @@ def test_a_study_is_continued_and_reported_and_its_best_is_taken(
     assert "fov: 40" in (tmp_path / "better" / "design.yaml").read_text()
 
 
-def test_a_dataset_is_continued(tmp_path: Path) -> None:
-    """With the renderer and the drawing that it was made with, which samples depend on."""
+def test_a_dataset_is_read_but_not_continued(tmp_path: Path) -> None:
+    """Its samples were drawn in another way."""
     folder = Path(shutil.copytree(ASSETS / "dataset-v1", tmp_path / "dataset"))
-    info = folder / "dataset.json"
-    known = json.loads(info.read_text())
-    now = versions("llvm")
-    known["made_with"] = {name: now[name] for name in ("optisense", "mitsuba")}
-    known["drawing"] = DRAWING
-    info.write_text(json.dumps(known))
-    before = (folder / "images" / "000000.png").read_bytes()
+    before = {path: path.read_bytes() for path in folder.rglob("*.*") if path.is_file()}
+    samples = list(Dataset.load(folder))
+    assert [sample.labels["index"] for sample in samples] == [0, 1]
+    for sample in samples:
+        assert sample.image.shape == (30, 40, 3) and np.nanmax(sample.depth) > 0.1
+        assert sample.labels["split"] == ""
     settings = ("--count", "3", "--resolution", "40x30", "--photons", "20000")
-    run("dataset", ASSETS / "design-v1", *settings, "--out", folder)
-    assert (folder / "images" / "000000.png").read_bytes() == before
-    assert len((folder / "metadata.csv").read_text().splitlines()) == 1 + 3
+    words = ("dataset", ASSETS / "design-v1", *settings, "--out", folder)
+    done = CliRunner().invoke(app, [str(word) for word in words])
+    assert done.exit_code == 2 and "made by another release" in done.output
+    assert all(path.read_bytes() == kept for path, kept in before.items())
