@@ -128,12 +128,18 @@ def open_design(session: Session, fields: DesignFields, job: Job) -> dict[str, A
 
 @handles("save", Save, Lane.QUICK)
 def save(session: Session, fields: Save, job: Job) -> dict[str, Any]:
-    """Write a design folder."""
+    """Write a design folder.
+
+    Raises:
+        DesignError: a part does not lie in its cage, so that the folder could not be opened again.
+        OutputError: another program has changed the folder.
+    """
     folder = Path(fields.to)
     named = fields.design if isinstance(fields.design, str) else fields.design.source
     # Before the files are read: a change meanwhile is noticed by the next save.
     source = digest_of(named) if named is not None and Path(named).is_absolute() else None
     design = design_of(session, fields, job)
+    design.deformed_meshes()  # raises for a part outside its cage
     if fields.digest is not None and digest_of(folder) not in ("", fields.digest):
         raise OutputError(
             "the design was changed on disk since it was opened here",

@@ -177,6 +177,19 @@ def test_files_that_changed_are_read_again(engine: Any, tmp_path: Path) -> None:
     assert refused["kind"] == "OutputError"
 
 
+def test_a_design_that_could_not_be_opened_again_is_not_saved(engine: Any, tmp_path: Path) -> None:
+    folder = tmp_path / "sensor"
+    engine.ask("save", design="gelsight-mini-ideal", to=str(folder))
+    before = (folder / "design.yaml").read_bytes()
+    opened = engine.ask("open", design=str(folder))
+    lower, upper = opened["data"]["cages"]["skin"]["box"]
+    opened["data"]["cages"]["skin"]["box"] = [lower, [*upper[:2], (lower[2] + upper[2]) / 2]]
+    given = {"data": opened["data"], "folder": str(folder)}
+    refused = engine.refused("save", design=given, to=str(folder))
+    assert "lie outside the box of the cage" in refused["message"]
+    assert (folder / "design.yaml").read_bytes() == before
+
+
 def test_a_design_that_was_changed_on_disk_is_not_overwritten(engine: Any, tmp_path: Path) -> None:
     folder = tmp_path / "design"
     first = engine.ask("save", design="gelsight-mini-ideal", to=str(folder))
