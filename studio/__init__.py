@@ -31,7 +31,7 @@ from .optimise import prop as optimise_prop
 from .optimise import search_progress, unfinished_studies
 from .optimise import ui as optimise_ui
 from .scene import cages, fields, object_properties, old_files, properties
-from .sensor import cad, starting, tour, workspace
+from .sensor import cad, opening, starting, tour, workspace
 from .sensor import operator as sensor_operator
 from .sensor import ui as sensor_ui
 from .shapes import cage_operator, cage_selection, cage_warnings, reference_operator, skin_operator
@@ -62,6 +62,7 @@ MODULES = (
     optimise_prop,
     search_progress,
     cad,
+    opening,
     sensor_operator,
     workspace,
     tour,

@@ -139,6 +139,9 @@ class OPTISENSE_PG_design(bpy.types.PropertyGroup):
     )
     folder: StringProperty(name="Folder", description="Folder in which the design is saved")
     is_saved: BoolProperty(options={"HIDDEN"})
+    opening: StringProperty(
+        description="Identifier of the opening of this sensor", options={"HIDDEN"}
+    )
     title: StringProperty(name="Name", description="Name of the sensor", maxlen=200)
     description: StringProperty(
         name="Description", description="Description of the sensor in a line or two"

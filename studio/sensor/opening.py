@@ -26,6 +26,26 @@ digests: dict[str, str] = {}
 """Digest of each design folder as it was last opened or saved in this Blender, by which the engine
 notices that another program has changed it. Undo does not bring older ones back."""
 
+folders: dict[tuple[int, str], str] = {}
+"""Folder in which a sensor was last saved in this Blender, by its scene's session id and its
+`opening`. Undo does not bring older ones back, which the next save would write over; undo of the
+opening of another sensor brings back the folder of the sensor before."""
+
+
+def saved_in(scene: bpy.types.Scene, folder: str) -> None:
+    """Make a folder that of the scene's sensor, also after undo."""
+    folders[scene.session_uid, scene.optisense.opening] = folder
+    _keep_folders()
+
+
+@bpy.app.handlers.persistent
+def _keep_folders(*_: Any) -> None:
+    for scene in bpy.data.scenes:
+        design = scene.optisense
+        folder = folders.get((scene.session_uid, design.opening))
+        if folder is not None:
+            design.folder, design.is_saved = folder, True
+
 
 def tell_opened(scene: bpy.types.Scene, draft: str | None) -> None:
     """Call these callbacks."""
@@ -87,7 +107,8 @@ def open_stage(
         stage: folder that the engine wrote.
         wait: block until the sensor is open.
         folder: the user's own folder of the design; empty if it is not saved.
-        keep_others: keep the contacts and references, the view, and the selection and visibility.
+        keep_others: keep the contacts and references, the view, and the selection and visibility;
+            the sensor counts as the same one, with other values.
         then: called with the scene and the engine's draft when the sensor is open.
     """
     name = scene.name
@@ -103,6 +124,8 @@ def open_stage(
         meshes = {key: mesh_file.read(stage / part["mesh"]) for key, part in parts}
         before = looks_of(scene) if keep_others else None
         build(scene, document, meshes, keep_others=keep_others)
+        if not keep_others:
+            scene.optisense.opening = uuid.uuid4().hex
         scene.optisense.folder = folder or str(stage)
         scene.optisense.is_saved = bool(folder)
         if before is None:
@@ -129,6 +152,7 @@ def open_empty(scene: bpy.types.Scene, document: dict[str, Any]) -> None:
     clear_startup(scene)
     picture_is_old(scene)
     build(scene, document, {}, keep_others=True)
+    scene.optisense.opening = uuid.uuid4().hex
     scene.optisense.folder = str(new_stage())
     scene.optisense.is_saved = False
     session.push_undo("New sensor")
@@ -151,3 +175,9 @@ def picture_is_old(scene: bpy.types.Scene | None) -> None:
     if scene is None or evaluation.is_of(scene):
         evaluation.is_before = True
     evaluation.rays = ""  # they go with the sensor that they were drawn in
+
+
+HOOKS = (
+    (bpy.app.handlers.undo_post, _keep_folders),
+    (bpy.app.handlers.redo_post, _keep_folders),
+)

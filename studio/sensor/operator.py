@@ -14,7 +14,7 @@ from ..engine.operators import ChoosingFile, Starting, fail, report_error, start
 from ..scene.cages import ignored_edits
 from ..scene.collections import objects_of
 from ..scene.paths import chosen, suggested
-from .opening import digests, open_empty, open_source
+from .opening import digests, open_empty, open_source, saved_in
 
 
 class _Opens:
@@ -123,8 +123,7 @@ class _Saves:
                 digests[result["folder"]] = result["digest"]
             scene = bpy.data.scenes.get(name)
             if scene is not None:
-                scene.optisense.folder = result["folder"]
-                scene.optisense.is_saved = True
+                saved_in(scene, result["folder"])
             session.state().note = f"Saved in {result['folder']}"
 
         wait = bpy.app.background

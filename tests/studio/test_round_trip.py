@@ -17,6 +17,7 @@ from studio.scene.collections import ALL, object_of, objects_of
 from studio.scene.gather import gather, gather_document
 from studio.scene.lamps import redraw
 from studio.scene.meshes import shown_vertices
+from studio.sensor import opening
 
 SENSORS = (
     "gelbelt",
@@ -136,6 +137,32 @@ def test_a_design_that_another_program_changed_is_not_overwritten(
     file.write_text(changed.replace("7.5", "8.5"))
     with pytest.raises(RuntimeError, match="was changed on disk"):
         bpy.ops.optisense.save()
+
+
+def test_undo_leaves_the_folder_in_which_a_sensor_was_saved(mini: Any, tmp_path: Path) -> None:
+    first, second = tmp_path / "a", tmp_path / "b"
+    for folder in (first, second):
+        assert bpy.ops.optisense.save_as(filepath=str(folder)) == {"FINISHED"}
+        bpy.context.scene.optisense.description = f"after {folder.name}"
+        bpy.ops.ed.undo_push(message="Describe")
+    before = (first / "design.yaml").read_bytes()
+    bpy.ops.ed.undo()
+    assert bpy.context.scene.optisense.description == "after a"
+    assert bpy.ops.optisense.save() == {"FINISHED"}
+    assert (first / "design.yaml").read_bytes() == before
+    assert "after a" in (second / "design.yaml").read_text()
+
+    bpy.ops.optisense.open(filepath=str(first))
+    bpy.ops.ed.undo()
+    assert bpy.context.scene.optisense.folder == str(second), "that of the sensor before"
+    bpy.ops.ed.redo()
+    assert bpy.context.scene.optisense.folder == str(first)
+    bpy.ops.ed.undo()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "b.blend"))
+    bpy.ops.optisense.save_as(filepath=str(tmp_path / "c"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "b.blend"))
+    opening._keep_folders()
+    assert bpy.context.scene.optisense.folder == str(second), "as the .blend file says"
 
 
 def test_what_is_edited_is_written_and_nothing_else(mini: Any) -> None:
