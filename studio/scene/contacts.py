@@ -10,11 +10,12 @@ import bmesh
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
+from mathutils.bvhtree import BVHTree
 
 from ..core.mesh_file import Mesh
 from ..core.numbers import short
 from .collections import CONTACTS, collection, next_order, objects_of
-from .meshes import mesh_of
+from .meshes import drawn_mesh, mesh_of
 from .paths import absolute
 
 COLOUR = (0.48, 0.37, 0.07, 1.0)
@@ -70,6 +71,15 @@ def sensing_surface(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the object of the sensing surface, or None."""
     parts = objects_of(scene, "PART")
     return next((each for each in parts if each.optisense.role == "sensing_surface"), None)
+
+
+def tree_of(surface: bpy.types.Object) -> BVHTree:
+    """Return the faces of a part for the search of points on it, in the frame of the design.
+
+    Blender's own search fails for parts that it does not evaluate.
+    """
+    mesh = drawn_mesh(surface)
+    return BVHTree.FromPolygons(mesh.vertices.tolist(), mesh.faces.tolist())
 
 
 def redraw(contact: bpy.types.Object) -> None:

@@ -116,6 +116,15 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     return _placed(Mesh(vertices, _triangles(data), normals), world)
 
 
+def drawn_mesh(part: bpy.types.Object) -> Mesh:
+    """Return a part as it is drawn, in the frame of the design; without its modifiers while Blender
+    does not evaluate it.
+    """
+    modified = part.modifiers and is_evaluated(part)
+    mesh = _modified(part) if modified else mesh_of(part.data)
+    return _placed(mesh, np.array(world_matrix(part), dtype=np.float64))
+
+
 def settle(part: bpy.types.Object) -> Mesh:
     """Make the present shape of a part in no cage, as it was edited, moved and modified, its shape
     at rest; return it in the frame of the design, where its object then stays.

@@ -15,10 +15,9 @@ from ..engine.operators import ChoosingProperties, refuse, start
 from ..scene import kinds
 from ..scene.build import add_material, add_part
 from ..scene.collections import REFERENCE, collection, select_only
-from ..scene.contacts import add_contact, sensing_surface
+from ..scene.contacts import add_contact, sensing_surface, tree_of
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
-from ..scene.world import world_matrix
 from ..sensor.cad import ChoosingFiles
 
 READING = "Reading the mesh"
@@ -172,9 +171,9 @@ def _press(operator: bpy.types.Operator, scene: bpy.types.Scene, item: bpy.types
     if surface is None:
         operator.report({"WARNING"}, "There is no sensing surface to press on")
         return
-    found, point, normal, _ = surface.closest_point_on_mesh((0.0, 0.0, 0.0))
-    if found:
-        contact = add_contact(scene, tuple(world_matrix(surface) @ point), tuple(-normal))
+    point, normal, *_ = tree_of(surface).find_nearest((0.0, 0.0, 0.0))
+    if point is not None:
+        contact = add_contact(scene, tuple(point), tuple(-normal))
         contact.optisense.shape = new_mesh(item.name, part_mesh(item, caged=False))
         contact.optisense.indenter = "mesh"
 

@@ -13,7 +13,7 @@ from ..core.engine import EngineError
 from ..engine import polls, session
 from ..engine.operators import Starting, fail, refuse, start, start_with_design
 from ..scene.collections import objects_of, select_only
-from ..scene.contacts import add_contact, sensing_surface
+from ..scene.contacts import add_contact, sensing_surface, tree_of
 from ..scene.world import world_matrix
 from . import editors, picture, requests, viewing
 
@@ -83,10 +83,10 @@ class OPTISENSE_OT_add_contact(polls.Arranging, bpy.types.Operator):
                 self, "There is no sensing surface; make one under Shapes (Make Sensing Surface)"
             )
         middle = sum((Vector(corner) for corner in surface.bound_box), Vector()) / 8.0
-        found, point, normal, _ = surface.closest_point_on_mesh(middle)
-        if not found:
+        point, normal, *_ = tree_of(surface).find_nearest(world_matrix(surface) @ middle)
+        if point is None:
             return refuse(self, "The sensing surface has no faces; remove it and make another")
-        _add(context, surface, point, normal)
+        _add(context, point, normal)
         return {"FINISHED"}
 
 
@@ -133,19 +133,15 @@ def press_along(context: bpy.types.Context, start: Vector, way: Vector) -> bool:
     surface = sensing_surface(context.scene)
     if surface is None:
         return False
-    inverse = world_matrix(surface).inverted()
-    hit, point, normal, _ = surface.ray_cast(inverse @ start, inverse.to_3x3() @ way)
-    if hit:
-        _add(context, surface, point, normal)
-    return hit
+    point, normal, *_ = tree_of(surface).ray_cast(start, way)
+    if point is None:
+        return False
+    _add(context, point, normal)
+    return True
 
 
-def _add(
-    context: bpy.types.Context, surface: bpy.types.Object, point: Vector, normal: Vector
-) -> None:
-    outward = -(world_matrix(surface).to_3x3() @ normal)
-    contact = add_contact(context.scene, tuple(world_matrix(surface) @ point), tuple(outward))
-    select_only(contact)
+def _add(context: bpy.types.Context, point: Vector, normal: Vector) -> None:
+    select_only(add_contact(context.scene, tuple(point), tuple(-normal)))
 
 
 class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
@@ -165,13 +161,13 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
             surface = None if scene is None else sensing_surface(scene)
             if scene is None or surface is None:
                 return
+            tree = tree_of(surface)
+            points = [each["point"] for each in result["contacts"]]
+            outward = [tuple(-tree.find_nearest(point)[1]) for point in points]
             for each in objects_of(scene, "CONTACT"):
                 bpy.data.objects.remove(each)
-            inverse = world_matrix(surface).inverted()
-            for each in result["contacts"]:
-                near = surface.closest_point_on_mesh(inverse @ Vector(each["point"]))
-                outward = -(world_matrix(surface).to_3x3() @ near[2])
-                contact = add_contact(scene, each["point"], tuple(outward))
+            for place in zip(points, outward, strict=True):
+                contact = add_contact(scene, *place)
                 for field, value in like.items():
                     setattr(contact.optisense, field, value)
             session.push_undo("Nine contacts")

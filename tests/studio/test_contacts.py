@@ -8,10 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 
 from studio.core.engine import EngineError
 from studio.engine import design_transfer, session
 from studio.scene.collections import object_of, objects_of
+from studio.simulate.operator import press_along
 
 
 def small(scene: Any) -> None:
@@ -89,6 +91,35 @@ def test_nine_contacts_are_like_the_active_one(mini: Any, select: Callable[..., 
     select(object_of(mini, "PART", "gel"))
     assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}
     assert {each.optisense.indenter for each in objects_of(mini, "CONTACT")} == {"sphere"}
+
+
+def disabled(skin: Any) -> None:
+    skin.hide_viewport = True
+
+
+def excluded(skin: Any) -> None:
+    layer = bpy.context.view_layer.layer_collection
+    layer.children[skin.users_collection[0].name].exclude = True
+
+
+@pytest.mark.parametrize("hide", [disabled, excluded])
+def test_contacts_are_placed_on_a_skin_that_blender_does_not_evaluate(
+    hide: Callable[[Any], None], mini: Any, select: Callable[..., None]
+) -> None:
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=2.0)
+    ball = bpy.context.active_object
+    hide(object_of(mini, "PART", "skin"))
+    bpy.context.view_layer.update()
+    assert bpy.ops.optisense.add_contact() == {"FINISHED"}
+    assert press_along(bpy.context, Vector((3.0, 2.0, 20.0)), Vector((0.0, 0.0, -1.0)))
+    select(ball)
+    assert bpy.ops.optisense.set_reference(reference="indenter") == {"FINISHED"}
+    found = objects_of(mini, "CONTACT")
+    places = [each.location for each in found]
+    assert np.allclose(places, [(0, 0, 0), (3, 2, 0), (0, 0, 0)], atol=1e-5)
+    assert all(each.matrix_world.col[2].z == pytest.approx(1.0) for each in found)
+    assert bpy.ops.optisense.nine_contacts() == {"FINISHED"}
+    assert len(objects_of(mini, "CONTACT")) == 9
 
 
 @pytest.mark.parametrize("sensor", ["gelsight-mini-ideal-spherical", "gelsight-svelte"])
