@@ -30,7 +30,7 @@ from .optimise import operator as optimise_operator
 from .optimise import prop as optimise_prop
 from .optimise import search_progress, unfinished_studies
 from .optimise import ui as optimise_ui
-from .scene import cages, fields, object_properties, old_files, properties
+from .scene import cages, copies, fields, object_properties, old_files, properties
 from .sensor import cad, opening, starting, tour, workspace
 from .sensor import operator as sensor_operator
 from .sensor import ui as sensor_ui
@@ -51,6 +51,7 @@ MODULES = (
     old_files,
     object_properties,
     cages,
+    copies,
     picture,
     editors,
     simulate_prop,

@@ -86,10 +86,8 @@ def release(scene: bpy.types.Scene) -> None:
     cages = objects_of(scene, "CAGE")
     bent = {name for cage in cages for name in cage_data(cage)["parts"]}
     for part in objects_of(scene, "PART"):
-        if part.optisense.is_caged:
-            key = part.optisense.key
-            if key not in bent or part != object_of(scene, "PART", key):
-                lock(part, False)
+        if part.optisense.is_caged and part.optisense.key not in bent:
+            lock(part, False)
 
 
 def cage_data(cage: bpy.types.Object) -> dict[str, Any]:
@@ -266,8 +264,6 @@ def _moved(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             if cage.name in changed:
                 follow(scene, cage)
     show_idle(scene)
-    if depsgraph.id_type_updated("COLLECTION"):  # objects came or went
-        release(scene)
 
 
 def show_idle(scene: bpy.types.Scene) -> None:

@@ -25,9 +25,11 @@ def collection(scene: bpy.types.Scene, name: str) -> bpy.types.Collection:
 
 
 def objects_of(scene: bpy.types.Scene, *kinds: str) -> list[bpy.types.Object]:
-    """Return the scene's objects of some kinds, in the order of the design file."""
+    """Return the scene's objects of some kinds, in the order of the design file; a copy made in
+    Blender comes after its original.
+    """
     found = [each for each in scene.objects if each.optisense.kind in kinds]
-    return sorted(found, key=lambda each: (each.optisense.order, each.name))
+    return sorted(found, key=lambda each: (each.optisense.order, each.session_uid))
 
 
 def is_edited(depsgraph: bpy.types.Depsgraph, *kinds: str) -> bool:

@@ -107,12 +107,16 @@ def _own_files(values: dict[str, Any], parts: dict[str, bpy.types.Object]) -> No
 
 
 def part_names(scene: bpy.types.Scene) -> dict[str, bpy.types.Object]:
-    """Return the parts by their names in the design; a copy made in Blender gets a new name."""
+    """Return the parts by their names in the design; a copy made in Blender gets a name that no
+    part has.
+    """
+    parts = objects_of(scene, "PART")
+    taken = {part.optisense.key for part in parts}
     found: dict[str, bpy.types.Object] = {}
-    for part in objects_of(scene, "PART"):
+    for part in parts:
         name = part.optisense.key
         if not name or name in found:
-            name = free_name(part.name, found)
+            name = free_name(part.name, taken | found.keys())
         found[name] = part
     return found
 
@@ -162,7 +166,7 @@ def _part(name: str, part: bpy.types.Object, before: dict[str, Any]) -> dict[str
     if own.material and own.role != "sensing_surface":
         values["material"] = own.material
     values["priority"] = own.priority
-    known = before.get(own.key, {})
+    known = before.get(own.source or own.key, {})
     if known.get("thickness") is not None:
         values["thickness"] = known["thickness"]
     faces = known.get("faces")

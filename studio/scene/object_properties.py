@@ -46,6 +46,11 @@ class OPTISENSE_PG_object(bpy.types.PropertyGroup):
         name="Kind", items=kinds.OBJECT_KINDS, description="Kind of object in the sensor"
     )
     key: StringProperty(name="Name", description="Name of the object in the design file")
+    source: StringProperty(
+        description="Name in the design file as it was read of the part of which this one is a "
+        "copy; empty for other objects",
+        options={"HIDDEN"},
+    )
     order: IntProperty(description="Position of the object in the design file", options={"HIDDEN"})
     data: StringProperty(
         description="Values as they were read, in full precision", options={"HIDDEN"}

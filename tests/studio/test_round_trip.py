@@ -214,6 +214,27 @@ def test_copies_made_in_blender_join_the_sensor(mini: Any, select: Callable[...,
     assert list(meshes) == list(document["parts"])
 
 
+def test_a_copy_is_a_part_of_its_own(mini: Any, select: Callable[..., None]) -> None:
+    document, meshes = gather(mini)
+    gel, tray = (object_of(mini, "PART", name) for name in ("gel", "tray"))
+    tray.optisense.key = "gel-001"  # as a copy that was saved and opened again
+    for original in (gel, objects_of(mini, "LIGHT")[1]):
+        select(original)
+        bpy.ops.object.duplicate()
+        bpy.context.active_object.location.z -= 30.0
+        original.name = "zz"
+    after, found = gather(mini)
+    assert list(found) == ["skin", "gel", "gel-001", "guide", "gel-001-2"]
+    assert after["cages"] == document["cages"]
+    assert np.array_equal(found["gel"].vertices, meshes["gel"].vertices)
+    assert np.array_equal(found["gel-001"].vertices, meshes["tray"].vertices)
+    assert found["gel-001-2"].vertices[:, 2].max() == pytest.approx(-30.0)
+    assert after["lights"]["red"]["lights"][:5] == document["lights"]["red"]["lights"]
+    assert gel.optisense.is_caged and not object_of(mini, "PART", "gel-001-2").optisense.is_caged
+    bpy.data.objects.remove(gel)
+    assert list(gather(mini)[1]) == ["skin", "gel-001", "guide", "gel-001-2"]
+
+
 def test_a_moved_part_is_written_where_it_is(mini: Any) -> None:
     tray = object_of(mini, "PART", "tray")
     _, before = gather(mini)
