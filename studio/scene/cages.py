@@ -16,12 +16,18 @@ from ..core.errors import SceneError
 from ..core.numbers import kept, kept_array
 from .collections import CAGES, collection, next_order, object_of, objects_of
 from .meshes import REST, remembered, show_vertices, shown_vertices
+from .world import world_matrix
 
 MOST_KEPT = 32
 """Number of cages whose weights are cached, so that bending one again needs no new ones."""
 SAME_SHAPE = 1e-3
 """Largest distance in mm between a drawn vertex and its place in the cage that counts as equal: the
 rounding of positions and weights in single precision, for sensors of up to a metre.
+"""
+
+SAME_FRAME = 1e-5
+"""Largest difference between elements of two matrices that count as equal (mm, or mm per mm): the
+rounding of an object's matrix under a parent. It moves a point 100 mm away by `SAME_SHAPE`.
 """
 
 _weights: dict[tuple[bytes, bytes, tuple[int, int, int]], NDArray[np.float32]] = {}
@@ -198,30 +204,46 @@ def follow(scene: bpy.types.Scene, cage: bpy.types.Object) -> None:
 
 
 def ignored_edits(scene: bpy.types.Scene, cage: bpy.types.Object) -> list[dict[str, Any]]:
-    """Return a problem, in the form of the engine's, for each part of a cage that is drawn in
-    another shape than the cage gives it, by edits of its vertices or by modifiers.
+    """Return a problem, in the form of the engine's, for a cage that was moved as an object, and
+    for each of its parts that is drawn in another place or shape than the cage gives it.
+
+    Such parts were moved, their vertices were edited, or they have modifiers.
     """
-    values, points = cage_data(cage), shown_points(cage)
+    values, points, key = cage_data(cage), shown_points(cage), cage.optisense.key
     resolution = tuple(values["resolution"])
-    if len(points) != np.prod(resolution):
-        return []
     found = []
+    if not _is_in_place(cage):
+        message = f"cage '{key}' was moved, turned or scaled as an object; its parts ignore that"
+        hint = "Undo that, and move its control points in Edit Shape"
+        found.append(_problem(message, hint, path=f"cages.{key}"))
     for name in values["parts"]:
         part = object_of(scene, "PART", name)
-        if part is None or part.mode == "EDIT":
+        if part is None:
+            continue
+        if not _is_in_place(part):
+            message = (
+                f"part '{name}' was moved, turned or scaled in its cage, which bends it as if it "
+                "had been moved before"
+            )
+            hint = "Undo that; or remove the cage, move the part, and create the cage again"
+            found.append(_problem(message, hint, part=name))
+        if part.mode == "EDIT" or len(points) != np.prod(resolution):
             continue
         if part.modifiers or not _is_bent(part, np.array(values["box"]), resolution, points):
-            found.append(
-                {
-                    "severity": "warning",
-                    "message": f"part '{name}' was edited by hand, or has modifiers; its cage "
-                    "ignores that",
-                    "hint": "Remove the cage, edit the part, and create the cage again",
-                    "path": "",
-                    "part": name,
-                }
-            )
+            message = f"part '{name}' was edited by hand, or has modifiers; its cage ignores that"
+            hint = "Remove the cage, edit the part, and create the cage again"
+            found.append(_problem(message, hint, part=name))
     return found
+
+
+def _problem(message: str, hint: str, *, path: str = "", part: str = "") -> dict[str, Any]:
+    """Return a warning in the form of the engine's."""
+    return {"severity": "warning", "message": message, "hint": hint, "path": path, "part": part}
+
+
+def _is_in_place(item: bpy.types.Object) -> bool:
+    """Return whether the frame of an object is that of the design, as of all parts in cages."""
+    return bool(np.abs(np.array(world_matrix(item)) - np.eye(4)).max() < SAME_FRAME)
 
 
 def _is_bent(

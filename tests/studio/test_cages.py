@@ -277,3 +277,21 @@ def test_edits_of_a_part_in_a_cage_are_told(
     assert bpy.ops.optisense.check() == {"FINISHED"}
     assert text in session.state().problem
     assert "Selected: gel" in session.state().hint
+
+
+@pytest.mark.parametrize("kind", ["PART", "CAGE"])
+def test_a_part_that_was_scaled_in_its_cage_is_told(
+    kind: str, mini: Any, select: Callable[..., None]
+) -> None:
+    item = object_of(mini, kind, "skin")
+    select(item)
+    assert "scaled" not in " ".join(draw(OPTISENSE_PT_shapes).texts)
+    rig = bpy.data.objects.new("rig", None)
+    mini.collection.objects.link(rig)
+    item.parent, rig.scale = rig, (0.9, 0.9, 1.0)
+    bpy.context.view_layer.update()
+    text = f"{kind.lower()} 'skin' was moved, turned or scaled"
+    assert text in " ".join(draw(OPTISENSE_PT_shapes).texts).lower()
+    assert bpy.ops.optisense.check() == {"FINISHED"}
+    assert text in session.state().problem.lower()
+    assert f"Selected: {item.name}" in session.state().hint
