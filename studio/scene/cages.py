@@ -215,7 +215,7 @@ def ignored_edits(scene: bpy.types.Scene, cage: bpy.types.Object) -> list[dict[s
     if not _is_in_place(cage):
         message = f"cage '{key}' was moved, turned or scaled as an object; its parts ignore that"
         hint = "Undo that, and move its control points in Edit Shape"
-        found.append(_problem(message, hint, path=f"cages.{key}"))
+        found.append(warning(message, hint, path=f"cages.{key}"))
     for name in values["parts"]:
         part = object_of(scene, "PART", name)
         if part is None:
@@ -226,17 +226,17 @@ def ignored_edits(scene: bpy.types.Scene, cage: bpy.types.Object) -> list[dict[s
                 "had been moved before"
             )
             hint = "Undo that; or remove the cage, move the part, and create the cage again"
-            found.append(_problem(message, hint, part=name))
+            found.append(warning(message, hint, part=name))
         if part.mode == "EDIT" or len(points) != np.prod(resolution):
             continue
         if part.modifiers or not _is_bent(part, np.array(values["box"]), resolution, points):
             message = f"part '{name}' was edited by hand, or has modifiers; its cage ignores that"
             hint = "Remove the cage, edit the part, and create the cage again"
-            found.append(_problem(message, hint, part=name))
+            found.append(warning(message, hint, part=name))
     return found
 
 
-def _problem(message: str, hint: str, *, path: str = "", part: str = "") -> dict[str, Any]:
+def warning(message: str, hint: str, *, path: str = "", part: str = "") -> dict[str, Any]:
     """Return a warning in the form of the engine's."""
     return {"severity": "warning", "message": message, "hint": hint, "path": path, "part": part}
 

@@ -87,6 +87,17 @@ def redraw(contact: bpy.types.Object) -> None:
     values = contact.optisense
     if values.kind != "CONTACT" or not isinstance(contact.data, bpy.types.Mesh):
         return
+    shape = drawing(values)
+    shape.to_mesh(contact.data)
+    shape.free()
+    contact.data.shade_smooth()
+    contact.data.update()
+
+
+def drawing(values: bpy.types.PropertyGroup) -> bmesh.types.BMesh:
+    """Return the shape with which a contact is drawn, in its own frame; empty if its file is not
+    known yet, which is then asked for.
+    """
     shape = bmesh.new()
     down = Matrix.Translation((0.0, 0.0, -values.depth))
     if values.indenter == "sphere":
@@ -121,10 +132,7 @@ def redraw(contact: bpy.types.Object) -> None:
         shape, verts=shape.verts, cent=(0.0, 0.0, 0.0),
         matrix=Matrix.Rotation(math.radians(values.rotation), 3, "Z"),
     )  # fmt: skip
-    shape.to_mesh(contact.data)
-    shape.free()
-    contact.data.shade_smooth()
-    contact.data.update()
+    return shape
 
 
 def absolute_file(values: bpy.types.PropertyGroup) -> str:

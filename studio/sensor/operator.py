@@ -11,8 +11,7 @@ from bpy.props import StringProperty
 from ..core.engine import EngineError
 from ..engine import catalogue, design_transfer, polls, session
 from ..engine.operators import ChoosingFile, Starting, fail, report_error, start
-from ..scene.cages import ignored_edits
-from ..scene.collections import objects_of
+from ..scene.drawings import ignored_edits
 from ..scene.paths import chosen, suggested
 from .opening import digests, open_empty, open_source, saved_in
 
@@ -181,9 +180,8 @@ class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
 
         def checked(result: dict[str, Any]) -> None:
             scene = bpy.data.scenes.get(name)
-            cages = [] if scene is None else objects_of(scene, "CAGE")
-            ignored = [each for cage in cages for each in ignored_edits(scene, cage)]
-            problems = [*result["problems"], *ignored]
+            # Other warnings may follow from edits that are ignored.
+            problems = [*([] if scene is None else ignored_edits(scene)), *result["problems"]]
             if not problems:
                 session.state().note = "The design is in order"
                 return

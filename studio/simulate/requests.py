@@ -9,6 +9,7 @@ import numpy as np
 
 from ..engine import design_transfer, session
 from ..scene.contacts import pressing
+from ..scene.drawings import ignored_edits
 from ..scene.objects_at import select
 from . import picture, relight
 from .exposure import exposure, keep_exposure, resolution, shown_size
@@ -60,6 +61,8 @@ def take(result: dict[str, Any], scene: bpy.types.Scene, *, draft: bool) -> None
     if not all(group.shown for group in scene.optisense.light_groups):
         relight.wanted()
     _tell_unseen(scene, result.get("unseen") or [])
+    if not draft:
+        _tell_ignored(scene)
     session.redraw()
 
 
@@ -86,6 +89,15 @@ def _tell_unseen(scene: bpy.types.Scene, numbers: list[int]) -> None:
             f"The camera does not see {names} (selected): move it to where the camera looks, "
             "which Show Chief Rays draws"
         )
+
+
+def _tell_ignored(scene: bpy.types.Scene) -> None:
+    """Report the first object that is drawn in another place or shape than the picture has it."""
+    found = ignored_edits(scene)
+    if found:
+        now = session.state()
+        message = f"{found[0]['message'][:1].upper()}{found[0]['message'][1:]}"
+        now.note = ". ".join(text for text in (now.note, message) if text)
 
 
 def presses(result: dict[str, Any], names: list[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -13,6 +14,7 @@ from mathutils import Vector
 from studio.core.engine import EngineError
 from studio.engine import design_transfer, session
 from studio.scene.collections import object_of, objects_of
+from studio.scene.lamps import redraw
 from studio.simulate.operator import press_along
 
 
@@ -201,3 +203,37 @@ def test_a_refusal_takes_the_place_of_the_error_before(mini: Any) -> None:
     with pytest.raises(RuntimeError, match="There is no objective"):
         bpy.ops.optisense.choose_objective(objective="no-such-one")
     assert not session.state().problem
+
+
+def scaled(item: Any) -> None:
+    item.scale = (3.0, 3.0, 3.0)
+
+
+def applied(item: Any) -> None:
+    item.location = (3.0, 2.0, 0.0)
+    bpy.context.view_layer.update()
+    bpy.ops.object.transform_apply(location=True, rotation=False, scale=False, isolate_users=True)
+
+
+@pytest.mark.parametrize("kind", ["CONTACT", "LIGHT"])
+@pytest.mark.parametrize("change", [scaled, applied])
+def test_what_is_drawn_otherwise_than_it_is_simulated_is_told(
+    kind: str, change: Callable[[Any], None], mini: Any, select: Callable[..., None]
+) -> None:
+    small(mini)
+    group = mini.optisense.light_groups[0]
+    group.drawn = json.dumps({"window": {"shape": "rectangle", "size": [3.0, 2.0]}})
+    redraw(mini, group)
+    bpy.ops.optisense.add_contact()
+    bpy.ops.optisense.check()
+    assert not session.state().problem
+    item = objects_of(mini, kind)[0]
+    select(item)
+    change(item)
+    bpy.ops.optisense.check()
+    name = f"{kind.capitalize()} '{item.name}' is "
+    assert session.state().problem.startswith(name)
+    assert f"Selected: {item.name}" in session.state().hint
+    if (kind, change) == ("CONTACT", scaled):
+        assert bpy.ops.optisense.simulate() == {"FINISHED"}
+        assert name in session.state().note
