@@ -8,11 +8,9 @@ from typing import Any
 import bpy
 
 from ..core.mesh_file import Mesh
-from . import kinds
 from .cages import add_cage
 from .cameras import add_camera
-from .collections import ALL, OPTICAL_SYSTEM, clear, collection, next_order, objects_of
-from .contacts import stay_on_surface
+from .collections import ALL, OPTICAL_SYSTEM, clear, collection, next_order
 from .lamps import add_light
 from .meshes import new_mesh
 from .properties import USUAL_COATING
@@ -52,8 +50,6 @@ def build(
         add_material(design, name, values)
     for name, values in document["parts"].items():
         add_part(scene, name, values, meshes[name])
-    for contact in objects_of(scene, "CONTACT"):
-        stay_on_surface(scene, contact)
     design.light_groups.clear()
     for name, values in document["lights"].items():
         group = add_light_group(design, name, values)
@@ -94,12 +90,11 @@ def add_part(
     own.order = next_order(scene, "PART")
     own.kind = "PART"
     own.key = key
-    own.role = values["role"]
     own.material = values.get("material") or ""
     own.priority = values.get("priority", 0)
     own.mesh_file = values["mesh"]
-    part.color = kinds.LOOKS[own.role]
     collection(scene, OPTICAL_SYSTEM).objects.link(part)
+    own.role = values["role"]  # its update holds the contacts on a new sensing surface
     return part
 
 

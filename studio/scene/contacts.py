@@ -67,6 +67,12 @@ def stay_on_surface(scene: bpy.types.Scene, contact: bpy.types.Object) -> None:
         stay.track_axis = "TRACK_NEGATIVE_Z"  # the surface's normals point inward
 
 
+def hold_contacts(scene: bpy.types.Scene) -> None:
+    """Constrain all contacts to the scene's present sensing surface."""
+    for contact in objects_of(scene, "CONTACT"):
+        stay_on_surface(scene, contact)
+
+
 def sensing_surface(scene: bpy.types.Scene) -> bpy.types.Object | None:
     """Return the object of the sensing surface, or None."""
     parts = objects_of(scene, "PART")

@@ -30,7 +30,12 @@ def _contact_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context
 
 
 def _role_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:
+    from .contacts import hold_contacts
+
     values.id_data.color = kinds.LOOKS[values.role]
+    if values.role == "sensing_surface":
+        for scene in values.id_data.users_scene:
+            hold_contacts(scene)
 
 
 def _blend_changed(values: bpy.types.PropertyGroup, context: bpy.types.Context) -> None:

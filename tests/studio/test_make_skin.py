@@ -119,3 +119,17 @@ def test_faces_can_be_chosen_by_hand(mini: Any, select: Callable[..., None]) -> 
     assert bpy.ops.optisense.make_skin() == {"FINISHED"}
     skin = sensing_surface(mini)
     assert len(skin.data.polygons) == wanted and bpy.context.mode == "OBJECT"
+
+
+def test_contacts_stay_on_a_new_skin(mini: Any, select: Callable[..., None]) -> None:
+    bpy.ops.optisense.add_contact()
+    without_skin(mini)
+    select(object_of(mini, "PART", "gel"))
+    assert bpy.ops.optisense.make_skin() == {"FINISHED"}
+    contact = objects_of(mini, "CONTACT")[0]
+    contact.location = (3.0, 2.0, 9.0)
+    bpy.context.view_layer.update()
+    assert contact.matrix_world.translation.z == pytest.approx(0.0, abs=1e-5)
+    object_of(mini, "PART", "skin").optisense.role = "blocker"
+    object_of(mini, "PART", "gel").optisense.role = "sensing_surface"
+    assert contact.constraints[0].target == object_of(mini, "PART", "gel")
