@@ -15,7 +15,7 @@ from ..core import cage as core
 from ..core.errors import SceneError
 from ..core.numbers import kept, kept_array
 from .collections import CAGES, collection, next_order, object_of, objects_of
-from .meshes import REST, remembered, show_vertices, shown_vertices
+from .meshes import KEEP_OR_UNDO, added, rest_shape, show_vertices, shown_vertices
 from .world import world_matrix
 
 MOST_KEPT = 32
@@ -191,7 +191,7 @@ def follow(scene: bpy.types.Scene, cage: bpy.types.Object) -> None:
         return
     for name in values["parts"]:
         part = object_of(scene, "PART", name)
-        rest = None if part is None else remembered(part.data, REST)
+        rest = None if part is None else rest_shape(part.data)
         if part is None or rest is None or part.mode == "EDIT":
             continue
         try:
@@ -229,7 +229,9 @@ def ignored_edits(scene: bpy.types.Scene, cage: bpy.types.Object) -> list[dict[s
             found.append(warning(message, hint, part=name))
         if part.mode == "EDIT" or len(points) != np.prod(resolution):
             continue
-        if part.modifiers or not _is_bent(part, np.array(values["box"]), resolution, points):
+        if rest_shape(part.data) is None:
+            found.append(warning(added(name), KEEP_OR_UNDO, part=name))
+        elif part.modifiers or not _is_bent(part, np.array(values["box"]), resolution, points):
             message = f"part '{name}' was edited by hand, or has modifiers; its cage ignores that"
             hint = "Remove the cage, edit the part, and create the cage again"
             found.append(warning(message, hint, part=name))
@@ -253,7 +255,7 @@ def _is_bent(
     points: NDArray[np.float32],
 ) -> bool:
     """Return whether a part has the shape that its cage gives it, as far as that is known."""
-    rest = remembered(part.data, REST)
+    rest = rest_shape(part.data)
     if rest is None or not len(rest):
         return True
     try:

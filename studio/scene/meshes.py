@@ -36,7 +36,14 @@ def new_mesh(name: str, mesh: Mesh) -> bpy.types.Mesh:
 
 
 def remember(mesh: bpy.types.Mesh, name: str, values: ArrayLike) -> None:
-    """Store numbers (n, 3) at the vertices exactly; undo and .blend files keep them."""
+    """Store numbers (n, 3) at the vertices exactly; undo and .blend files keep them.
+
+    Vertices that Blender adds later have zeros, also in the attribute that marks known ones.
+    """
+    known = mesh.attributes.get(f"{name}_known")
+    if known is None:
+        known = mesh.attributes.new(f"{name}_known", "FLOAT", "POINT")
+    known.data.foreach_set("value", np.ones(len(mesh.vertices), dtype=np.float32))
     for number, part in enumerate(split(values)):
         attribute = mesh.attributes.get(f"{name}_{number}")
         if attribute is None:
@@ -45,7 +52,11 @@ def remember(mesh: bpy.types.Mesh, name: str, values: ArrayLike) -> None:
 
 
 def remembered(mesh: bpy.types.Mesh, name: str) -> NDArray[np.float64] | None:
-    """Return the numbers that `remember` stored; None if the vertices are others now."""
+    """Return the numbers that `remember` stored, not-a-number for vertices that were added since;
+    None if no numbers are stored.
+
+    Meshes in .blend files of earlier versions have no marks: all their vertices count as known.
+    """
     parts = []
     for number in range(3):
         attribute = mesh.attributes.get(f"{name}_{number}")
@@ -54,7 +65,21 @@ def remembered(mesh: bpy.types.Mesh, name: str) -> NDArray[np.float64] | None:
         values = np.empty(3 * len(mesh.vertices), dtype=np.float32)
         attribute.data.foreach_get("vector", values)
         parts.append(values.reshape(-1, 3))
-    return joined(parts)
+    found = joined(parts)
+    attribute = mesh.attributes.get(f"{name}_known")
+    if attribute is not None and len(attribute.data) == len(mesh.vertices):
+        known = np.empty(len(mesh.vertices), dtype=np.float32)
+        attribute.data.foreach_get("value", known)
+        found[known < 0.5] = np.nan  # marks of new vertices between others are interpolated
+    return found
+
+
+def rest_shape(mesh: bpy.types.Mesh) -> NDArray[np.float64] | None:
+    """Return the vertices of a part at rest, (n, 3) mm; None if not all are known, because some
+    were added in Blender.
+    """
+    rest = remembered(mesh, REST)
+    return None if rest is None or np.isnan(rest).any() else rest
 
 
 def shown_vertices(mesh: bpy.types.Mesh) -> NDArray[np.float32]:
@@ -99,7 +124,8 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
         caged: whether a cage deforms the part, so that its drawn shape is not that at rest.
 
     Raises:
-        SceneError: the part has modifiers that Blender does not evaluate.
+        SceneError: the part has modifiers that Blender does not evaluate, or its shape at rest is
+            not known.
     """
     if part.mode == "EDIT":
         part.update_from_editmode()
@@ -107,13 +133,23 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     if part.modifiers and not caged:
         return _placed(_modified(part), world)
     data = part.data
+    if caged and rest_shape(data) is None:
+        raise SceneError(f"{added(part.optisense.key)}. {KEEP_OR_UNDO}", "parts")
     rest = remembered(data, REST)
-    shown = shown_vertices(data)
-    vertices = rest if caged and rest is not None else kept_array(rest, shown)
+    vertices = rest if caged else kept_array(rest, shown_vertices(data))
     normals = remembered(data, NORMAL)
     if normals is not None and (rest is None or not np.array_equal(vertices, rest)):
         normals = None
     return _placed(Mesh(vertices, _triangles(data), normals), world)
+
+
+def added(name: str) -> str:
+    """Return the message about a part in a cage that has vertices without a place at rest."""
+    return f"part '{name}' got new vertices in its cage, so that its shape at rest is not known"
+
+
+KEEP_OR_UNDO = "Undo that, or remove the cage: the part then keeps its drawn shape"
+"""What to do about a part whose shape at rest is not known."""
 
 
 def drawn_mesh(part: bpy.types.Object) -> Mesh:

@@ -28,7 +28,7 @@ from ..scene.cages import (
 )
 from ..scene.collections import object_of, objects_of, select_only
 from ..scene.gather import free_name, part_names
-from ..scene.meshes import REST, remembered, settle, show_vertices
+from ..scene.meshes import rest_shape, settle, show_vertices
 
 
 def _cage(context: bpy.types.Context) -> bpy.types.Object | None:
@@ -217,7 +217,7 @@ class OPTISENSE_OT_rest_cage(_OfCage, bpy.types.Operator):
 
 
 class OPTISENSE_OT_remove_cage(polls.Checked, bpy.types.Operator):
-    """Remove the cage; its parts go back to rest"""
+    """Remove the cage; its parts go back to rest, or stay as they are if they got new vertices"""
 
     bl_idname = "optisense.remove_cage"
     bl_label = "Remove Cage"
@@ -229,9 +229,10 @@ class OPTISENSE_OT_remove_cage(polls.Checked, bpy.types.Operator):
         cage = _cage(context)
         for name in cage_data(cage)["parts"]:
             part = object_of(context.scene, "PART", name)
-            rest = None if part is None else remembered(part.data, REST)
-            if part is not None and rest is not None:
-                show_vertices(part.data, rest)
+            if part is not None:
+                rest = rest_shape(part.data)
+                if rest is not None:
+                    show_vertices(part.data, rest)
                 lock(part, False)
         bpy.data.objects.remove(cage)
         return {"FINISHED"}

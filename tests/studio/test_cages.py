@@ -295,3 +295,25 @@ def test_a_part_that_was_scaled_in_its_cage_is_told(
     assert bpy.ops.optisense.check() == {"FINISHED"}
     assert text in session.state().problem.lower()
     assert f"Selected: {item.name}" in session.state().hint
+
+
+def test_vertices_that_were_added_in_a_cage_are_refused_and_kept_without_it(
+    mini: Any, select: Callable[..., None]
+) -> None:
+    gel = object_of(mini, "PART", "gel")
+    before = gather(mini)[1]["gel"].vertices
+    select(gel)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.primitive_cube_add(size=1.0, location=(5.0, 5.0, -2.0))
+    bpy.ops.object.mode_set(mode="OBJECT")
+    text = "art 'gel' got new vertices in its cage"
+    assert text in " ".join(draw(OPTISENSE_PT_shapes).texts)
+    with pytest.raises(RuntimeError, match=f"{text}.*remove the cage"):
+        bpy.ops.optisense.check()
+    bpy.ops.optisense.remove_cage()
+    after = gather(mini)[1]["gel"].vertices
+    assert np.allclose(after[:-8], before, atol=1e-5)
+    assert np.allclose(after[-8:].mean(axis=0), (5.0, 5.0, -2.0))
+    select(gel)
+    assert bpy.ops.optisense.new_cage() == {"FINISHED"}
+    assert np.array_equal(gather(mini)[1]["gel"].vertices, after)
