@@ -29,6 +29,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bench]:
     blender = Path(os.environ[BLENDER]).resolve()
     if os.environ.get(PICTURES):
         home = SHOWN_HOME
+        shutil.rmtree(home, ignore_errors=True)  # a run that was killed leaves it
         home.mkdir()
     else:
         home = tmp_path_factory.mktemp("home")
