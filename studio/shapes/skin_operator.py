@@ -9,6 +9,7 @@ from mathutils import Vector
 from numpy.typing import NDArray
 
 from ..core import outer_faces
+from ..core.errors import SceneError
 from ..engine import polls
 from ..engine.operators import refuse
 from ..scene.build import add_part
@@ -82,7 +83,10 @@ class OPTISENSE_OT_make_skin(polls.Checked, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene, gel = context.scene, _gel(context)
         cage = cage_around(scene, gel)
-        mesh = part_mesh(gel, caged=cage is not None)
+        try:
+            mesh = part_mesh(gel, caged=cage is not None)
+        except SceneError as error:
+            return refuse(self, f"{error}")
         if gel.mode == "EDIT":
             faces = _chosen(gel)
             if not len(faces):
