@@ -15,6 +15,7 @@ from optisense.design import SensorDesign
 from optisense.errors import FolderInUseError, OutputError, SearchError
 from optisense.search import Study, search
 from optisense.search._run_search import run_study
+from optisense.search.study.definitions import SCORING
 from optisense.search.study.store import START, STORE_VERSION
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
@@ -100,6 +101,23 @@ class TestFolder:
         path.write_text(json.dumps({**json.loads(path.read_text()), "seed": 99}))
         with pytest.raises(SearchError, match="was edited"):
             Study.open(folder)
+
+    def test_scores_of_earlier_definitions_are_not_mixed_with_new_ones(
+        self, folder: Path, goals: ModuleType, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """A study of another version of the scoring continues only if its start scores alike."""
+
+        def nearness(design: SensorDesign) -> float:
+            return 1.1 * float(goals.nearness(design))
+
+        monkeypatch.setattr("optisense.search.study.loop.SCORING", SCORING + 1)
+        study = Study.open(folder, goals=[nearness])
+        assert study.settings.scoring == SCORING
+        with pytest.raises(SearchError, match=r"nearness was .* and is .* now") as told:
+            run_study(study, limit=10)
+        assert "new study with another --out" in str(told.value.hint)
+        assert (len(study.trials), study.budget) == (6, 5)
+        assert len(run_study(Study.open(folder, goals=[goals.nearness]), limit=10).trials) == 11
 
     def test_broken_files_are_told(self, folder: Path, tmp_path: Path) -> None:
         with pytest.raises(SearchError, match="no study in this folder"):

@@ -25,6 +25,7 @@ from optisense.search.study._tally import Tally
 from optisense.search.study.advice import moved_start_note
 from optisense.search.study.best import newer_note, tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
+from optisense.search.study.definitions import SCORING, refuse_other_definitions
 from optisense.search.study.progress import (
     FRESH,
     START_STAGE,
@@ -102,19 +103,20 @@ class StudyRun:
 
         Raises:
             FolderInUseError: another process runs this study.
-            SearchError: all trials fail.
+            SearchError: all trials fail, or an earlier release scored them by other definitions.
             SetupError, OutputError: no trial can be scored, or written.
         """
         study = self.study
         study.lock()
         interrupted, ended = False, ""
-        if self.limit > study.budget:
-            study.store.set_fact(BUDGET, self.limit)
         for row in study.store.rows():
             if row.outcome is not None:
                 self._tally.count(row, row.outcome)
         try:
             with self._running(self._evaluator) as runner:
+                self._check_definitions(runner)
+                if self.limit > study.budget:
+                    study.store.set_fact(BUDGET, self.limit)
                 self._begin(START_STAGE, 1)
                 self._score_start(runner)
                 self._begin(TRIALS, self.limit, self._tally.done)
@@ -221,6 +223,20 @@ class StudyRun:
         """Read the best design so far, unless the method looks for a front."""
         if not self.method.multi_objective:
             self._watch.update(last=last)
+
+    def _check_definitions(self, runner: Runner) -> None:
+        """Score the first finished trial of an earlier release again, with the seed of the study.
+
+        Raises:
+            SearchError: its scores are other ones now, so that new trials could not be compared.
+        """
+        settings = self.study.settings
+        first = next((trial for trial in self.study.trials if not trial.outcome.failed), None)
+        if settings.scoring == SCORING or first is None:
+            return
+        then = first.outcome
+        job = (first.number, first.vector, settings.seed)
+        run_jobs(runner, [job], lambda _, now: refuse_other_definitions(then, now), self._report)
 
     def _score_start(self, runner: Runner) -> None:
         store = self.study.store

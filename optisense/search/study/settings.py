@@ -28,7 +28,7 @@ LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")
 MOST_NAMES = 100
 """Largest number of a study's objectives, or rules; with more, no useful front is found."""
 
-LATER = ("requirements", "coarse_first")
+LATER = ("requirements", "coarse_first", "scoring")
 """Settings that studies of earlier releases do not have. They count as their defaults, and are left
 out of comparisons if they have their defaults, so that such studies can be resumed.
 """
@@ -61,6 +61,8 @@ class StudySettings:
         samples: number of manufactured sensors per trial.
         requirements: conditions that the best trial must meet.
         coarse_first: whether trials have coarse scores, and only the promising ones full scores.
+        scoring: version of the definitions of the scores (`optisense.search.study.definitions`);
+            0 if it was not stored yet.
         begun: time of creation, UTC.
         versions: versions of the packages with which the study was begun.
 
@@ -87,6 +89,7 @@ class StudySettings:
     samples: Whole = 0
     requirements: Names = field(default_factory=list)
     coarse_first: bool = False
+    scoring: Whole = 0
     begun: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     versions: dict[str, str] = field(default_factory=lambda: package_versions())
 
@@ -101,9 +104,10 @@ class StudySettings:
 
     def comparable(self) -> dict[str, Any]:
         """Return the settings that must be equal for a study to be resumed. The design, which is
-        compared value by value, and the budget, which may grow, are left out.
+        compared value by value, the budget, which may grow, and the version of the scoring, of
+        which trials are compared, are left out.
         """
-        return self._without("begun", "versions", "design", "fingerprint", "budget")
+        return self._without("begun", "versions", "scoring", "design", "fingerprint", "budget")
 
     def _without(self, *names: str) -> dict[str, Any]:
         """Return all settings but these, and but those of `LATER` that are not used."""
