@@ -107,11 +107,12 @@ def print_result(result: SearchResult, out: Path) -> None:
 
 
 def _end(result: SearchResult) -> str:
-    """Return the number of trials, of how many if they are fewer, and why the search has ended."""
+    """Return the number of trials, of the limit of this run if they are fewer, and why the search
+    has ended.
+    """
     count = sum(not trial.is_start for trial in result.trials)
-    budget = result.study.budget
-    of = f" of {budget:,}" if count < budget else ""
-    return f"{count:,}{of} {'trial' if budget == 1 else 'trials'}: {result.ended}"
+    of = f" of {result.limit:,}" if count < result.limit else ""
+    return f"{count:,}{of} {'trial' if max(count, result.limit) == 1 else 'trials'}: {result.ended}"
 
 
 def _print_nearest(trials: Sequence[Trial]) -> None:

@@ -11,6 +11,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from optisense.cli.search_result import _end
 from optisense.design import SensorDesign
 from optisense.errors import FolderInUseError, OutputError, SearchError
 from optisense.search import Study, search
@@ -63,6 +64,7 @@ class TestFolder:
         assert any(told in note for note in stopped.notes)
         assert Study.open(folder).budget == 200  # which the next run goes on to by default
         ended = run_study(study, limit=70)
+        assert _end(ended) == "70 trials: the budget is spent"  # not "70 of 200"
         assert ended.best.fresh and not any("fresh seeds yet" in note for note in ended.notes)
 
     def test_a_study_is_not_begun_over_another(

@@ -149,7 +149,7 @@ class StudyRun:
             *self.method.notes(),
             *(note for note in found_notes if note is not None),
         ]
-        return SearchResult(study, interrupted, ended, tuple(notes))
+        return SearchResult(study, interrupted, ended, tuple(notes), self.limit)
 
     @contextmanager
     def _running(self, evaluator: Evaluator) -> Iterator[Runner]:

@@ -61,12 +61,15 @@ class SearchResult:
         interrupted: whether it was stopped before its end.
         ended: reason why it ended.
         notes: notes for the user.
+        limit: number of trials at which the run ends, those of earlier runs included; 0 if it is
+            not known.
     """
 
     study: Study
     interrupted: bool
     ended: str
     notes: tuple[str, ...] = ()
+    limit: int = 0
 
     @property
     def best(self) -> Trial:
