@@ -293,7 +293,7 @@ class SensorDesign(Model):
             type(self) is type(other)
             and self.__dict__ == other.__dict__
             and self._meshes.keys() == other._meshes.keys()
-            and all(mesh.equals(other._meshes[name]) for name, mesh in self._meshes.items())
+            and all(same_mesh(mesh, other._meshes[name]) for name, mesh in self._meshes.items())
         )
 
     def _repr_html_(self) -> str:
@@ -353,6 +353,15 @@ class SensorDesign(Model):
             if path in before:
                 value.located(before[path].folder)
         return design
+
+
+def same_mesh(one: TriangleMesh | None, other: TriangleMesh | None) -> bool:
+    """Return whether two meshes of a design are equal; objects of other types, which users may have
+    set, are equal if they are the same object.
+    """
+    return one is other or (
+        isinstance(one, TriangleMesh) and isinstance(other, TriangleMesh) and one.equals(other)
+    )
 
 
 def refuse_no_design(given: object) -> None:
