@@ -8,12 +8,12 @@ Grammar: names and list indices, as in `coating.specularity`, `lights.red.flux`,
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
-from optisense.design.sensor_design import SensorDesign, dotted, refuse_no_design
+from optisense.design.sensor_design import SensorDesign, dotted, refuse_no_design, same_mesh
 from optisense.errors import DesignError
 from optisense.near import suggestion
 
@@ -40,7 +40,8 @@ def get_value(design: SensorDesign, path: str) -> Any:
 def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
     """Return a new, checked design with `value` at `path`; the given design is not changed.
 
-    The provenance of this path is dropped if the value is another one.
+    Sources of this value, of values in it and of values that hold it are dropped from the
+    provenance if they are other ones then.
 
     Raises:
         DesignError: the path names nothing, or the value does not fit there.
@@ -51,7 +52,7 @@ def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
 def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesign:
     """Return a new design with all these values by their paths, checked once with all of them.
 
-    The provenance of these paths is dropped where the value is another one.
+    Sources of values that are other ones then are dropped from the provenance; see `set_value`.
 
     Raises:
         DesignError: a path names nothing, or the values do not fit there.
@@ -59,15 +60,41 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
     refuse_no_design(design)
     data = design._data()
     for path, value in values.items():
-        before = get_value(design, path)  # raises an error that suggests a similar name
+        get_value(design, path)  # raises an error that suggests a similar name
         target: Any = data
         *way, last = parse_path(path)
         for step in way:
             target = target[_key(target, step)]
-        target[_key(target, last)] = plain = _plain(value)
-        if _plain(before) != plain:
-            data["provenance"].pop(path, None)
-    return design._replaced(data, where=", ".join(values))
+        target[_key(target, last)] = _plain(value)
+    edited = design._replaced(data, where=", ".join(values))
+    for path in changed_paths(design, edited, design.provenance):
+        edited.provenance.pop(path, None)
+    return edited
+
+
+def changed_paths(before: SensorDesign, after: SensorDesign, paths: Iterable[str]) -> list[str]:
+    """Return the paths at which a value of one design is another one in a second design, or is in
+    one of them only. A part has another value if its mesh is another one.
+    """
+    return [
+        path
+        for path in paths
+        if found_at(before, path) != found_at(after, path) or not _same_part(before, after, path)
+    ]
+
+
+def found_at(design: SensorDesign, path: str) -> tuple[Any, ...]:
+    """Return the value at a path as a tuple of one; an empty tuple if the path names nothing."""
+    try:
+        return (get_value(design, path),)
+    except DesignError:
+        return ()
+
+
+def _same_part(before: SensorDesign, after: SensorDesign, path: str) -> bool:
+    """Return False if the path names a part that has another mesh in the second design."""
+    section, _, name = path.partition(".")
+    return section != "parts" or same_mesh(before.meshes.get(name), after.meshes.get(name))
 
 
 def parse_path(path: str) -> Steps:

@@ -133,6 +133,9 @@ def _fitted(build: Callable[..., SensorDesign], dimensions: dict[str, Any]) -> S
             continue
         if place == "camera.position":
             value = [*value[:2], design.camera.position[2]]
+        calibrated = Provenance(status=Status.CALIBRATED, source=entry["source"])
+        # Sources of whole parts and groups stay: they hold for the numbers that are not fitted.
+        sources = design.provenance | {place: calibrated}
         design = set_value(design, place, value)
-        design.provenance[place] = Provenance(status=Status.CALIBRATED, source=entry["source"])
+        design.provenance = sources
     return design

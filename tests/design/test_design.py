@@ -143,6 +143,24 @@ def test_a_changed_number_loses_its_source(design: SensorDesign) -> None:
     changed = ots.set_value(design, "lights.red.flux", 9.0)
     assert "lights.red.flux" not in changed.provenance
     assert design.provenance["lights.red.flux"] == known
+    position = ots.get_value(design, "camera.position")
+    for path, value, told, kept_at in (
+        ("lights.red", {**design.lights["red"].model_dump(), "flux": 9.0},
+         "lights.red.flux", "lights.red.colour"),
+        ("camera.position.z", position[2] + 1.0, "camera.position", "camera.position.x"),
+    ):  # fmt: skip
+        design.provenance |= {told: known, kept_at: known}
+        changed = ots.set_value(design, path, value)
+        assert told not in changed.provenance
+        assert changed.provenance[kept_at] == known
+
+
+def test_designs_with_wrong_meshes_can_be_compared(design: SensorDesign) -> None:
+    other = design.copy()
+    assert other == design
+    for wrong in (None, "a file"):
+        other.meshes["gel"] = wrong
+        assert other != design and design != other
 
 
 def test_a_name_that_no_folder_can_have() -> None:

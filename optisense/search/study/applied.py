@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from optisense.design import Part, Provenance, SensorDesign, Status, get_value
-from optisense.errors import DesignError
+from optisense.design import Provenance, SensorDesign, Status
+from optisense.design.addressing import changed_paths, found_at
 from optisense.search.study.study import Study
 from optisense.search.study.trial import Trial
 
@@ -35,22 +33,8 @@ def design_of(study: Study, trial: Trial) -> SensorDesign:
     }
     varied |= {path for p in study.space.parameters if p.variable for path in p.variable.values}
     varied |= {f"lights.{group}.model" for group in design.lights}  # lights.model varies them all
-    known = {path: each for path, each in design.provenance.items() if _value(design, path)}
-    for path in {**known, **dict.fromkeys(sorted(varied))}:
-        now, then = _value(design, path), _value(before, path)
-        if now and now != then:
-            known[path] = found
-    return design.model_copy(update={"provenance": known})
-
-
-def _value(design: SensorDesign, path: str) -> tuple[Any, ...]:
-    """Return the value at a path, and the vertices of a part, or an empty tuple if the path names
-    nothing.
-    """
-    try:
-        value = get_value(design, path)
-    except DesignError:
-        return ()
-    if isinstance(value, Part):
-        return value, design.meshes[path.removeprefix("parts.")].vertices.tobytes()
-    return (value,)
+    sources = {**before.provenance, **design.provenance}
+    changed = changed_paths(before, design, [*sources, *sorted(varied - sources.keys())])
+    marked = sources | dict.fromkeys((path for path in changed if found_at(design, path)), found)
+    kept = {path: each for path, each in marked.items() if each is found or path not in changed}
+    return design.model_copy(update={"provenance": kept})
