@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from optisense import library, sensors
-from optisense.design import Role, SensorDesign, add_cage, get_value, set_value
+from optisense.design import (
+    Role,
+    SensorDesign,
+    add_cage,
+    get_value,
+    load_design,
+    save_design,
+    set_value,
+)
 from optisense.design.cage import as_array
 from optisense.errors import DesignError, OptiSenseError, SearchError
 from optisense.search import (
@@ -19,7 +29,7 @@ from optisense.search import (
     Together,
 )
 from optisense.search.space._expansion import expand
-from optisense.search.space.search_space import BoundSpace
+from optisense.search.space.search_space import BoundSpace, checked
 
 
 class TestNumbers:
@@ -424,3 +434,14 @@ def test_a_camera_from_the_library_keeps_the_width_of_the_picture() -> None:
     design = set_value(sensors.gelsight_mini_ideal(), "camera.resolution", [320, 240])
     sizes = [space.bind(design).apply(np.array([i])).camera.resolution for i in (0.0, 1.0, 2.0)]
     assert sizes == [(320, 240), (320, 240), (320, 180)]  # 4608 x 2592 is 16 to 9
+
+
+def test_a_wrong_varied_value_blames_no_line_of_the_file(
+    mini: SensorDesign, tmp_path: Path
+) -> None:
+    save_design(mini, tmp_path / "mini")
+    read = load_design(tmp_path / "mini")
+    wide = read.camera.model_copy(update={"fov": 500.0})
+    with pytest.raises(DesignError, match="'camera.fov' = 500") as told:
+        checked(read.model_copy(update={"camera": wide}))
+    assert told.value.where == "the varied design"

@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import ValidationError
 
 from optisense.array_types import FloatArray
 from optisense.design import SensorDesign, get_value, set_values
-from optisense.design.problems import design_error
 from optisense.errors import OptiSenseError, SearchError
 from optisense.search.space._edit import Edit
 from optisense.search.space._expansion import expand
@@ -319,11 +317,7 @@ def checked(design: SensorDesign) -> SensorDesign:
     Raises:
         DesignError: a value does not fit.
     """
-    try:
-        return design.copy()
-    except ValidationError as error:
-        data = design.model_dump(mode="json")
-        raise design_error(error, data, where="the varied design") from None
+    return design._replaced(design._data(), where="the varied design")
 
 
 def _low(kind: Continuous | Integer | Choice) -> float:
