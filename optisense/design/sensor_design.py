@@ -209,10 +209,16 @@ class SensorDesign(Model):
         """Return the mesh of each part in its current shape: as stored, then deformed by its cage.
 
         Raises:
-            DesignError: a vertex of a caged part lies outside the cage's box.
+            DesignError: a vertex of a caged part lies outside the cage's box, or a mesh is an
+                object of another type.
+            MeshError: a mesh has no vertices or no triangles.
         """
         from optisense.geometry.cage import deformed
 
+        for name in self.parts.keys() & self._meshes.keys():
+            mesh = self._meshes[name]
+            if not isinstance(mesh, TriangleMesh) or not len(mesh.vertices) or not len(mesh.faces):
+                self.valid_mesh(name)  # raises the error; a full check here would be slow
         result = dict(self._meshes)
         for cage_name, cage in self.cages.items():
             box = np.array(cage.box, dtype=np.float64)

@@ -15,7 +15,7 @@ from optisense.design.arrangement import may_overlap
 from optisense.design.cage_checks import _overlap
 from optisense.design.camera_checks import view_shares
 from optisense.design.check import inside
-from optisense.errors import DesignError
+from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.search.space.constraints import NoCrossings
 
@@ -76,12 +76,16 @@ def test_an_object_that_is_no_mesh(design: SensorDesign) -> None:
     design.meshes["gel"] = SimpleNamespace(vertices=(), faces=())  # type: ignore[assignment]
     problem = only(check_design(design))
     assert "SimpleNamespace" in problem.message and "TriangleMesh(" in str(problem.hint)
+    with pytest.raises(DesignError, match="SimpleNamespace"):
+        design.deformed_meshes()
 
 
 @pytest.mark.parametrize("faces", [[], [[0, 1, 2]]])
 def test_a_mesh_without_vertices(design: SensorDesign, faces: list[list[int]]) -> None:
     design.meshes["gel"] = TriangleMesh([], faces)
     assert "part 'gel'" in only(check_design(design)).message
+    with pytest.raises(MeshError, match="part 'gel'"):
+        design.deformed_meshes()
 
 
 def test_a_missing_mesh(design: SensorDesign) -> None:

@@ -442,6 +442,6 @@ def test_a_wrong_varied_value_blames_no_line_of_the_file(
     save_design(mini, tmp_path / "mini")
     read = load_design(tmp_path / "mini")
     wide = read.camera.model_copy(update={"fov": 500.0})
-    with pytest.raises(DesignError, match="'camera.fov' = 500") as told:
+    with pytest.raises(DesignError, match=r"'camera\.fov' = 500") as told:
         checked(read.model_copy(update={"camera": wide}))
     assert told.value.where == "the varied design"
