@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -81,9 +81,9 @@ class Evaluation(CachedValues):
         self._progress = progress or (lambda fraction, text: None)
         self._untouched_responses: dict[tuple[float, bool], NDArray[np.float32]] = {}
 
-    @property
+    @cached_property
     def design(self) -> SensorDesign:
-        """The sensor design."""
+        """The sensor design, copied once from the model."""
         return self.model.design
 
     @property

@@ -98,7 +98,8 @@ class Objective:
 
     def __call__(self, evaluation: Evaluation, **settings: Any) -> Any:
         """Call the function itself, without any checks of its result."""
-        given = evaluation.design if takes_design(self.function) else evaluation
+        # A user's function gets a copy, as it may edit it; other objectives share the design.
+        given = evaluation.design.copy() if takes_design(self.function) else evaluation
         return self.function(given, **settings)
 
     @property
