@@ -37,8 +37,14 @@ gives; a larger one is reported.
 """
 
 BESIDE = 1.0
-"""Largest distance (mm) of a light from a part that it lies beside, and by which the part must move
-away for a warning: about the height of an LED's package."""
+"""Largest distance of a light from a part that it lies beside, mm: the height of an LED's package,
+whose window is that far from the board or the part on which it stands.
+"""
+
+LEFT_BEHIND = 1.0
+"""Least motion of a part, mm, after which a warning names lights that did not move with it: by less
+than the height of its package, a light still lies at the part.
+"""
 
 FOLDS = {
     "inside out": "is turned inside out by cage '{cage}' near {place}: {count} of its vertices",
@@ -203,7 +209,8 @@ def _leaves(cage: Cage, place: NDArray[np.float64], rest: TriangleMesh, bent: Tr
     if (ray_hits(bent, place + way, -way).distance < 1.0).any():
         return True
     before = distance_within(rest, place, BESIDE)
-    return before <= BESIDE and distance_within(bent, place, before + BESIDE) > before + BESIDE
+    away = before + LEFT_BEHIND
+    return before <= BESIDE and distance_within(bent, place, away) > away
 
 
 def _coats(surface: TriangleMesh, solid: TriangleMesh) -> bool:
