@@ -107,8 +107,9 @@ class Model(BaseModel):
     model_config = ConfigDict(extra="forbid", validate_assignment=True)
 
     error_in_words: ClassVar[Callable[..., DesignError]]
-    """The function `design_error` of `optisense.design.problems`, which sets it: that module
-    imports all models, so that they can't import it."""
+    """The function `design_error` of `optisense.design.problems`, which sets it when it is
+    imported. It words an error by the fields of all models, so that its module imports them, and an
+    import here would be a cycle."""
 
     def __setattr__(self, name: str, value: object) -> None:
         """Set a field if the value fits.
@@ -120,7 +121,9 @@ class Model(BaseModel):
         try:
             super().__setattr__(name, value)
         except ValidationError as error:
-            self.__dict__.update(before)  # pydantic sets it before it compares fields
+            # Validators of a whole model see the new value in the model: pydantic sets it before
+            # they run, and leaves it there if one of them refuses it.
+            self.__dict__.update(before)
             raise Model.error_in_words(error, {name: value}, where=name, model=type(self)) from None
 
 

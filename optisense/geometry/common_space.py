@@ -94,10 +94,9 @@ def as_manifold(mesh: TriangleMesh) -> Any:
     import manifold3d
 
     welded = mesh.welded()
-    vertices, faces = (
-        welded.vertices.copy(),
-        welded.faces.astype(np.uint64),
-    )  # it takes no read-only
+    # manifold3d refuses arrays that are read-only, so both are copies.
+    vertices = welded.vertices.copy()
+    faces = welded.faces.astype(np.uint64)
     return manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
 
 

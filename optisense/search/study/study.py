@@ -331,8 +331,14 @@ class Study:
 
     @property
     def _judged(self) -> float:
-        """Number of trials that there were when the best were last scored with fresh seeds; of a
-        finished study of an earlier release, which did not store it, all.
+        """Number of trials that were considered when the best were last scored with fresh seeds.
+
+        It is one of three:
+            the stored number, once a run has scored the best;
+            0, if the study does not store it and has not ended or was interrupted: no trial was
+            considered;
+            infinity, if the study does not store it and has ended, in a release that did not store
+            it: all trials were considered.
         """
         found = self.store.fact(JUDGED)
         if isinstance(found, int):

@@ -25,8 +25,11 @@ from optisense.sensors.from_meshes.recipe_parts import ShapeReference
 from optisense.sensors.from_meshes.surfaces import chosen, pick
 
 LITTLE_SEEN = 0.5
-"""Share of the area of the sensing surface that the camera sees below which a note states it:
-the built-in sensors see more."""
+"""Share of the area of the sensing surface that the camera sees below which `new` notes it. The
+built-in sensors have 0.51 (GelBelt) and more by this estimate, which neglects refraction. It is
+larger than `LEAST_SKIN` (0.25), below which `check` warns and scores refuse: a camera that has just
+been placed is easily moved.
+"""
 
 
 def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGroup:
