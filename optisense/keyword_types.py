@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import numbers
 from collections.abc import Sequence
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
@@ -12,8 +13,15 @@ WORDS = {bool: "true or false", int: "a whole number", float: "a number", str: "
 """What a user is asked to give for an argument of each type."""
 
 
+def is_real(value: Any) -> bool:
+    """Return whether a value is a real number of Python or NumPy, also an infinite one or NaN, and
+    not a truth value.
+    """
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
 def is_number(value: Any) -> bool:
-    """Return whether a value is a finite real number, and not a truth value."""
+    """Return whether a value is a finite number that JSON can hold, and not a truth value."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 

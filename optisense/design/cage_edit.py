@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import numbers
 import operator
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,6 +16,7 @@ from optisense.design.limits import LARGEST
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry.cage_map import refined_points
+from optisense.keyword_types import is_real
 from optisense.near import suggestion
 
 Resolution = tuple[int, int, int]
@@ -60,7 +60,7 @@ def add_cage(
         )
     chosen = list(parts)
     resolution = _counts(resolution)
-    if not (_is_number(margin) and 0.0 <= margin <= LARGEST):
+    if not (is_real(margin) and 0.0 <= margin <= LARGEST):
         raise DesignError(f"the margin of a cage is {margin}", hint=f"Give 0 to {LARGEST:g}, in mm")
     if name in design.cages:
         raise DesignError(
@@ -206,7 +206,7 @@ def set_range(
                 hint=f"Give {len(now)} rows of x, y, z, in mm",
             )
         data[field] = _plain(points)
-    if not (blend is None or _is_number(blend)):
+    if not (blend is None or is_real(blend)):
         raise DesignError(
             f"the blend of cage '{name}' is no number",
             where=design.where("cages", name, "blend"),
@@ -271,10 +271,6 @@ def _counts(resolution: Iterable[int]) -> Resolution:
     if min(counts) < 2 or max(counts) > MOST_ALONG or math.prod(counts) > MAX_POINTS:
         raise DesignError(f"a cage can't have {_times(counts)} control points", hint=hint)
     return counts
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, numbers.Real) and not isinstance(value, bool)
 
 
 def _array(values: object) -> NDArray[np.float64] | None:

@@ -21,6 +21,7 @@ import numpy as np
 from optisense.errors import ContactError
 from optisense.geometry.mesh import TriangleMesh
 from optisense.geometry.rotations import turn_about_axes
+from optisense.keyword_types import is_real
 from optisense.near import suggestion
 from optisense.registry import Registry, must_derive, place_of_definition
 from optisense.text import brief
@@ -77,8 +78,7 @@ class Quantity:
 
     def check(self, owner: str, name: str, value: Any) -> None:
         """Raise ContactError if a value is not a finite number or is outside the limits."""
-        is_number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        if is_number and math.isfinite(value) and self.low <= value <= self.high:
+        if is_real(value) and math.isfinite(value) and self.low <= value <= self.high:
             return
         if self.low == ABOVE_ZERO:
             hint = "Give one above 0"
@@ -87,7 +87,7 @@ class Quantity:
         else:
             hint = "Give a finite number"
         title = name.replace("_", " ")
-        text = f"{value:g}" if is_number else brief(repr(value))
+        text = f"{value:g}" if is_real(value) else brief(repr(value))
         raise ContactError(f"the {title} of an indenter ({owner}) is {text}", hint=hint)
 
 

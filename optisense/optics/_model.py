@@ -15,6 +15,7 @@ from optisense.design import SensorDesign
 from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact import refuse_no_contacts
+from optisense.keyword_types import is_real
 from optisense.mechanics import ELASTIC, SKINS, PressedSkin, SkinMesh
 from optisense.mechanics.skins import refuse_drags
 from optisense.optics._ray_model import RayModel
@@ -398,7 +399,7 @@ def _check_choices(estimator: str, skin: str, noise: Any, seconds: Any, seed: An
     if skin not in SKINS:
         raise RenderError(f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS))
     for name, value in (("noise", noise), ("seconds", seconds)):
-        if value is not None and not (isinstance(value, int | float | np.number) and value > 0):
+        if value is not None and not (is_real(value) and value > 0):
             raise RenderError(
                 f"the limit '{name}' is {value!r}", hint="Give a number above 0, or none"
             )

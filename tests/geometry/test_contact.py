@@ -42,6 +42,11 @@ def test_a_place_that_is_not_finite_is_refused() -> None:
         parse_place("nan,0")
 
 
+def test_a_complex_radius_is_refused() -> None:
+    with pytest.raises(ContactError, match="radius"):
+        Sphere(np.complex128(1.0))
+
+
 def test_lists_and_arrays_of_numbers_are_kept_as_tuples() -> None:
     at = np.array([1.0, 0.0])
     made = Contact(Sphere(2), at=at, depth=np.float32(0.5), along=[1, 0, 0], shift=np.zeros(2))  # type: ignore[arg-type]

@@ -288,7 +288,15 @@ def test_contacts_that_are_no_list_of_contacts_are_refused(contacts: Any) -> Non
 
 
 @pytest.mark.parametrize(
-    "given", [{"noise": "1"}, {"seconds": 0}, {"seed": 1.5}, {"seed": -1}, {"seed": 2**32}]
+    "given",
+    [
+        {"noise": "1"},
+        {"noise": True},
+        {"seconds": 0},
+        {"seed": 1.5},
+        {"seed": -1},
+        {"seed": 2**32},
+    ],
 )
 def test_an_impossible_limit_or_seed_is_refused(given: Any) -> None:
     with pytest.raises(RenderError, match=next(iter(given))):
