@@ -5,27 +5,25 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import drjit as dr
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import SensorDesign
-from optisense.errors import RenderError
 from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.contact import refuse_no_contacts
-from optisense.keyword_types import is_real
-from optisense.mechanics import ELASTIC, SKINS, PressedSkin, SkinMesh
+from optisense.mechanics import ELASTIC, PressedSkin, SkinMesh
 from optisense.mechanics.skins import refuse_drags
 from optisense.optics._ray_model import RayModel
-from optisense.optics._skin_view import VIEW_ACROSS, SkinView, is_size
+from optisense.optics._render_settings import check_choices, check_pixels, number_of_photons
+from optisense.optics._skin_view import VIEW_ACROSS, SkinView
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import bound_memory
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
 from optisense.optics.backend.versions import versions
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.estimators import ESTIMATORS, RADIANCE_CACHE, SPPM
+from optisense.optics.estimators import RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import render_cached
 from optisense.optics.imaging.image_layers import ImageLayers
 from optisense.optics.imaging.known_view import KnownView
@@ -42,7 +40,7 @@ from optisense.optics.scene.surface_cells import fineness
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
-from optisense.quality import MOST_PIXELS, MOST_SEED, PICTURE_PHOTONS, SCORE_PHOTONS, photons_of
+from optisense.quality import PICTURE_PHOTONS, SCORE_PHOTONS
 
 SPPM_PASS_PHOTONS = 1_000_000
 """Largest number of photons of one pass of the `sppm` estimator: enough that a disc of 0.3 mm on
@@ -212,10 +210,10 @@ class OpticalModel(RayModel):
             RenderError: the camera sees nothing of the sensing surface, or a setting is invalid.
         """
         refuse_no_contacts(contacts)
-        _check_choices(estimator, skin, noise, seconds, seed)
+        check_choices(estimator, skin, noise, seconds, seed)
         refuse_drags(contacts, skin)
-        _check_pixels(resolution)
-        number = None if photons is None else _photons_of(photons)
+        check_pixels(resolution)
+        number = None if photons is None else number_of_photons(photons)
         began = time.perf_counter()
         bound_memory()
         on_stage = _stage_callback(progress or self.listener, began)
@@ -390,35 +388,6 @@ class OpticalModel(RayModel):
         return ImageLayers.from_sppm(result, view.rays, began)
 
 
-def _check_choices(estimator: str, skin: str, noise: Any, seconds: Any, seed: Any) -> None:
-    """Raise RenderError if a setting of `OpticalModel.render` is invalid."""
-    if estimator not in ESTIMATORS:
-        raise RenderError(
-            f"there is no estimator '{estimator}'", hint="Use " + " or ".join(ESTIMATORS)
-        )
-    if skin not in SKINS:
-        raise RenderError(f"there is no kind of skin '{skin}'", hint="Use " + " or ".join(SKINS))
-    for name, value in (("noise", noise), ("seconds", seconds)):
-        if value is not None and not (is_real(value) and value > 0):
-            raise RenderError(
-                f"the limit '{name}' is {value!r}", hint="Give a number above 0, or none"
-            )
-    if not (isinstance(seed, int | np.integer) and 0 <= seed <= MOST_SEED):
-        raise RenderError(f"the seed is {seed!r}", hint=f"Give a number from 0 to {MOST_SEED}")
-
-
-def _check_pixels(resolution: object) -> None:
-    """Raise RenderError if a picture has too many pixels."""
-    if not is_size(resolution):
-        return
-    width, height = map(int, resolution)  # a product of NumPy's integers may overflow
-    if width * height > MOST_PIXELS:
-        raise RenderError(
-            f"a picture of {width} x {height} pixels is too large",
-            hint=f"Ask for at most {MOST_PIXELS:,} pixels",
-        )
-
-
 def _stage_callback(
     listener: Callable[[RenderProgress], None] | None, began: float
 ) -> StageCallback:
@@ -446,10 +415,3 @@ def _named(contacts: Sequence[Contact], placed: list[TriangleMesh]) -> dict[str,
 
 def _percent(noise: float | None) -> float | None:
     return None if noise is None or not np.isfinite(noise) else round(100 * noise, 4)
-
-
-def _photons_of(given: int | str) -> int:
-    try:
-        return photons_of(given)
-    except ValueError as error:
-        raise RenderError(str(error)) from None
