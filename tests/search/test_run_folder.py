@@ -16,7 +16,7 @@ from optisense.design import SensorDesign
 from optisense.errors import FolderInUseError, OutputError, SearchError
 from optisense.search import Study, search
 from optisense.search._run_search import run_study
-from optisense.search.study.definitions import SCORING
+from optisense.search.study._definitions import SCORING
 from optisense.search.study.store import START, STORE_VERSION
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}

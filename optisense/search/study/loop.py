@@ -18,6 +18,7 @@ from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import Runner, SerialRunner
 from optisense.search.executors.base import TICK, run_jobs
 from optisense.search.methods import Method, Problem, make
+from optisense.search.study._definitions import SCORING, refuse_other_definitions
 from optisense.search.study._evaluators import evaluators
 from optisense.search.study._promotion import promote
 from optisense.search.study._reading_watch import ReadingWatch
@@ -25,7 +26,6 @@ from optisense.search.study._tally import Tally
 from optisense.search.study.advice import moved_start_note
 from optisense.search.study.best import newer_note, tie_note
 from optisense.search.study.conditions import condition_note, worsened_note
-from optisense.search.study.definitions import SCORING, refuse_other_definitions
 from optisense.search.study.progress import (
     FRESH,
     START_STAGE,

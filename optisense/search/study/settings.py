@@ -61,7 +61,7 @@ class StudySettings:
         samples: number of manufactured sensors per trial.
         requirements: conditions that the best trial must meet.
         coarse_first: whether trials have coarse scores, and only the promising ones full scores.
-        scoring: version of the definitions of the scores (`optisense.search.study.definitions`);
+        scoring: version of the definitions of the scores (`optisense.search.study._definitions`);
             0 if it was not stored yet.
         begun: time of creation, UTC.
         versions: versions of the packages with which the study was begun.
