@@ -28,9 +28,14 @@ LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")
 MOST_NAMES = 100
 """Largest number of a study's objectives, or rules; with more, no useful front is found."""
 
-LATER = ("requirements", "coarse_first", "scoring")
+LATER = ("requirements", "coarse_first")
 """Settings that studies of earlier releases do not have. They count as their defaults, and are left
 out of comparisons if they have their defaults, so that such studies can be resumed.
+"""
+
+OPTIONAL = (*LATER, "scoring")
+"""Names that may be missing in `STUDY_FILE`. New studies always have a version of the scoring, which
+is compared by scores and not by its number.
 """
 
 Names = Annotated[list[str], Field(max_length=MOST_NAMES)]
@@ -110,11 +115,11 @@ class StudySettings:
         return self._without("begun", "versions", "scoring", "design", "fingerprint", "budget")
 
     def _without(self, *names: str) -> dict[str, Any]:
-        """Return all settings but these, and but those of `LATER` that are not used."""
+        """Return all settings but these, and but those of `OPTIONAL` that are not used."""
         return {
             key: value
             for key, value in asdict(self).items()
-            if key not in names and not (key in LATER and not value)
+            if key not in names and not (key in OPTIONAL and not value)
         }
 
     def save(self, folder: Path) -> None:
@@ -150,7 +155,7 @@ class StudySettings:
                 where=str(path),
                 hint="A newer release wrote it: update OptiSense Studio" if newer else COPY_AGAIN,
             )
-        missing = {name for name in _fields() if name not in data} - set(LATER)
+        missing = {name for name in _fields() if name not in data} - set(OPTIONAL)
         if missing:
             names = ", ".join(sorted(missing))
             raise SearchError(f"{names} is missing", where=str(path), hint=COPY_AGAIN)
