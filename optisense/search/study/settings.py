@@ -34,8 +34,8 @@ out of comparisons if they have their defaults, so that such studies can be resu
 """
 
 OPTIONAL = (*LATER, "scoring")
-"""Names that may be missing in `STUDY_FILE`. New studies always have a version of the scoring, which
-is compared by scores and not by its number.
+"""Names that may be missing in `STUDY_FILE`. New studies always have a version of the scoring; a
+study of another version is resumed if its scores are the same (`_definitions`).
 """
 
 Names = Annotated[list[str], Field(max_length=MOST_NAMES)]
