@@ -15,6 +15,7 @@ from optisense.optics.radiance_cache._raised_plane import (
     RAISED_HEIGHT,
     areas,
     crossings,
+    raised_height,
     sampled_plane,
 )
 from optisense.optics.scene.surface_cells import build_cells, cell_at
@@ -38,6 +39,13 @@ def test_a_slanting_photon_crosses_the_plane_behind_its_landing() -> None:
             cells, point - mi.Vector3f(tangent * RAISED_HEIGHT, 0, 0), mi.Bool(True)
         )
         assert crosses[0] and crossed[0] == expected[0]
+
+
+def test_the_plane_is_lower_above_a_small_surface() -> None:
+    fineness = 0.4
+    cells = build_cells(fineness * SQUARE, FACES, fineness * 0.5, fineness=fineness)
+    assert raised_height(cells)[0] == pytest.approx(fineness * RAISED_HEIGHT)
+    assert np.asarray(areas(cells)) == pytest.approx(1.0)
 
 
 def test_photons_from_beyond_the_edge_and_from_behind_do_not_count() -> None:
@@ -78,11 +86,12 @@ def test_a_beam_is_as_strong_above_a_dome_as_on_it(cosine: float) -> None:
 @pytest.mark.parametrize("share", [0.0, 0.25, 0.75, 1.2])
 def test_samples_look_up_the_plane_in_proportion_to_their_height(share: float) -> None:
     count = 1200
+    cells = build_cells(SQUARE, FACES, 0.5)
     points = SimpleNamespace(
         series=dr.full(mi.UInt32, 7, count), number=dr.arange(mi.UInt32, count)
     )
     rise = dr.full(mi.Float, share * RAISED_HEIGHT, count)
-    above = sampled_plane(cast(Any, points), rise, mi.Bool(True))
+    above = sampled_plane(cells, cast(Any, points), rise, mi.Bool(True))
     assert np.asarray(above).mean() == pytest.approx(min(share, 1.0), abs=0.01)
-    beside = sampled_plane(cast(Any, points), rise, dr.full(mi.Bool, False, count))
+    beside = sampled_plane(cells, cast(Any, points), rise, dr.full(mi.Bool, False, count))
     assert not np.asarray(beside).any()

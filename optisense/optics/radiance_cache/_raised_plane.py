@@ -28,7 +28,8 @@ from optisense.optics.transport.camera_paths import VisiblePoints
 RAISED_HEIGHT = 0.8
 """Height (mm) of the raised plane, about the depth of usual contacts. In a contact of this depth
 near the lamps of GelSight Mini, means over patches are 3.0 % off; with 0.5 mm it is 3.5 %, and with
-1.1 mm 4.3 %. A third plane at 0.4 mm makes no difference."""
+1.1 mm 4.3 %. A third plane at 0.4 mm makes no difference. It is lower on small sensing surfaces
+(see `raised_height`)."""
 STEPS = 2
 """Number of planes of cells that a line is intersected with in turn, where the surface is curved.
 With 8, the light in a contact of the spherical GelSight Mini is the same within 0.2 %."""
@@ -40,9 +41,15 @@ MIN_COSINE = 0.02
 crosses the plane 40 mm or more before it lands, farther away than most sensors are long."""
 
 
+def raised_height(cells: SurfaceCells) -> mi.Float:
+    """Return the height (1,), mm, of the raised plane above cells."""
+    return RAISED_HEIGHT * cells.fineness
+
+
 def areas(cells: SurfaceCells) -> mi.Float:
     """Return the area of the raised plane above each cell over the area of the cell, (cells,)."""
-    growth = cells.offset_growth @ (RAISED_HEIGHT, RAISED_HEIGHT**2)
+    height = float(raised_height(cells)[0])
+    growth = cells.offset_growth @ (height, height**2)
     return floats(np.maximum(1 + growth, LEAST_AREA))
 
 
@@ -75,7 +82,7 @@ def crossings(
         cell,
         point,
         -direction,
-        dr.opaque(mi.Float, RAISED_HEIGHT),
+        raised_height(cells),
         active,
         areas is not None,
     )
@@ -123,7 +130,9 @@ def below_crossing(
     return there, exists
 
 
-def sampled_plane(points: VisiblePoints, height: mi.Float, raised: mi.Bool) -> mi.Bool:
+def sampled_plane(
+    cells: SurfaceCells, points: VisiblePoints, height: mi.Float, raised: mi.Bool
+) -> mi.Bool:
     """Return whether each camera sample looks up the raised plane instead of the surface, (n,).
 
     Args:
@@ -131,4 +140,5 @@ def sampled_plane(points: VisiblePoints, height: mi.Float, raised: mi.Bool) -> m
         raised: mask of the points that lie on an indenter.
     """
     shift = mi.sample_tea_32(points.series, mi.UInt32(5), 4)[0]
-    return raised & (unit_float(points.number * GOLDEN_BITS + shift) * RAISED_HEIGHT < height)
+    share = unit_float(points.number * GOLDEN_BITS + shift)
+    return raised & (share * raised_height(cells) < height)

@@ -8,8 +8,8 @@ import mitsuba as mi
 from optisense.optics.backend.sequences import GOLDEN_BITS, next_random, richtmyer
 from optisense.optics.radiance_cache._irradiance import irradiance
 from optisense.optics.radiance_cache._raised_plane import (
-    RAISED_HEIGHT,
     below_crossing,
+    raised_height,
     sampled_plane,
 )
 from optisense.optics.radiance_cache.angular_variance import (
@@ -30,7 +30,7 @@ from optisense.optics.scene.coating_bsdf import albedo_of, evaluate_coating, gre
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene
 from optisense.optics.scene.surface_cells import bin_axis, cell_at, plane_of
-from optisense.optics.transport.volume_flux import LAYER_HEIGHT
+from optisense.optics.transport.volume_flux import layer_height
 
 MIN_IRRADIANCE_SHARE = 0.2
 """Share of the mean irradiance that is added to the expected light when shadow rays are spaced, so
@@ -91,13 +91,13 @@ def sum_bins(
     surface_normal, offset = plane_of(light.cells, at.cell, active)
     point_height = dr.dot(surface_normal, points.point) - offset
     # Share of the upper light: 0 on the surface, 1 at the middle of the flux layer.
-    interpolation = dr.select(raised, point_height / (LAYER_HEIGHT / 2), 0)
+    interpolation = dr.select(raised, point_height / (layer_height(light.cells) / 2), 0)
     interpolation = dr.clip(interpolation, 0, MAX_EXTRAPOLATION)
     axis = bin_axis(light.cells, 2)
     level, first = mi.Float(0), mi.UInt32(0)
     if dr.hint(light.planes > 1, mode="scalar"):
-        above = sampled_plane(points, point_height, raised)
-        level = dr.select(above, RAISED_HEIGHT, 0)
+        above = sampled_plane(light.cells, points, point_height, raised)
+        level = dr.select(above, raised_height(light.cells), 0)
         first = dr.select(above, dr.opaque(mi.UInt32, light.cells.cells), 0)
 
     # The loop's state holds only what it changes (see docs/architecture.md).

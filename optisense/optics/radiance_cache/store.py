@@ -140,13 +140,13 @@ class CacheStore:
 
     @property
     def _raises(self) -> bool:
-        """Whether coarse bins have a raised plane: unless cells would be larger, light grazes and
-        the volume flux takes the place of the raised plane, or the sensor is small.
+        """Whether coarse bins have a raised plane: unless cells would be larger, or light grazes
+        and the volume flux takes the place of the raised plane.
         """
-        if not self.thorough or self._grazes or self._small:
+        if not self.thorough or self._grazes:
             return False
         bins = CURVED_BINS if self._curved else COARSE_BINS
-        return 2 * self._tally_bytes(bins, self.cell_size) < MAX_TALLY_BYTES
+        return 2 * self._tally_bytes(bins, self.cell_size * self._fineness) < MAX_TALLY_BYTES
 
     def _planes(self, photons: int) -> int:
         """Return the number of planes in which light is tallied.
@@ -159,7 +159,8 @@ class CacheStore:
         """
         if not self._raises or self._directions.fine:
             return 1
-        return 2 if not self._curved or self.kernels.density * photons >= DENSE else 1
+        density = self.kernels.density * photons * self._fineness**2
+        return 2 if not self._curved or density >= DENSE else 1
 
     @property
     def _flux_layer(self) -> FluxLayer | None:
@@ -170,17 +171,15 @@ class CacheStore:
             self._above = flux_layer_above(self.cells)
         return self._above
 
-    @property
-    def _small(self) -> bool:
-        """Whether raised plane and flux layer would be too high above the sensing surface: on pads
-        of 2 and 4 mm, contacts would be 5 to 20 % off with them, instead of 2 %.
-        """
-        return fineness(self._lit.opaque) < 1.0
+    @cached_property
+    def _fineness(self) -> float:
+        """The factor on lengths that suits the size of the sensing surface."""
+        return fineness(self._lit.opaque)
 
     @cached_property
     def _grazes(self) -> bool:
         """Whether much of the light in the camera's view is grazing, and the flux layer is used."""
-        seen = None if self._small else self._seen_pilot
+        seen = self._seen_pilot
         return seen is not None and seen.grazing_share() > GRAZING_SHARE_LIMIT
 
     @property
@@ -248,9 +247,9 @@ class CacheStore:
             if self._grazes:
                 least *= np.sqrt(2)
             scale = self.cell_size / CELL_SIZE
-            size = max(self.cell_size * fineness(self._lit.opaque), scale * least)
+            size = max(self.cell_size * self._fineness, scale * least)
             normals = self._corner_normals if self._curved else None
-            self._cells = build_cells(*self._opaque_mesh, size, normals)
+            self._cells = build_cells(*self._opaque_mesh, size, normals, self._fineness)
         return self._cells
 
     def _tally_bytes(self, directions: DirectionBins, size: float) -> float:

@@ -57,6 +57,8 @@ class SurfaceCells:
             surface (Steiner's formula; a is minus twice the mean curvature, b the Gaussian
             curvature).
         axes: (3, 3) frame of the direction bins, as rows.
+        fineness: factor (1,), at most 1, on the heights above the surface in which light is
+            tallied (see the function `fineness`).
     """
 
     lower: mi.Point3f
@@ -72,6 +74,7 @@ class SurfaceCells:
     areas: FloatingArray
     offset_growth: FloatingArray
     axes: FloatingArray
+    fineness: mi.Float
 
 
 def fineness(pieces: Sequence[Piece]) -> float:
@@ -100,6 +103,7 @@ def build_cells(
     faces: NDArray[np.integer],
     size: float,
     normals: FloatingArray | None = None,
+    fineness: float = 1.0,
 ) -> SurfaceCells:
     """Divide a mesh into cells.
 
@@ -109,6 +113,7 @@ def build_cells(
         size: side (mm) of a cell.
         normals: (m, 3, 3) unit normals of the surface at the corners of each face, on the side of
             the normal of the face; None if all facets are flat.
+        fineness: factor on the heights above the surface in which light is tallied.
     """
     vertices = np.asarray(vertices, dtype=np.float64)
     solid = _twice_areas(vertices, faces)[1] > 0.0  # others would give cells without area
@@ -152,6 +157,7 @@ def build_cells(
         areas=area,
         offset_growth=growths,
         axes=_frame(normal.sum(axis=0)),
+        fineness=dr.opaque(mi.Float, fineness),
     )
 
 

@@ -19,7 +19,8 @@ from optisense.optics.scene.ray_scene import Ray, SurfaceHit
 from optisense.optics.scene.surface_cells import SurfaceCells, cell_at, plane_of
 
 LAYER_HEIGHT = 1.0
-"""Height (mm) of the layer; presses are usually less deep."""
+"""Height (mm) of the layer; presses are usually less deep. It is lower on small sensing surfaces
+(see `layer_height`)."""
 MAX_SEGMENT_LENGTH = 50.0
 """Length (mm) at which a path segment that meets nothing is cut off: twice the size of a sensor,
 so that it has left the layer."""
@@ -29,7 +30,7 @@ GOLDEN_RATIO_FRACTION = 0.618034
 """Offset (modulo 1) between the places within successive pieces. Multiples of the golden ratio's
 fractional part are spread evenly for any number of pieces."""
 TAIL_HEIGHTS = 1.5
-"""Height above the surface, in units of `LAYER_HEIGHT`, at which the last part of a landing
+"""Height above the surface, in units of `layer_height`, at which the last part of a landing
 photon's path begins. Half of the pieces divide this part."""
 MIN_COSINE = 1e-3
 """Lower bound on the cosine of incidence when the length of that last part is computed; it avoids
@@ -51,6 +52,11 @@ def flux_layer_above(cells: SurfaceCells) -> FluxLayer:
     return FluxLayer(cells, floats(four))
 
 
+def layer_height(cells: SurfaceCells) -> mi.Float:
+    """Return the height (1,), mm, of the layer above cells."""
+    return LAYER_HEIGHT * cells.fineness
+
+
 def layer_cell_at(
     flux_layer: FluxLayer, point: mi.Point3f, active: mi.Bool
 ) -> tuple[mi.UInt32, mi.Float, mi.Bool]:
@@ -69,7 +75,8 @@ def layer_cell_at(
     aside = foot - mi.Point3f(middle.x, middle.y, middle.z)
     size = dr.rcp(cells.inverse_size)
     beside = dr.maximum(dr.maximum(dr.abs(aside.x), dr.abs(aside.y)), dr.abs(aside.z))
-    return cell, height, found & (height > 0) & (height < LAYER_HEIGHT) & (beside < size)
+    below = height < layer_height(cells)
+    return cell, height, found & (height > 0) & below & (beside < size)
 
 
 def sample_segment(
@@ -99,9 +106,8 @@ def sample_segment(
     """
     end = dr.select(hit.valid, hit.distance, MAX_SEGMENT_LENGTH)
     cosine = dr.maximum(dr.abs(dr.dot(ray.direction, hit.normal)), MIN_COSINE)
-    tail = dr.select(
-        landing, dr.minimum(TAIL_HEIGHTS * LAYER_HEIGHT / cosine, end * 0.5), end * 0.5
-    )
+    top = layer_height(flux_layer.cells)
+    tail = dr.select(landing, dr.minimum(TAIL_HEIGHTS * top / cosine, end * 0.5), end * 0.5)
     last = piece >= SAMPLES_PER_SEGMENT // 2
     length = dr.select(last, tail, end - tail) * (2 / SAMPLES_PER_SEGMENT)
     first = dr.select(last, end - tail, 0) + length * mi.Float(piece % (SAMPLES_PER_SEGMENT // 2))
@@ -110,4 +116,4 @@ def sample_segment(
     cell, _, inside = layer_cell_at(flux_layer, mi.Point3f(spot), mi.Bool(True))
     upright, _ = plane_of(flux_layer.cells, cell, inside)
     inside &= ~scattered | (dr.dot(upright, ray.direction) < 0)
-    return mi.Point3f(spot), LAYER_HEIGHT / length, inside
+    return mi.Point3f(spot), top / length, inside
