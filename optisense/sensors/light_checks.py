@@ -179,18 +179,29 @@ def _overlapping(design: SensorDesign, crowded: set[str]) -> list[Diagnostic]:
         (one, first), (other, second) = windows[i], windows[j]
         if one == other and one in crowded:
             continue
-        if _overlap(first, second) and np.abs(first - second).max() > TOGETHER:
+        if _overlap(first, second) and not _coincide(first, second):
             found[one, other] = found.get((one, other), 0) + 1
     return [
         Diagnostic(
             f"windows of lights of group '{one}' overlap those of group '{other}' partly in "
             f"{count} {'place' if count == 1 else 'places'}, where only one of two counts",
             design.where("lights", one),
-            "Move them apart, or give both the same position, direction, up and size",
+            "Move them apart, or give both the same position, direction and outline",
             severity="warning",
         )
         for (one, other), count in found.items()
     ]
+
+
+def _coincide(one: FloatArray, other: FloatArray) -> bool:
+    """Return whether two windows in one plane, samples (9, 3) each as of `_samples`, have the same
+    outline: the same corners, or the same middle and one radius.
+    """
+    away = np.linalg.norm(one[:, None] - other, axis=2).min(axis=1)
+    if away.max() <= TOGETHER:
+        return True
+    radii = np.linalg.norm([window[1:] - window[0] for window in (one, other)], axis=2)
+    return bool(away[0] <= TOGETHER and np.ptp(radii) <= TOGETHER)
 
 
 def _overlap(one: FloatArray, other: FloatArray) -> bool:

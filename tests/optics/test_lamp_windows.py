@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import drjit as dr
 import mitsuba as mi
@@ -81,6 +82,33 @@ def test_lights_of_several_groups_at_one_place_are_all_seen() -> None:
     together = seen([red, alone, blue], 3)
     for layer, lamp in zip(together, (red, blue, alone), strict=True):
         assert np.array_equal(layer, seen([replace(lamp, group=0)], 1)[0]) and layer.any()
+
+
+RED = Emitter(
+    0, (0.49999949, 0, DISTANCE), (0, 0, -1), (1, 0, 0), EmitterShape.RECTANGLE, (0.8, 0.4)
+)
+
+
+@pytest.mark.parametrize(
+    ("one", "changes", "together"),
+    [
+        (RED, {"position": (0.49999951, 0, DISTANCE)}, True),  # equal to the rounding of files
+        (RED, {"position": (0.5001, 0, DISTANCE)}, False),
+        (RED, {"up": (-1, 0, 0)}, True),
+        (RED, {"up": (0, 1, 0), "size": (0.4, 0.8)}, True),
+        (RED, {"up": (0, 1, 0)}, False),
+        (RED, {"direction": (0, 0, 1)}, False),
+        (replace(RED, shape=EmitterShape.DISC, size=(0.8, 0.8)), {"up": (1, 2, 0)}, True),
+        (replace(RED, shape=EmitterShape.DISC, size=(0.8, 0.8)), {"size": (0.7, 0.7)}, False),
+    ],
+)
+def test_windows_are_one_if_they_cover_the_same_area(
+    one: Emitter, changes: dict[str, Any], together: bool
+) -> None:
+    far = replace(one, position=(9, 0, DISTANCE))
+    after = LampWindows.of([one, far, replace(one, **changes)]).after
+    assert (after is not None) == together
+    assert after is None or np.asarray(after).tolist() == [0, 3, 2, 1]
 
 
 @pytest.mark.parametrize(

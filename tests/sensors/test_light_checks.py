@@ -73,8 +73,13 @@ def test_windows_of_two_groups_that_overlap(mini: SensorDesign) -> None:
     """Lights of two groups at one place are the dies of one LED, which is fine."""
     lights = mini.lights["green"].lights
     x, y, z = lights[0].position
-    for shift, count in ((0.0, 0), (0.5, 1), (4.0, 0)):
-        beside = lights[0].model_copy(update={"position": (x, y + shift, z)})
+    for shift, up, count in (
+        (0.0, lights[0].up, 0),
+        (0.0, (0.3, 0.2, 0.9), 0),  # round windows
+        (0.5, lights[0].up, 1),
+        (4.0, lights[0].up, 0),
+    ):
+        beside = lights[0].model_copy(update={"position": (x, y + shift, z), "up": up})
         blue = mini.lights["green"].model_copy(update={"lights": [beside]})
         alone = with_green(mini, lights[:1])
         both = alone.model_copy(update={"lights": {"green": alone.lights["green"], "blue": blue}})

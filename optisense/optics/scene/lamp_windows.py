@@ -8,11 +8,15 @@ from dataclasses import dataclass
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from optisense.array_types import FloatingArray
 from optisense.design.emitters import Intensity
+from optisense.geometry.connected import connected_components
 from optisense.optics.backend.arrays import floats, indices
-from optisense.optics.scene.emitters import UP_TURN, Emitter
+from optisense.optics.scene._lamp_places import SIGNS
+from optisense.optics.scene.emitters import UP_TURN, Emitter, EmitterShape
 
 POLAR_STEPS = 720
 """Number of steps of a tabulated profile over the polar angles from 0 to 180 degrees: steps of a
@@ -24,9 +28,10 @@ MIN_COSINE = 0.01
 have light at 90 degrees, where a flat window has no area."""
 FLOATS_PER_WINDOW = 12
 """Number of floats of a window in the table; three gathers of four floats read them."""
-SAME_PLACE = 6
-"""Decimals to which positions (mm) and axes of two windows agree that are one: 1e-6 covers the
-rounding of numbers in files, and is far below `RAY_OFFSET`, at which windows are two for rays."""
+SAME_PLACE = 1e-6
+"""Largest distance (mm) between positions and corners, and largest difference between unit normals,
+of two windows that are one: it covers the rounding of numbers in files, and is far below
+`RAY_OFFSET`, at which windows are two for rays."""
 
 
 @dataclass(frozen=True)
@@ -147,15 +152,42 @@ class LampWindows:
         return dr.lerp(dr.lerp(one, next_one, f), dr.lerp(other, next_other, f), g)
 
 
-def _rings(emitters: list[Emitter]) -> list[list[int]]:
-    """Return the numbers + 1 of the lights with each window."""
-    rings: dict[tuple[object, ...], list[int]] = {}
-    for number, emitter in enumerate(emitters):
-        if emitter.area > 0:
-            place = np.round([emitter.position, *emitter.frame], SAME_PLACE)
-            key = emitter.shape, emitter.size, *place.ravel().tolist()
-            rings.setdefault(key, []).append(number + 1)
-    return list(rings.values())
+def _rings(emitters: list[Emitter]) -> list[NDArray[np.int64]]:
+    """Return the numbers + 1 of the lights of each window that several lights have."""
+    lamps = [(number, lamp) for number, lamp in enumerate(emitters) if lamp.area > 0]
+    if not lamps:
+        return []
+    places = cKDTree([lamp.position for _, lamp in lamps])
+    pairs = [
+        (lamps[i][0], lamps[j][0])
+        for i, j in places.query_pairs(SAME_PLACE)
+        if _is_same_window(lamps[i][1], lamps[j][1])
+    ]
+    if not pairs:
+        return []
+    part = connected_components(len(emitters), *np.array(pairs).T)
+    shared = np.flatnonzero(np.bincount(part) > 1)
+    return [np.flatnonzero(part == number) + 1 for number in shared]
+
+
+def _is_same_window(one: Emitter, other: Emitter) -> bool:
+    """Return whether the windows of two lights at one position coincide: discs have no `up`, and a
+    rectangle turned by a half turn, or a quarter turn with its sides exchanged, is the same.
+    """
+    if one.shape is not other.shape:
+        return False
+    if np.linalg.norm(one.frame[2] - other.frame[2]) > SAME_PLACE:
+        return False
+    if one.shape is EmitterShape.DISC:
+        return abs(one.size[0] - other.size[0]) <= SAME_PLACE
+    away = np.linalg.norm(_corners(one)[:, None] - _corners(other), axis=2)
+    return bool((away.min(axis=1) <= SAME_PLACE).all())
+
+
+def _corners(emitter: Emitter) -> FloatingArray:
+    """Return the corners (4, 3), mm, of a rectangular window."""
+    across = np.array(emitter.size)[:, None] / 2 * emitter.frame[:2]
+    return np.asarray(np.array(emitter.position) + SIGNS @ across)
 
 
 def _grid(intensity: Intensity) -> FloatingArray:
