@@ -111,6 +111,17 @@ def test_windows_are_one_if_they_cover_the_same_area(
     assert after is None or np.asarray(after).tolist() == [0, 3, 2, 1]
 
 
+def test_kernels_do_not_depend_on_the_number_of_lights_in_a_window() -> None:
+    found = []
+    for count in (2, 5):
+        lamps = [replace(RED, group=number % 2) for number in range(count)]
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+            dr.kernel_history_clear()
+            seen(lamps, 2)
+            found.append({each["hash"] for each in dr.kernel_history([dr.KernelType.JIT])})
+    assert found[0] == found[1]
+
+
 @pytest.mark.parametrize(
     ("gap", "first"), [(0.05, "wall"), (1e-4, "light 0"), (0.0, "light 0"), (-0.05, "light 0")]
 )

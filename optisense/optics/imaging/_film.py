@@ -33,8 +33,10 @@ class Film:
     """Sums of radiance and of samples per pixel and group."""
 
     def __init__(self, pixels: int, groups: int) -> None:
-        self.sums = [dr.zeros(mi.Float, pixels * 3) for _ in range(groups)]
+        self.groups = groups
+        self.sums = dr.zeros(mi.Float, groups * pixels * 3)
         self.counts = dr.zeros(mi.Float, pixels)
+        self._stride = dr.opaque(mi.UInt32, pixels * 3)
 
     def count(self, pixel: mi.UInt32) -> None:
         """Count one sample of each of these pixels (n,)."""
@@ -42,30 +44,30 @@ class Film:
 
     def add(self, points: VisiblePoints, radiance: list[mi.Color3f]) -> None:
         """Add the radiance (3, n) of visible points towards the camera, one array per group."""
-        for total, value in zip(self.sums, radiance, strict=True):
-            weighted = points.weight * value
-            for k in range(3):
-                dr.scatter_add(total, weighted[k], points.pixel * 3 + k, points.valid)
+        for group, value in enumerate(radiance):
+            self.scatter(points.weight * value, points.pixel, mi.UInt32(group), points.valid)
+
+    def scatter(
+        self, value: mi.Color3f, pixel: mi.UInt32, group: mi.UInt32, active: mi.Bool
+    ) -> None:
+        """Add values (3, n) to pixels (n,) of the layers of groups (n,) or (1,)."""
+        first = group * self._stride + pixel * 3
+        for k in range(3):
+            dr.scatter_add(self.sums, value[k], first + k, active)
 
     def add_light(self, points: VisiblePoints, lamps: LampWindows) -> None:
         """Add the windows of lamps that are seen directly."""
-        for value, group, seen in lamps.radiances(points.light, points.towards_eye):
-            for number, total in enumerate(self.sums):
-                for k in range(3):
-                    dr.scatter_add(
-                        total,
-                        points.weight[k] * value,
-                        points.pixel * 3 + k,
-                        seen & (group == number),
-                    )
+
+        def add(value: mi.Float, group: mi.UInt32, seen: mi.Bool) -> None:
+            self.scatter(points.weight * value, points.pixel, group, seen)
+
+        lamps.add_radiances(points.light, points.towards_eye, add)
 
     def layers(self, width: int, height: int) -> NDArray[np.float32]:
         """Return the layers (groups, h, w, 3): the sums divided by the number of samples."""
         share = 1 / np.maximum(np.asarray(self.counts), 1).reshape(height, width, 1)
-        out = np.empty((len(self.sums), height, width, 3), dtype=np.float32)
-        for layer, total in zip(out, self.sums, strict=True):
-            np.multiply(np.asarray(total).reshape(height, width, 3), share, out=layer)
-        return out
+        sums = np.asarray(self.sums, dtype=np.float32)
+        return np.asarray(sums.reshape(self.groups, height, width, 3) * share, dtype=np.float32)
 
     def averaged_layers(
         self,

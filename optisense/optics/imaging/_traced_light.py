@@ -318,7 +318,7 @@ def _add_light(
     Args:
         share: inverse of the number of rays of each sample.
     """
-    lit = _lit_rays(rays, len(film.sums))
+    lit = _lit_rays(rays, film.groups)
     if dr.width(lit) < FEWEST_LANES:
         return
     points = dr.gather(VisiblePoints, seen, dr.gather(mi.UInt32, rays.owner, lit))
@@ -327,11 +327,9 @@ def _add_light(
     whole = dr.gather(mi.Bool, rays.whole, lit)
     value = _reflected(points, coating, direction, whole) * points.weight
     value *= dr.opaque(mi.Float, share) / dr.gather(mi.Float, rays.density, lit)
-    groups = len(film.sums)
-    for g in range(groups):
-        for k in range(3):
-            light = dr.gather(mi.Float, rays.light, (lit * groups + g) * 3 + k)
-            dr.scatter_add(film.sums[g], light * value[k], points.pixel * 3 + k)
+    for g in range(film.groups):
+        light = dr.gather(mi.Color3f, rays.light, lit * film.groups + g)
+        film.scatter(light * value, points.pixel, mi.UInt32(g), mi.Bool(True))
 
 
 def _reflected(

@@ -181,7 +181,7 @@ class _Shading:
         known as faint light.
         """
         if self.faint_known:
-            return np.zeros((len(self.film.sums), *self.size[::-1], 3), dtype=np.float32)
+            return np.zeros((self.film.groups, *self.size[::-1], 3), dtype=np.float32)
         return self.mirrored.layers(*self.size)
 
     def interreflection(self) -> NDArray[np.float32]:

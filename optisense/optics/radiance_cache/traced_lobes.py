@@ -326,10 +326,13 @@ class LobeTracer:
 
     def _add_lamps(self, found: LobeRays, end: PathEnd, lane: mi.UInt32, counts: mi.Bool) -> None:
         """Add the light of the lamps that rays meet, of those rays that the mask ``counts``."""
-        for value, group, lit in self.lamps.radiances(end.light, end.towards_eye):
+
+        def add(value: mi.Float, group: mi.UInt32, lit: mi.Bool) -> None:
             for k in range(3):
                 entry = (lane * self.cache.binned.groups + group) * 3 + k
                 dr.scatter_add(found.light, end.weight[k] * value, entry, lit & counts)
+
+        self.lamps.add_radiances(end.light, end.towards_eye, add)
 
     def _add_cached(
         self,

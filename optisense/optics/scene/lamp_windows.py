@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import drjit as dr
@@ -48,7 +48,6 @@ class LampWindows:
         exist: whether any light has a window.
         after: for each entry, the next one with the same window, in a ring; None if every light has
             a window of its own.
-        most: largest number of lights that share a window.
     """
 
     rows: mi.Float
@@ -56,7 +55,6 @@ class LampWindows:
     profiles: mi.Float
     exist: bool
     after: mi.UInt32 | None = None
-    most: int = 1
 
     @classmethod
     def of(cls, emitters: list[Emitter]) -> LampWindows:
@@ -82,27 +80,32 @@ class LampWindows:
         profiles = np.array(tables) if tables else np.zeros(1)
         exist = bool(rows[:, 3].any())
         rings = _rings(emitters)
-        most = max(map(len, rings), default=1)
-        if most < 2:
+        if not rings:
             return cls(floats(rows), indices(groups), floats(profiles), exist)
-        after = np.zeros(len(rows), dtype=np.uint32)
+        after = np.arange(len(rows))
         for ring in rings:
             after[ring] = np.roll(ring, -1)
-        return cls(floats(rows), indices(groups), floats(profiles), exist, indices(after), most)
+        return cls(floats(rows), indices(groups), floats(profiles), exist, indices(after))
 
-    def radiances(
-        self, light: mi.UInt32, direction: mi.Vector3f
-    ) -> Iterator[tuple[mi.Float, mi.UInt32, mi.Bool]]:
-        """Yield `radiance` of the lights whose windows rays end on, then of the other lights that
-        have the same window, such as the three colours of an RGB LED.
+    @dr.syntax
+    def add_radiances(
+        self,
+        light: mi.UInt32,
+        direction: mi.Vector3f,
+        add: Callable[[mi.Float, mi.UInt32, mi.Bool], None],
+    ) -> None:
+        """Call a function with `radiance` of the lights whose windows rays end on, then of the
+        other lights that have the same window, such as the three colours of an RGB LED.
+
+        The function is recorded twice, whatever the number of lights, or once if every light has a
+        window of its own.
         """
-        yield self.radiance(light, direction)
-        other, active = light, light > 0
-        for _ in range(self.most - 1):
-            assert self.after is not None
-            other = dr.gather(mi.UInt32, self.after, other, active)
-            active &= other != light
-            yield self.radiance(dr.select(active, other, 0), direction)
+        add(*self.radiance(light, direction))
+        if dr.hint(self.after is not None, mode="scalar"):
+            other = dr.gather(mi.UInt32, self.after, light)
+            while dr.hint(other != light, exclude=[self, light, direction, add]):
+                add(*self.radiance(other, direction))
+                other = dr.gather(mi.UInt32, self.after, other)
 
     def radiance(
         self, light: mi.UInt32, direction: mi.Vector3f
