@@ -321,7 +321,7 @@ class OpticalModel(RayModel):
             scenes = self.scenes.touched(contacts, placed)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
-            raise sees_nothing(rays)
+            raise sees_nothing(rays, scenes.full)
         return ContactView(camera, placed, pressed, scenes, rays, mesh)
 
     @property

@@ -119,7 +119,7 @@ class SkinView:
         else:
             fine = self.chief_rays(self._design.camera.size_at(MIDDLE_ACROSS))
             if not fine.hit.any():
-                raise sees_nothing(fine)
+                raise sees_nothing(fine, self._scenes.fine.scene)
             origin = np.median(fine.points[fine.hit].astype(float), axis=0)
         return SensingSurface(self._scenes.assembly.sensing, origin, axes[0], axes[1])
 
@@ -155,7 +155,7 @@ class SkinView:
         """Return one contact at each of nine places; see `RayModel.nine_contacts`."""
         rays = self.chief_rays(self._design.camera.size_at(VIEW_ACROSS, resolution))
         if rays.hit.sum() < LEAST_SEEN:
-            raise sees_nothing(rays)
+            raise sees_nothing(rays, self._scenes.fine.scene)
         points = rays.points[rays.hit].astype(np.float64)
         # Each pixel is weighted with the area of surface that it sees.
         weights = pixel_areas(rays)[rays.hit]

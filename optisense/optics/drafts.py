@@ -207,7 +207,7 @@ class DraftModel(OpticalModel):
         scenes = self.scenes.deformed(mesh, pressed, self.scenes.full)
         rays = trace_chief_rays(scenes.full, camera)
         if not rays.hit.any():
-            raise sees_nothing(rays)
+            raise sees_nothing(rays, scenes.full)
         return ContactView(camera, last.placed, pressed, scenes, rays, mesh)
 
     def _are_same(self, contacts: tuple[Contact, ...]) -> bool:

@@ -14,6 +14,7 @@ from optisense.optics.transport.chief_rays import (
     ChiefRays,
     RayOutcome,
     pixel_stretching,
+    sees_nothing,
     trace_chief_rays,
 )
 from optisense.sensors import gelbelt, load
@@ -192,3 +193,12 @@ def test_nine_contacts_span_pictures_of_any_shape(
         # even patches are no grid, and reach farther along the width.
         assert (low < 0.25).all() and (low > 0.05).all()
         assert (high > 0.75).all() and (high < 0.95).all()
+
+
+@pytest.mark.parametrize(("specularity", "told"), [(1.0, True), (0.5, False)])
+def test_a_blind_camera_is_told_about_rough_mirrors_only(specularity: float, told: bool) -> None:
+    metal = Surface(SurfaceKind.OPAQUE, alpha=0.1, specularity=specularity)
+    corners = [(-5, -5, 2), (-5, 5, 2), (5, 5, 2), (5, -5, 2)]
+    scene = RayScene([quad("metal", corners, metal)])
+    hint = str(sees_nothing(trace_chief_rays(scene, camera()), scene).hint)
+    assert ("roughness" in hint) == told

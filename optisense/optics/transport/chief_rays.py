@@ -16,7 +16,7 @@ from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.assembly import SMOOTH_METAL
 from optisense.optics.scene.ray_scene import Ray, RayScene
-from optisense.optics.scene.surfaces import Region
+from optisense.optics.scene.surfaces import Region, Surface, SurfaceKind
 from optisense.optics.transport.interact import RayKind, interact
 
 HASH_FACTOR = 0x9E3779B1
@@ -267,16 +267,23 @@ def shares_by_mirrors(
     return shares
 
 
-def sees_nothing(rays: ChiefRays) -> RenderError:
-    """Return the error to raise if no chief ray meets the sensing surface; it reports their
-    outcomes.
+def sees_nothing(rays: ChiefRays, scene: RayScene) -> RenderError:
+    """Return the error to raise if no chief ray meets the sensing surface of a scene; it reports
+    their outcomes, and how rough mirrors may be if there are rough ones.
     """
     names = {outcome: outcome.name.lower().replace("_", " ") for outcome in RayOutcome}
     counts = {names[o]: int((rays.outcome == o).sum()) for o in RayOutcome}
     met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
+    hint = "Check the camera's position, direction and field of view, and what is in its way"
+    if any(_is_rough_metal(piece.surface) for piece in scene.pieces):
+        hint += f". Mirrors show an image if their roughness is below {SMOOTH_METAL:g}"
     return RenderError(
         "the camera sees nothing of the sensing surface",
         where=f"of {rays.outcome.size} rays, {met}",
-        hint="Check the camera's position, direction and field of view, and what is in its way. "
-        f"Mirrors show an image if their roughness is below {SMOOTH_METAL:g}",
+        hint=hint,
     )
+
+
+def _is_rough_metal(surface: Surface) -> bool:
+    opaque = surface.kind is SurfaceKind.OPAQUE and surface.region is Region.OTHER
+    return opaque and surface.specularity == 1.0

@@ -94,7 +94,7 @@ class DifferentiableRays:
         self.codes = codes = trace_path_codes(self._scene, camera, x, y).reshape(shape)
         self.hit = codes > 0
         if not self.hit.any():
-            raise sees_nothing(trace_chief_rays(self._scene, camera))
+            raise sees_nothing(trace_chief_rays(self._scene, camera), self._scene)
         self.edges = find_edges(self._scene, camera, codes)
         self._vertices = floats(self._scene.vertices)
         self._faces = indices(self._scene.faces)
