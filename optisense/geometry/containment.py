@@ -16,10 +16,10 @@ NEAR_EDGE = 1e-9
 """Distance of a ray from an edge, as a share of the face's size, below which its result is not
 used: far above the rounding of double precision (1e-16)."""
 
-BLOCK = 9
-"""Number of points, one after another, for which the faces near all of them are selected first: the
-points at which the window of a light is tested lie close together.
-"""
+BLOCK = 36
+"""Number of points, one after another, that are tested together, after the faces near all of them
+are selected: neighbouring facets, and points at which the window of a light is tested, lie close
+together."""
 
 
 def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
@@ -43,24 +43,25 @@ def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
     for first in range(0, len(near), BLOCK):
         block = seen[first : first + BLOCK]
         beside = np.flatnonzero(_beside(lowest, highest, block.min(axis=0), block.max(axis=0)))
-        low, high = lowest[:, beside], highest[:, beside]
-        for index, place in zip(near[first : first + BLOCK], block, strict=True):
-            met = beside[_beside(low, high, place, place)]
-            corners = np.stack([a[:, met].T, b[:, met].T, c[:, met].T], axis=1)
-            crossings = _crossings(corners - place)
-            turns = _turns(mesh, places[index]) if crossings is None else crossings
-            result[index] = turns != 0
+        low, high = lowest[:, None, beside], highest[:, None, beside]
+        owner, met = np.nonzero(_beside(low, high, block.T[..., None], block.T[..., None]))
+        face = beside[met]
+        corners = np.stack([a[:, face].T, b[:, face].T, c[:, face].T], axis=1)
+        turns, unsure = _crossings(corners - block[owner, None], owner, len(block))
+        for number in np.flatnonzero(unsure):
+            turns[number] = _turns(mesh, places[near[first + number]])
+        result[near[first : first + BLOCK]] = turns != 0
     return result
 
 
 def _beside(
     lowest: FloatArray, highest: FloatArray, low: FloatArray, high: FloatArray
 ) -> NDArray[np.bool_]:
-    """Return a mask (m,) of the faces that rays along +z from a box may meet.
+    """Return a mask (m,) or (n, m) of the faces that rays along +z from a box or points may meet.
 
     Args:
-        lowest, highest: bounds (3, m) of the faces.
-        low, high: bounds (3,) of the box.
+        lowest, highest: bounds (3, m) or (3, 1, m) of the faces.
+        low, high: bounds (3,) of the box, or points (3, n, 1).
     """
     beside: NDArray[np.bool_] = (lowest[0] <= high[0]) & (highest[0] >= low[0])
     beside &= (lowest[1] <= high[1]) & (highest[1] >= low[1])
@@ -76,8 +77,16 @@ def _frame() -> FloatArray:
     return np.array([across, np.cross(way, across), way])
 
 
-def _crossings(corners: FloatArray) -> int | None:
-    """Return the exits minus entries of a ray from the origin along +z; None if uncertain."""
+def _crossings(
+    corners: FloatArray, owner: NDArray[np.integer], count: int
+) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the exits minus entries (count,) of rays along +z, and whether they are uncertain.
+
+    Args:
+        corners: corners (m, 3, 3) of faces, relative to the origin of a ray.
+        owner: number (m,) of the ray that may meet each face.
+        count: number of rays.
+    """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     edges = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
     area = edges.sum(axis=1)
@@ -89,11 +98,11 @@ def _crossings(corners: FloatArray) -> int | None:
     unsure &= (edges >= -NEAR_EDGE * size[:, None]).all(axis=1) | (
         edges <= NEAR_EDGE * size[:, None]
     ).all(axis=1)
-    if unsure.any():
-        return None
     hit = (edges > 0.0).all(axis=1) | (edges < 0.0).all(axis=1)
     height = np.einsum("mi,mi->m", share[hit], corners[hit][:, :, 2])
-    return int(np.sign(area[hit][height > 0.0]).sum())
+    signs = np.sign(area[hit]) * (height > 0.0)
+    turns = np.bincount(owner[hit], signs, count).astype(np.int64)
+    return turns, np.bincount(owner[unsure], minlength=count) > 0
 
 
 def _cross(one: FloatArray, other: FloatArray) -> FloatArray:

@@ -54,3 +54,12 @@ def test_rays_agree_with_solid_angles() -> None:
     points = np.random.default_rng(4).uniform(-2.0, 2.0, (60, 3))
     expected = [_turns(closed, point) != 0 for point in points]
     assert inside(points, closed).tolist() == expected
+
+
+def test_many_points_are_tested_as_each_alone() -> None:
+    mesh = TriangleMesh.box((-1, -1, -1), (1, 1, 1))
+    points = np.random.default_rng(0).uniform(-1.2, 1.2, (100, 3))
+    points[::10, :2] = 0.0  # rays from these may meet edges
+    together = inside(points, mesh)
+    assert together.any() and not together.all()
+    assert together.tolist() == [bool(inside(point, mesh)[0]) for point in points]

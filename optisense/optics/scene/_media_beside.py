@@ -47,9 +47,8 @@ def media_beside(sheet: Piece, solids: Sequence[Solid], each: bool) -> NDArray[n
         patch = np.unique(levels, axis=0, return_inverse=True)[1].reshape(-1)
     elif each:
         patch = sheet.patches
-    largest = np.zeros(patch.max() + 1, dtype=np.int64)
-    rising = np.argsort(-size, kind="stable")[::-1]
-    largest[patch[rising]] = rising  # the last one counts
+    falling = np.argsort(-size, kind="stable")
+    largest = falling[np.unique(patch[falling], return_index=True)[1]]
     middle, off = corners[largest].mean(axis=1), PROBE * normals[largest]
     sides = [solid_at(middle + off, solids), solid_at(middle - off, solids)]
     return np.stack(sides, axis=1)[patch]
