@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
-from operator import itemgetter
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ContactError
+from optisense.geometry.exits import exits
 from optisense.geometry.indenter_kinds import FACET_ERROR, Indenter
 from optisense.geometry.mesh import TriangleMesh
-from optisense.geometry.rays import ray_hits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
 from optisense.text import brief
 
@@ -30,10 +28,6 @@ BESIDE = 1e-6
 """Distance (mm) beside a point, to four sides, at which the thickness of the gel is looked for if
 there is none behind the point itself, as in the plane of a side of the gel: far above the rounding
 of double precision, and far below any distance that matters."""
-
-GRAZING = 1e-6
-"""Cosine between a line and the normal of a face up to which the face is parallel to the line, as
-the side of a gel below a point of its border: far above the rounding of double precision."""
 
 ON_SURFACE = 0.5
 """Largest distance (mm) from the sensing surface of a contact point given as x, y, z: points picked
@@ -169,7 +163,7 @@ def locate(contact: Contact, surface: SensingSurface) -> SurfacePoint:
 def place(
     contact: Contact,
     surface: SensingSurface,
-    gel: TriangleMesh | None = None,
+    gel: TriangleMesh | Sequence[TriangleMesh] | None = None,
     facet_error: float = FACET_ERROR,
 ) -> TriangleMesh:
     """Return the pressed-in mesh of an indenter in the design's frame.
@@ -178,7 +172,8 @@ def place(
     ray inside the gel sees the first of the two surfaces.
 
     Args:
-        gel: the elastomer under it, a closed mesh; None to leave the depth unchecked.
+        gel: the elastomers under it, as in `available_depth`; None or an empty list to leave the
+            depth unchecked.
         facet_error: largest distance of the mesh from the indenter's exact shape, mm.
 
     Returns:
@@ -189,7 +184,7 @@ def place(
         ContactError: the contact is off the surface or as deep as the gel.
     """
     spot = locate(contact, surface)
-    if gel is not None:
+    if gel:
         available = available_depth(spot.point, spot.inward, gel)
         if contact.depth >= available:
             raise ContactError(
@@ -205,67 +200,34 @@ def place(
     return contact.indenter.mesh(reach, facet_error).transformed(pose)
 
 
-def place_on_gels(
-    contact: Contact,
-    surface: SensingSurface,
-    gels: Sequence[TriangleMesh],
-    facet_error: float = FACET_ERROR,
-) -> TriangleMesh:
-    """Return the mesh of `place` for the one of several gels that lies under the contact.
-
-    Args:
-        contact, surface, facet_error: as in `place`.
-        gels: the gels, as in `gel_under`; with none, the depth is not checked.
-
-    Raises:
-        ContactError: as in `place`.
-    """
-    if not gels:
-        return place(contact, surface, facet_error=facet_error)
-    spot = locate(contact, surface)
-    found = gel_under(spot, gels)
-    return place(contact, surface, gels[0] if found is None else found[0], facet_error)
-
-
-def gel_under(
-    spot: SurfacePoint, gels: Sequence[TriangleMesh]
-) -> tuple[TriangleMesh, float] | None:
-    """Return the uppermost of several gels under a point of the skin, and its thickness (mm) there;
-    None if there is none.
-
-    Args:
-        gels: meshes as in `available_depth`; layers that touch are one mesh (see `without_seams`).
-    """
-    found = []
-    for gel in gels:
-        with suppress(ContactError):
-            found.append((gel, available_depth(spot.point, spot.inward, gel)))
-    return min(found, key=itemgetter(1), default=None)
-
-
-def available_depth(point: ArrayLike, inward: ArrayLike, gel: TriangleMesh) -> float:
+def available_depth(
+    point: ArrayLike, inward: ArrayLike, gel: TriangleMesh | Sequence[TriangleMesh]
+) -> float:
     """Return the thickness (mm) of the gel at a point of its surface along the inward normal.
 
     Args:
         point: (3,) point on the surface of the gel, mm.
         inward: (3,) unit vector into the gel.
-        gel: mesh, mm, with outward face normals, that ends where the gel does.
+        gel: closed mesh, mm, with outward face normals, or several: those that touch or overlap
+            under the point count as one, as in `exits`.
 
     Raises:
         ContactError: there is no gel behind the point.
     """
+    gels = [gel] if isinstance(gel, TriangleMesh) else gel
     way = np.asarray(inward, dtype=np.float64)
     sides = np.cross(way, np.eye(3)[np.argsort(np.abs(way))[:2]])
     starts = np.asarray(point) + BESIDE * np.concatenate([np.zeros((1, 3)), sides, -sides])
-    hits = ray_hits(gel, starts, np.tile(way, (len(starts), 1)))
-    leaving = (gel.face_normals[hits.face] @ way > GRAZING) & (hits.distance > 1e-3)
-    if not leaving.any():
+    depths = exits(gels, starts, np.tile(way, (len(starts), 1)))
+    depths = depths[np.isfinite(depths)]
+    if not len(depths):
         raise ContactError(
             "there is no gel under a contact",
             where="at ({:.2f}, {:.2f}, {:.2f}) mm".format(*np.asarray(point, dtype=np.float64)),
             hint="Check that the sensing surface lies on the elastomer and its normals point in",
         )
-    return float(hits.distance[leaving][0])
+    # In the plane of a side, rounding may hide one layer of several from a line.
+    return float(depths[0] if len(gels) == 1 else depths.max())
 
 
 def _axes(

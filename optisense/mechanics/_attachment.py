@@ -9,11 +9,8 @@ from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import boxes_overlap, find_coincident
+from optisense.geometry.exits import GLUE
 from optisense.geometry.overlaps import find_overlap, touching_vertices
-
-GLUE = 0.05
-"""Largest distance (mm) between the faces of a gel and of a part that holds it: the thickness of a
-film of glue, and more than the difference of two meshes of one curved surface."""
 
 
 def is_attached(design: SensorDesign) -> bool:

@@ -14,7 +14,7 @@ from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import Contact, MeshIndenter, SensingSurface, TriangleMesh
-from optisense.geometry.contact import gel_under, locate
+from optisense.geometry.contact import available_depth, locate
 from optisense.geometry.surface import SurfacePoint
 from optisense.mechanics._contact_checks import refuse_holes, refuse_shared_skin
 from optisense.mechanics._deformed_mesh import SkinMesh, skin_mesh
@@ -151,7 +151,7 @@ class Gel:
         Args:
             surface: the undeformed sensing surface.
             skin: its mesh, with all its triangles.
-            elastomers: the gels under it, as in `gel_under`; without any the gel is
+            elastomers: the gels under it, as in `available_depth`; without any the gel is
                 `USUAL_THICKNESS` thick.
             elasticity: elastic constants of the gel.
             place: function that returns a contact's placed indenter in the design's frame (mm).
@@ -313,5 +313,9 @@ class Gel:
 
     def _thickness(self, spot: SurfacePoint) -> float:
         """Return the thickness (mm) of the gel under a point of the skin."""
-        found = gel_under(spot, self._elastomers)
-        return USUAL_THICKNESS if found is None else found[1]
+        if not self._elastomers:
+            return USUAL_THICKNESS
+        try:
+            return available_depth(spot.point, spot.inward, self._elastomers)
+        except ContactError:
+            return USUAL_THICKNESS

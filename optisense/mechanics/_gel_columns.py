@@ -12,8 +12,8 @@ from scipy import ndimage
 
 from optisense.array_types import BoolArray, FloatArray, IntArray
 from optisense.geometry import TriangleMesh
+from optisense.geometry.exits import exits
 from optisense.geometry.patches import sides_of_faces
-from optisense.geometry.rays import ray_hits
 from optisense.mechanics._footprint import Footprint, outer_faces
 from optisense.mechanics._height_map import heights
 
@@ -55,9 +55,6 @@ LEAST_LEAVING = -0.5
 which the face is tested. Lines leave the base of a gel nearly at right angles, and single lines of
 a tile differ from their mean by up to 60 degrees; the skin itself, which is left out, faces
 them."""
-NEAREST_EXIT = 1e-3
-"""Distance (mm) behind the skin below which a face counts as the skin itself: half of the distance
-below which faces touch."""
 ASIDE = 1e-6
 """Distance by which the lines of columns at the border of the gel start inside of it, over the
 thickness: far above the rounding of double precision, which puts lines in the plane of a side on
@@ -364,22 +361,22 @@ def _lengths(
     _, tile = np.unique(tiles, axis=0, return_inverse=True)
     order = np.argsort(tile.ravel(), kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(tile.ravel()[order])) + 1)
-    for body in bodies:
-        lowest, highest = body.face_bounds
-        normals = body.face_normals
-        for group in groups:
-            way = ways[group]
-            ends = np.concatenate([starts[group], starts[group] + longest * way])
-            near = ((highest >= ends.min(axis=0)) & (lowest <= ends.max(axis=0))).all(axis=1)
-            # Lines leave through faces that point the same way; they meet the skin from behind.
-            near &= normals @ way.mean(axis=0) > LEAST_LEAVING
-            if not near.any():
-                continue
-            part = TriangleMesh(body.vertices, body.faces[near])
-            hits = ray_hits(part, starts[group], way)
-            out = np.einsum("ki,ki->k", normals[near][hits.face], way[hits.ray]) > 0.0
-            far = out & (hits.distance > NEAREST_EXIT) & (hits.distance <= longest)
-            np.minimum.at(result, group[hits.ray[far]], hits.distance[far])
+    for group in groups:
+        way = ways[group]
+        ends = np.concatenate([starts[group], starts[group] + longest * way])
+        low, high = ends.min(axis=0), ends.max(axis=0)
+        parts = []
+        for body in bodies:
+            lowest, highest = body.face_bounds
+            near = ((highest >= low) & (lowest <= high)).all(axis=1)
+            if len(bodies) == 1:
+                # Lines leave through faces that point the same way; they meet the skin from behind.
+                near &= body.face_normals @ way.mean(axis=0) > LEAST_LEAVING
+            if near.any():
+                parts.append(TriangleMesh(body.vertices, body.faces[near]))
+        if parts:
+            found = exits(parts, starts[group], way)
+            result[group] = np.where(found <= longest, found, np.inf)
     return result
 
 

@@ -14,7 +14,7 @@ from optisense.design.camera_checks import uniqueness_problems
 from optisense.design.problems import raise_problems
 from optisense.errors import RenderError
 from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh, nine_places
-from optisense.geometry.contact import place_on_gels
+from optisense.geometry.contact import place
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.mechanics import Gel, elasticity_of, refuse_loose_gel
 from optisense.optics.camera.projection import RayCamera
@@ -147,7 +147,7 @@ class SkinView:
                 its force.
         """
         contact = self.gel.at_depth(contact)
-        return place_on_gels(contact, self.surface, self._scenes.assembly.gels, self.facet_error)
+        return place(contact, self.surface, self._scenes.assembly.gels, self.facet_error)
 
     def nine_contacts(
         self, indenter: Indenter | None, depth: float, resolution: tuple[int, int] | None

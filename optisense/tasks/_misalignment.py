@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import ContactError, TaskError
-from optisense.geometry import Contact, TriangleMesh
+from optisense.geometry import Contact, TriangleMesh, available_depth
+from optisense.geometry.exits import NEAREST
 from optisense.geometry.rotations import turn_about_axes
 from optisense.mechanics import CONFORMING
 
@@ -167,8 +168,11 @@ def plane_contact(model: OpticalModel, angle_x: float, angle_y: float, depth: fl
     corners = np.array([(a * u, b * v, 0.0) for a in (-1, 1) for b in (-1, 1)])
     turned = corners @ (axes @ turn_about_axes(angle_x, angle_y)).T
     deepest = depth + float((turned @ spot.inward).max())
-    for gel in model.gels:
-        thickness = float(((gel.vertices - spot.point) @ spot.inward).max())
+    bottoms = [float(((gel.vertices - spot.point) @ spot.inward).max()) for gel in model.gels]
+    if len(bottoms) > 1:  # layers that end above the bottom of the gel are left out
+        middle = available_depth(spot.point, spot.inward, model.gels)
+        bottoms = [bottom for bottom in bottoms if bottom >= middle - NEAREST]
+    for thickness in bottoms:
         if deepest >= thickness:
             raise ContactError(
                 f"a plane at {angle_x:g} and {angle_y:g} degrees, {depth:g} mm deep in the middle, "

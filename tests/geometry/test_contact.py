@@ -217,6 +217,15 @@ def test_gel_is_as_thick_on_edges_of_its_mesh_and_at_its_border_as_elsewhere() -
             assert found == pytest.approx(4.25, abs=1e-5), point
 
 
+def test_a_gap_ends_a_gel_of_several_elastomers_and_a_film_of_glue_does_not() -> None:
+    upper = TriangleMesh.box((-5, -5, -2), (5, 5, 0))
+    for gap, thickness in ((0.1, 2.0), (0.04, 4.04), (-0.5, 3.5)):
+        lower = TriangleMesh.box((-5, -5, -4 - gap), (5, 5, -2 - gap))
+        for gels in ([upper, lower], [lower, upper]):
+            for x in (1.0, 5.0):  # in the middle and at the border
+                assert available_depth((x, 0, 0), (0, 0, -1), gels) == pytest.approx(thickness)
+
+
 def test_a_missing_mesh_file_is_named(tmp_path: Path) -> None:
     from optisense.errors import MeshError
 

@@ -352,6 +352,30 @@ def test_touching_layers_are_one_gel(lower_first):
         assert several == pytest.approx(one, rel=1e-6)
 
 
+def wavy(low, high, wave_at, steps):
+    """A box (mm) with a number of steps along its sides, and waves of 0.5 mm in the face at a z."""
+    box = TriangleMesh.box(low, high, (steps, steps, 1))
+    places = box.vertices.copy()
+    moved = np.isclose(places[:, 2], wave_at)
+    x, y = places[moved, :2].T
+    places[moved, 2] += 0.5 * np.sin(0.7 * x) * np.cos(0.5 * y)
+    return TriangleMesh(places, box.faces)
+
+
+def test_layers_whose_curved_faces_have_other_facets_are_one_gel():
+    low, high = BLOCK.bounds
+    upper = wavy((*low[:2], -2.0), high, -2.0, 40)
+    lower = wavy(low, (*high[:2], -2.0), -2.0, 60)
+    layers = Gel(
+        SURFACE, TOP, [upper, lower], GEL, lambda contact: place(contact, SURFACE, [upper, lower])
+    )
+    for x in (-4.0, 1.3, 9.0):  # the gel ends beside the last place
+        contact = Contact(Sphere(1.5), at=(x, 0.3), depth=0.8)
+        one, several = (each.pressed([contact]).contacts[0] for each in (gel(), layers))
+        assert several.place.thickness == pytest.approx(one.place.thickness)
+        assert several.force == pytest.approx(one.force, rel=1e-6)
+
+
 def test_elastomers_of_other_stiffness_are_named():
     design = load("gelsight-mini-ideal").model_copy(deep=True)
     name = design.parts["gel"].material

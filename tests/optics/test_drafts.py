@@ -262,3 +262,18 @@ def test_frosted_faces_move_along_with_a_cage_as_if_cut_anew() -> None:
     for moved, cut in zip(drafts.scenes.pieces, anew.scenes.pieces, strict=True):
         box = [np.stack([p.vertices.min(axis=0), p.vertices.max(axis=0)]) for p in (moved, cut)]
         np.testing.assert_allclose(box[0], box[1], atol=0.01, err_msg=moved.name)
+
+
+def test_gels_that_overlap_by_priority_are_as_thick_in_drafts_as_in_pictures(
+    mini: SensorDesign,
+) -> None:
+    design = mini.model_copy(deep=True)
+    design.cages.clear()
+    low, high = design.meshes["gel"].bounds
+    design.meshes["gel"] = ots.geometry.TriangleMesh.box(low, high)
+    upper = (low[0] + 2, low[1] + 2, -2), (high[0] - 2, high[1] - 2, high[2])
+    design.meshes["upper"] = ots.geometry.TriangleMesh.box(*upper)
+    design.parts["upper"] = design.parts["gel"].model_copy(update={"priority": 1})
+    for model in (OpticalModel(design), DraftModel(design)):
+        found = ots.geometry.available_depth((0, 0, high[2]), (0, 0, -1), model.gels)
+        assert found == pytest.approx(high[2] - low[2])

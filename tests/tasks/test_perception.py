@@ -13,7 +13,7 @@ from optisense import OpticalModel
 from optisense.design import Markers
 from optisense.design.colour import srgb_curve
 from optisense.errors import ContactError, TaskError
-from optisense.geometry import Contact, Cylinder
+from optisense.geometry import Contact, Cylinder, TriangleMesh
 from optisense.tasks import (
     BallForce,
     BallShear,
@@ -130,6 +130,19 @@ def test_samples_are_kept_and_work_continues_where_it_stopped(
     fewer = collect(task, lambertian, replace(QUIET, count=10), tmp_path / "parts")
     assert lambertian.pictures == again
     assert np.array_equal(fewer.features, whole.features[:10])
+
+
+def test_planes_reach_through_the_layers_of_a_gel(mini: OpticalModel) -> None:
+    design = mini.design
+    design.cages.clear()
+    low, high = design.meshes["gel"].bounds
+    design.meshes["gel"] = TriangleMesh.box((*low[:2], -2.0), high)
+    design.meshes["low"] = TriangleMesh.box(low, (*high[:2], -2.0))
+    design.parts["low"] = design.parts["gel"]
+    layered = OpticalModel(design)
+    assert plane_contact(layered, 1.0, 0.0, 2.5) == plane_contact(mini, 1.0, 0.0, 2.5)
+    with pytest.raises(ContactError, match=r"4\.25 mm thick"):
+        plane_contact(layered, 1.0, 0.0, 4.2)
 
 
 def test_a_folder_of_other_samples_is_left_alone(lambertian: Any, tmp_path: Path) -> None:

@@ -16,7 +16,6 @@ from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
-from optisense.geometry.seams import without_seams
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
 from optisense.optics.scene._lamp_places import off_faces, window
 from optisense.optics.scene._media_beside import PROBE, media_beside, solid_at, split_by_media
@@ -43,8 +42,8 @@ class Assembly:
     Attributes:
         pieces: all fixed surfaces; flat faces are merged into few triangles.
         sensing: the deformed sensing surface, with all its triangles.
-        gels: the elastomers, without what parts of higher priority cut out of them (drafts of parts
-            that bend leave it in); those that touch are one mesh.
+        gels: the elastomers, without what parts of higher priority cut out of them; drafts of parts
+            that bend leave it in.
         emitters: all lights; ``group`` counts in the order of ``groups``.
         fine: by number of a piece of the sensing surface, that piece with all its triangles.
         ior_before: refractive index on the inner side of the (first) sensing surface.
@@ -223,12 +222,10 @@ def assemble(design: SensorDesign, before: Assembly | None = None, bend: bool = 
     return Assembly(
         pieces=pieces,
         sensing=sensing[0] if len(sensing) == 1 else TriangleMesh.joined(sensing),
-        gels=without_seams(
-            [
-                meshes[name] if bend else carved(design, meshes, name)
-                for name in design.parts_of(Role.ELASTOMER)
-            ]
-        ),
+        gels=[
+            meshes[name] if bend else carved(design, meshes, name)
+            for name in design.parts_of(Role.ELASTOMER)
+        ],
         emitters=emitters,
         groups=list(design.lights),
         fine=fine,
