@@ -184,7 +184,7 @@ def on_the_tray() -> ots.SensorDesign:
 
 def matt_belt() -> ots.SensorDesign:
     """GelBelt's light design 3 with a diffuse coating, the best of the paper's designs."""
-    design = ots.set_value(ots.load("gelbelt"), "coating.specularity", 0.0)
+    design = ots.set_value(ots.load("builtin:gelbelt"), "coating.specularity", 0.0)
     return design.model_copy(update={"name": "matt-belt"})
 
 
@@ -208,7 +208,7 @@ def rows_below() -> ots.SensorDesign:
 
 def best_of_paper() -> ots.SensorDesign:
     """GelSight360 with GBBRRGGB, the best of the paper's five colourings by `reading`."""
-    design = ots.load("gelsight360")
+    design = ots.load("builtin:gelsight360")
     colours = {"R": (1.0, 0.0, 0.0), "G": (0.0, 1.0, 0.0), "B": (0.0, 0.0, 1.0)}
     for number, letter in enumerate("GBBRRGGB", 1):
         design = ots.set_value(design, f"lights.lg{number}.colour", colours[letter])
