@@ -75,8 +75,10 @@ class Calibration:
         worse = ratios[0] < ratios[1] - BACKGROUND_AS_WELL
         if after > before + AS_WELL * before:
             return f"{told} worse: {shares}. {ADVICE}"
-        level = "better" if after < before - AS_WELL * before else "as well as before"
-        return f"{told} {level}: {shares}" + (f"; but {untouched}. {ADVICE}" if worse else ".")
+        if after < before - AS_WELL * before:
+            return f"{told} better: {shares}" + (f"; but {untouched}." if worse else ".")
+        told = f"{told} as well as before: {shares}"
+        return f"{told}; but {untouched}. {ADVICE}" if worse else f"{told}."
 
     def as_data(self) -> dict[str, Any]:
         """Return all numbers and figures, ready for JSON."""

@@ -24,7 +24,7 @@ from optisense.calibration.families import chosen_families
 from optisense.calibration.kept_renderings import KeptRenderings
 from optisense.calibration.quantities import designed, quantities_of
 from optisense.calibration.realism import Realism, distances
-from optisense.calibration.result import Calibration
+from optisense.calibration.result import ADVICE, Calibration
 from optisense.calibration.seen_contacts import SeenContact
 from optisense.calibration.settings import CalibrationSettings
 from optisense.cli import app
@@ -276,6 +276,7 @@ def test_a_design_is_fitted_and_marked(small_photographs: Photographs, tmp_path:
         (0.0101, 36.5, "as well as before: 0.010 of their energy is unexplained, 0.010 before."),
         (0.0101, 23.1, "; but the untouched sensor worse: 23.1 dB, 37.0 before. Keep the design"),
         (0.005, 37.0, "better: 0.005"),
+        (0.005, 23.1, "; but the untouched sensor worse: 23.1 dB, 37.0 before."),
         (0.02, 37.0, "worse: 0.020 of their energy is unexplained, 0.010 before. Keep the design"),
     ],
 )
@@ -298,6 +299,7 @@ def test_a_verdict_is_about_the_background_too(
         (),  # type: ignore[arg-type]
     )
     assert words in found.verdict()
+    assert (ADVICE in found.verdict()) == ("Keep the design" in words)
 
 
 def test_an_interrupted_calibration_goes_on_where_it_was(
