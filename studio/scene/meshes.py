@@ -133,10 +133,11 @@ def part_mesh(part: bpy.types.Object, *, caged: bool) -> Mesh:
     if part.modifiers and not caged:
         return _placed(_modified(part), world)
     data = part.data
-    if caged and rest_shape(data) is None:
+    at_rest = caged and len(data.vertices) > 0  # an empty mesh has no shape at rest
+    if at_rest and rest_shape(data) is None:
         raise SceneError(f"{added(part.optisense.key)}. {KEEP_OR_UNDO}", "parts")
     rest = remembered(data, REST)
-    vertices = rest if caged else kept_array(rest, shown_vertices(data))
+    vertices = rest if at_rest else kept_array(rest, shown_vertices(data))
     normals = remembered(data, NORMAL)
     if normals is not None and (rest is None or not np.array_equal(vertices, rest)):
         normals = None

@@ -36,7 +36,8 @@ def flat(pitch: float, stretch: float, blur: float | None, across: int = 400) ->
     """A plane behind 40 x 30 rays, `pitch` mm apart; a camera `across` pixels wide."""
     column, row = np.meshgrid(np.arange(40.0), np.arange(30.0))
     points = np.stack([column * pitch, row * pitch * stretch, 0 * row], -1).astype(np.float32)
-    rays = SimpleNamespace(points=points, hit=np.ones((30, 40), dtype=bool))
+    seen, codes = np.ones((30, 40), dtype=bool), np.zeros((30, 40), dtype=np.uint32)
+    rays = SimpleNamespace(points=points, hit=seen, reflections=codes)
     focus = None
     if blur is not None:
         focus = SimpleNamespace(in_pixels=lambda window: np.full((30, 40), blur))

@@ -281,10 +281,10 @@ def test_an_ascent_ends_on_the_limit_of_its_conditions(svelte: SensorDesign) -> 
     given: dict[str, Any] = {"method": "gradient", "settings": SETTINGS, "budget": 12}
     given["options"] = {"resolution": RESOLUTION, "starts": 1}
     space = {"cages.M1.blend": (0.0, 1.0)}
-    found = search(svelte, space, "aoap", require="distortion <= 1.2", **given)
+    found = search(svelte, space, "aoap", require="distortion <= 1.3", **given)
     assert found.best.score > found.start.score
-    kept = found.best.conditions["distortion <= 1.2"]
-    assert kept is not None and 1.17 < kept <= 1.2
+    kept = found.best.conditions["distortion <= 1.3"]
+    assert kept is not None and 1.27 < kept <= 1.3
 
 
 def test_powers_of_lights_climb_by_relit_pictures(mini: SensorDesign) -> None:
