@@ -97,7 +97,7 @@ def _window_of(
         turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
         outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half
     else:
-        outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * half
+        outline = SIGNS * half
     points = np.asarray(position) + outline[:, :1] * s + outline[:, 1:] * t
     count = len(points)
     faces = np.array([[0, k, k + 1] for k in range(1, count - 1)])
