@@ -53,11 +53,6 @@ AVERAGED_ROUGHNESS = 0.18
 contacts (see `INTERREFLECTION_WIDTH`). At 0.2 this reduces the noise of the camera samples in a
 contact of GelSight Mini from 2.6 to 1.1 % of the mean, with an error of 0.5 % (RMS over patches);
 the error grows as lobes become narrower."""
-TAIL_SAMPLES = 1 / 3
-"""Number of samples of a pixel in a contact that read the cache, as a share of the usual number,
-where rays bring the light in the peaks of lobes. Only the tails of the lobes and a faint diffuse
-lobe remain, which vary little within a pixel: with all samples, the noise of the contact is the
-same."""
 BESIDE_RANGE = 0.1
 """Distance from a contact, as a fraction of the image width, within which the skin is shaded with
 light that the contact reflects to it: 2 mm on GelSight Mini. This is half a per cent of a diffuse
@@ -274,7 +269,7 @@ class _Shading:
         """Sample the pixels in contacts and around them."""
         counted = [
             (*(tier := repeated(pixels, times)), dr.opaque(mi.UInt32, times, dr.width(tier[0])))
-            for pixels, times in self._near_samples()
+            for pixels, times in self.plan.of_contacts(self.regions)
             if pixels.any()
         ]
         if not counted:
@@ -282,16 +277,6 @@ class _Shading:
         pixel, number, count = reduce(joined, counted)
         dr.eval(pixel, number, count)
         self.sample(pixel, number, True, count=count)
-
-    def _near_samples(self) -> list[tuple[NDArray[np.bool_], int]]:
-        """Return the masks (h, w) of the pixels in contacts and around them, with their number of
-        samples per pixel.
-        """
-        tiers = self.plan.of_contacts(self.regions)
-        if self.cache.traced_lobes and not self.plan.only_contacts:
-            inside, inner = tiers[0]
-            tiers[0] = inside, max(1, round(TAIL_SAMPLES * inner))
-        return tiers
 
     def sample_far(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Sample the pixels far from contacts, and return the layers of the image without

@@ -69,11 +69,6 @@ GUIDED_SHARE = 0.3
 """Share of the rays from the skin that are drawn from the beams of the cache. With 0.3, the noise
 of the skin of GelSight Mini of specularity 1 is 12 instead of 15 %; with 0.7, it is larger again,
 as light that the beams do not describe is found by fewer rays."""
-GUIDED_RAYS = 8
-"""Number of rays that beams are drawn for together: points beside each other share them if fewer
-rays start at each. Beams of a point of GelSight Mini take as long as six rays; an image of
-specularity 1 with 200,000 photons takes a tenth less time than without sharing, with the same
-noise. With 32, the noise of the skin around contacts is a tenth larger."""
 
 
 @dataclass
@@ -135,21 +130,19 @@ class LobeTracer:
         u = unit_float(first.series + number * STEPS_2D[0])
         v = unit_float(first.series * 277803737 + number * STEPS_2D[1])
         pick = unit_float(first.series * 69069 + number * GOLDEN_BITS)
-        guide, share, sharing = None, mi.Float(0), owner
+        guide, share = None, mi.Float(0)
         if gathers:
-            step = max(1, GUIDED_RAYS // directions)
-            guide = self._guide(_every(points, step))
-            sharing = owner // dr.opaque(mi.UInt32, step)
-            share = dr.select(dr.gather(mi.Bool, guide.found, sharing), GUIDED_SHARE, 0)
+            guide = self._guide(points)
+            share = dr.select(dr.gather(mi.Bool, guide.found, owner), GUIDED_SHARE, 0)
         guided = pick < share
         pick = dr.select(guided, pick / GUIDED_SHARE, (pick - share) / (1 - share))
         spot = mi.Point2f(u, v)
         direction, _ = sample_coating(coating, first.normal, -first.towards_eye, pick, spot)
         if guide is not None:
-            direction = dr.select(guided, guide.sample(sharing, pick, spot), direction)
+            direction = dr.select(guided, guide.sample(owner, pick, spot), direction)
         density = (1 - share) * coating_density(coating, first.normal, direction, first.towards_eye)
         if guide is not None:
-            density += share * guide.density(sharing, direction)
+            density += share * guide.density(owner, direction)
         ray = Ray(leave(first.point, first.face_normal, direction), direction, first.valid)
         ray.active &= (coating.specularity > 0) & (density > 0)
         ray.active &= dr.dot(direction, first.face_normal) > 0
@@ -395,14 +388,6 @@ class LobeTracer:
             for k in range(3):
                 entry = (lane * len(light) + g) * 3 + k
                 dr.scatter_add(found.light, value[k], entry, active)
-
-
-def _every(points: VisiblePoints, step: int) -> VisiblePoints:
-    """Return every ``step``-th of visible points, from the first on."""
-    if step == 1:
-        return points
-    lanes = dr.arange(mi.UInt32, -(-dr.width(points.pixel) // step))
-    return gathered(points, lanes * dr.opaque(mi.UInt32, step))
 
 
 def _on_indenter(table: mi.Float, end: PathEnd) -> mi.Bool:
