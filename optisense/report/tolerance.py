@@ -56,15 +56,16 @@ def spread_figure(name: str, found: ScoreDistribution) -> Figure:
     if len(scores):
         left.hist(scores, bins=min(40, max(8, len(scores) // 6)), color=BLUE, alpha=0.55)
     left.axvline(found.nominal, color=GREY, lw=1.4, ls="--", label=f"nominal {found.nominal:.4g}")
+    edge = left.get_xlim()[0]
     for key, each in found.percentiles.items():
+        colour, style = PERCENTILE_LINES[key]
         if math.isfinite(each.value):
-            colour, style = PERCENTILE_LINES[key]
             label = f"{key.upper()} {each.value:.4g}"
             left.axvline(each.value, color=colour, ls=style, lw=1.5, label=label)
-            if key == "p10" and math.isfinite(each.low):
-                left.axvspan(
-                    each.low, each.high, color=colour, alpha=0.12, lw=0, label=P10_INTERVAL
-                )
+        if key == "p10" and math.isfinite(each.high):
+            low = each.low if math.isfinite(each.low) else edge  # a failed sensor
+            left.axvspan(low, each.high, color=colour, alpha=0.12, lw=0, label=P10_INTERVAL)
+    left.set_xlim(left=edge)
     left.set_xlabel(name)
     left.set_ylabel("sensors")
     legend_above(left)
@@ -120,15 +121,18 @@ def _share(each: Estimate | None) -> tuple[str, str, str]:
 
 
 def _cells(each: Estimate) -> tuple[str, str]:
-    if not math.isfinite(each.value):
-        return "fails", ""
-    return f"{each.value:.4g}", _interval(each)
+    return _shown(each.value, ".4g"), _interval(each)
 
 
 def _interval(each: Estimate, shape: str = ".4g") -> str:
-    if not (math.isfinite(each.low) and math.isfinite(each.high)):
+    """Return both ends of an interval; an empty text if both are failed sensors."""
+    if not math.isfinite(each.high):
         return ""
-    return f"{each.low:{shape}} to {each.high:{shape}}"
+    return f"{_shown(each.low, shape)} to {_shown(each.high, shape)}"
+
+
+def _shown(value: float, shape: str) -> str:
+    return f"{value:{shape}}" if math.isfinite(value) else "fails"
 
 
 def _kind(kind: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -13,9 +14,10 @@ from typer.testing import CliRunner
 import optisense as ots
 from optisense.cli import app
 from optisense.design import SensorDesign, set_value
-from optisense.report.tolerance import render_tolerance, shown_size, spread_figure
+from optisense.report.tolerance import P10_INTERVAL, render_tolerance, shown_size, spread_figure
 from optisense.search import ToleranceDistribution
 from optisense.search.tolerance.analysis import Tolerance, tolerance
+from optisense.search.tolerance.sensitivity import Estimate
 
 EVIL = "</table><img src=x onerror=alert(1)>"
 QUICK = ["--objective", "aoap", "--resolution", "40x30"]
@@ -58,6 +60,17 @@ def test_failures_are_told_as_text(found: Tolerance) -> None:
     assert sum(found.failures.values()) > 0
     assert "onerror=alert(…)" in page  # a cause is told without its numbers
     assert "<img src=x" not in page
+
+
+def test_an_interval_that_reaches_to_failed_sensors_says_so(found: Tolerance) -> None:
+    spread = found.results["score"]
+    p10 = Estimate(0.509, math.nan, 0.541, math.nan)
+    reaching = replace(spread, percentiles={**spread.percentiles, "p10": p10})
+    assert "fails to 0.541" in render_tolerance(replace(found, results={"score": reaching}))
+    axes = spread_figure("score", reaching).axes[0]
+    (shaded,) = [each for each in axes.patches if each.get_label() == P10_INTERVAL]
+    assert shaded.get_x() == axes.get_xlim()[0]
+    assert shaded.get_x() + shaded.get_width() == pytest.approx(0.541)
 
 
 def test_without_noise_none_is_spoken_of(found: Tolerance) -> None:

@@ -153,6 +153,21 @@ def test_failed_sensors_count_as_worse_than_any(grey: SensorDesign) -> None:
     assert "too dark" in next(iter(found.failures))
 
 
+def test_the_interval_of_p10_reaches_to_failed_sensors() -> None:
+    """With 10 failures in 120, P10 is a failed sensor in a third of the resamples."""
+    scores = np.r_[np.full(10, math.nan), np.linspace(0.5, 1.0, 110)][:, None]
+    found = percentile_of(scores, 0.1)
+    assert found.value == pytest.approx(0.509, abs=0.001)
+    assert math.isnan(found.low)
+    assert math.isnan(found.error)
+    assert found.high == pytest.approx(0.54, abs=0.005)
+    most = percentile_of(np.r_[np.full(4, math.nan), scores[:, 0]][:, None], 0.1)
+    assert math.isnan(most.value)
+    assert 0.5 < most.high < found.high
+    middle = percentile_of(scores, 0.5)
+    assert middle.low < middle.value < middle.high
+
+
 def test_results_are_json(result: Tolerance) -> None:
     again = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert again["sensors"] == result.sensors == 2400

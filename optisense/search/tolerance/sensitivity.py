@@ -38,8 +38,10 @@ class Estimate:
     """Number with its 90 % bootstrap interval.
 
     Attributes:
-        value, low, high: the number and the ends of the interval.
-        error: standard error: the standard deviation of the bootstrap.
+        value, low, high: the number and the ends of the interval. For a percentile, NaN stands for
+            a failed sensor, which is below every score.
+        error: standard error: the standard deviation of the bootstrap; NaN if the percentile is
+            that of a failed sensor in any resample.
     """
 
     value: float
@@ -131,8 +133,5 @@ def _resampled(rows: int) -> NDArray[np.int64]:
 
 
 def _estimate(value: float, again: list[float]) -> Estimate:
-    known = [each for each in again if np.isfinite(each)]
-    if not known or not np.isfinite(value):
-        return Estimate(value, np.nan, np.nan, np.nan)
-    low, high = np.quantile(known, INTERVAL).tolist()
-    return Estimate(value, low, high, float(np.std(known)))
+    low, high = (percentile(again, share) for share in INTERVAL)
+    return Estimate(value, low, high, float(np.std(again)))
