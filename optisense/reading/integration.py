@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.ndimage import binary_erosion
+from scipy.ndimage import binary_erosion, median
 from scipy.sparse.linalg import factorized
 
 from optisense.array_types import FloatArray
@@ -75,6 +75,17 @@ class GridIntegrator:
         result[self.mask] = values - mean[self._part]
         return result
 
+    def level(self, values: FloatArray, pixels: NDArray[np.bool_]) -> FloatArray:
+        """Return values (h, w) with the median over some pixels (h, w) of each connected part set
+        to 0; NaN outside the mask and for parts without such pixels.
+        """
+        chosen = pixels[self.mask]
+        inside = values[self.mask]
+        zero = median(inside[chosen], self._part[chosen], np.arange(self._parts))
+        result = np.full(self.mask.shape, np.nan)
+        result[self.mask] = inside - zero[self._part]
+        return result
+
 
 class NormalIntegrator:
     """Integrator of the normals that a camera sees to depth, on flat and on curved sensors.
@@ -103,7 +114,8 @@ class NormalIntegrator:
         """Return the depth (h, w), mm, along the inward normal, from unit inward normals (h, w, 3).
 
         The integration constant is set so that the median along the border of the view is 0, as a
-        contact should leave most of the border untouched.
+        contact should leave most of the border untouched. Each connected part of the view has a
+        constant of its own.
 
         Raises:
             TaskError: there is not one normal for each pixel, or one of a seen pixel is not finite.
@@ -125,7 +137,7 @@ class NormalIntegrator:
         for _ in range(ROUNDS):
             across, down = (each.of(back) for each in steps)
             back = self._grid.from_steps(across, down)
-            back = np.nan_to_num(back - np.median(back[self._border]))
+            back = np.nan_to_num(self._grid.level(back, self._border))
         surface = untouched.points - back[..., None] * untouched.directions
         surface[~untouched.seen] = np.nan
         return untouched.depth(surface)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -75,12 +77,12 @@ def rays(pinhole: float, radius: float) -> UntouchedSurface:
     return UntouchedSurface(points, normals, way, np.ones(SHAPE, dtype=bool))
 
 
-@pytest.mark.parametrize("radius", [np.inf, 12.0], ids=["flat", "cylinder"])
-@pytest.mark.parametrize("pinhole", [1e4, 8.0], ids=["orthographic", "pinhole"])
-def test_a_pressed_ball_comes_back(radius: float, pinhole: float) -> None:
-    untouched = rays(pinhole, radius)
-    # A ball of 1.5 mm, 0.5 mm deep: each ray meets the ball or the surface first.
-    ball, deep = 1.5, 0.5
+def pressed(
+    untouched: UntouchedSurface, pinhole: float, radius: float, ball: float, deep: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Depths, normals and touched pixels of a ball in a surface of `rays`: each ray meets the ball
+    or the surface first.
+    """
     eye = np.array([0.0, 0.0, -pinhole])
     middle = np.array([0.3, -0.2, ball - deep])
     if np.isfinite(radius):
@@ -93,12 +95,30 @@ def test_a_pressed_ball_comes_back(radius: float, pinhole: float) -> None:
     touched = (inside > 0) & (near < far)
     points = np.where(touched[..., None], eye + near[..., None] * way, untouched.points)
     normals = np.where(touched[..., None], (points - middle) / ball, untouched.normals)
-    expected = untouched.depth(points)
+    return untouched.depth(points), normals, touched
+
+
+@pytest.mark.parametrize("radius", [np.inf, 12.0], ids=["flat", "cylinder"])
+@pytest.mark.parametrize("pinhole", [1e4, 8.0], ids=["orthographic", "pinhole"])
+def test_a_pressed_ball_comes_back(radius: float, pinhole: float) -> None:
+    untouched = rays(pinhole, radius)
+    deep = 0.5
+    expected, normals, touched = pressed(untouched, pinhole, radius, 1.5, deep)
     got = NormalIntegrator(untouched).depths(normals)
     # The rim, where the slope jumps between two pixels, costs less than half a step.
     assert expected.max() == pytest.approx(deep, abs=0.01)
     assert np.abs(got - expected).max() < 0.02
     assert np.abs(got - expected)[touched].mean() < 0.006
+
+
+def test_each_part_of_the_view_is_level_at_its_own_border() -> None:
+    """A strut in front of the camera divides the view beside the ball."""
+    seen = np.ones(SHAPE, dtype=bool)
+    seen[:, 20] = False
+    untouched = replace(rays(1e4, np.inf), seen=seen)
+    expected, normals, _ = pressed(untouched, 1e4, np.inf, 1.5, 0.5)
+    got = NormalIntegrator(untouched).depths(normals)
+    assert np.abs(got - expected)[seen].max() < 0.02
 
 
 def test_nothing_beyond_the_border_of_the_view_is_read() -> None:
