@@ -46,6 +46,7 @@ def render_verification(found: Verification, axes: tuple[FloatArray, FloatArray]
         kind={BETTER: "good", WORSE: "bad", INCONCLUSIVE: "open"}[found.verdict],
         in_words=found.in_words(),
         notes=found.notes(),
+        same_places=found.same_places,
         headline=[
             ("objects", str(len(settings.objects))),
             ("places", str(settings.places)),

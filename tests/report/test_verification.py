@@ -76,6 +76,8 @@ def test_notes_are_told(found: Verification) -> None:
     page = render_verification(replace(found, scale=0.5, same_places=False), AXES)
     assert "scaled to 50 %" in page
     assert "sensing surfaces differ" in page
+    assert "counts as read flat" not in page
+    assert "counts as read flat" in render_verification(found, AXES)
     assert "notice" not in re.sub(
         r"<style>.*?</style>", "", render_verification(found, AXES), flags=re.S
     )
