@@ -33,9 +33,10 @@ def print_verification(found: Verification) -> None:
     table.add_row("stretched", f"{one.stretching:.2f}", f"{other.stretching:.2f}")
     output.print(table)
     count, places = len(found.settings.objects), found.settings.places
+    objects = "1 object" if count == 1 else f"{count} objects, each"
     each = "one place" if places == 1 else f"{places} places"
     output.print(
-        f"{count} objects, each at {each}; the errors of a flat reading are "
+        f"{objects} at {each}; the errors of a flat reading are "
         f"{found.flat[0]:.1f} degrees and {found.flat[1]:.3f} mm",
         style="dim",
     )

@@ -42,6 +42,7 @@ def test_a_study_is_compared_with_its_start(study: Path, tmp_path: Path) -> None
     assert code == 0, told
     assert "error of normals" in text
     assert "the start" in text
+    assert "1 object at one place" in text
     assert "a verdict needs 6 or more objects, and there were 1" in told
     assert "note:" not in text  # notes are no results
     assert "inconclusive" in told
