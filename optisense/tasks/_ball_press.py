@@ -59,11 +59,11 @@ class BallPress:
     aside: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (self.radius > 0 and 0 < self.least < self.most and self.aside >= 0):
+        if not (0 < self.least < self.most <= self.radius and self.aside >= 0):
             raise TaskError(
                 f"a ball of {self.radius:g} mm and depths of {self.least:g} to "
                 f"{self.most:g} mm are impossible",
-                hint="Give a radius above 0 mm, and depths above 0 mm, the smaller first",
+                hint="Give depths above 0 mm and not deeper than the radius, the smaller first",
             )
 
     def check(self, model: OpticalModel) -> None:

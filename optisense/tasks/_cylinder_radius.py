@@ -54,10 +54,11 @@ class CylinderRadius:
     contact_only: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
-        if not (0 < self.least < self.most and self.depth > 0 and self.aside >= 0):
+        if not (0 < self.depth <= self.least < self.most and self.aside >= 0):
             raise TaskError(
-                f"radii {self.least:g} to {self.most:g} and depth {self.depth:g} are impossible",
-                hint="Give radii above 0 mm, the smaller first, and a depth above 0 mm",
+                f"radii of {self.least:g} to {self.most:g} mm, pressed {self.depth:g} mm deep, are "
+                "impossible",
+                hint="Give the smaller radius first, and a depth above 0 mm and not deeper than it",
             )
 
     def check(self, model: OpticalModel) -> None:

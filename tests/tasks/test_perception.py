@@ -160,7 +160,7 @@ def test_what_cannot_work_is_told_before_any_picture(lambertian: Any) -> None:
     with pytest.raises(ContactError, match="mm deep at a corner"):
         perceive(Misalignment(range=30), lambertian, QUIET)
     with pytest.raises(ContactError, match="thick"):
-        perceive(CylinderRadius(depth=5), lambertian, QUIET)
+        perceive(CylinderRadius(least=5, depth=5), lambertian, QUIET)
     with pytest.raises(TaskError, match=r"covers only \d+ % of the crop"):
         perceive(Misalignment(depth=0.05), lambertian, QUIET)
     with pytest.raises(TaskError, match="are impossible"):
@@ -177,6 +177,11 @@ def test_what_cannot_work_is_told_before_any_picture(lambertian: Any) -> None:
         Misalignment(range=0)
     with pytest.raises(TaskError):
         CylinderRadius(least=3, most=2)
+    with pytest.raises(TaskError, match=r"0\.2 to 0\.3 mm, pressed 0\.5 mm deep, are impossible"):
+        CylinderRadius(least=0.2, most=0.3)
+    for kind in (BallForce, BallShear):
+        with pytest.raises(TaskError, match="not deeper than the radius"):
+            kind(radius=0.5)
     assert lambertian.pictures == 0
 
 
@@ -201,7 +206,7 @@ def test_a_force_is_read_from_the_spread(mini: OpticalModel) -> None:
     with pytest.raises(TaskError, match="are impossible"):
         BallForce(least=0.5, most=0.4)
     with pytest.raises(ContactError, match="thick"):
-        perceive(BallForce(most=5.0), mini, settings)
+        perceive(BallForce(radius=5.0, most=5.0), mini, settings)
 
 
 def test_the_mean_motion_of_dots_in_pictures_tells_the_shear(mini: OpticalModel) -> None:
