@@ -110,6 +110,8 @@ def _export_robot(
 ) -> None:
     names = _known(wanted, ROBOT_FORMATS, "--for", FORMATS, "--format")
     densities = dict(_density(text) for text in density)
+    if len(densities) < len(density):
+        raise typer.BadParameter("a part is given twice", param_hint="--density")
 
     from optisense.robots import export_robot
     from optisense.sensors import load

@@ -189,13 +189,16 @@ def reconstruction(
     variant: VariantOption = "auto",
 ) -> None:
     """Reconstruct shapes of objects: errors of normals (degrees) and depth (mm)."""
-    contacts = dict(zip(thing or [], parse_contacts(thing), strict=True)) or None
+    texts = thing or []
+    contacts = dict(zip(texts, parse_contacts(texts), strict=True))
+    if len(contacts) < len(texts):
+        raise typer.BadParameter("an object is given twice", param_hint="--object")
     with progress_line() as line:
         line.begin(LOADING)
         settings = tasks.ReconstructionSettings(**options.model_dump())
         model = load_sensor(line, design, out, variant, settings.resolution)
         show = sample_progress(line, model, "pictures", "comparing")
-        result = tasks.reconstruct(model, settings, contacts, show)
+        result = tasks.reconstruct(model, settings, contacts or None, show)
     values = _with_notes(result.to_dict(), model, settings.resolution)
     if out is not None:
         from optisense.tasks.figures import draw_reconstruction

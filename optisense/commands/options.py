@@ -110,7 +110,7 @@ def read_named(value: Any) -> Any:
     Values are parsed as in a design file: 1e-3 is a number.
 
     Raises:
-        ValueError: a text has another form.
+        ValueError: a text has another form, or two have the same name.
     """
     if not isinstance(value, list):
         return value
@@ -120,13 +120,16 @@ def read_named(value: Any) -> Any:
     found = {}
     for text in value:
         name, equals, given = text.partition("=")
-        if not equals or not name.strip():
+        name = name.strip().replace("-", "_")
+        if not equals or not name:
             raise ValueError(f"'{text}' is not NAME=VALUE")
+        if name in found:
+            raise ValueError(f"'{name}' is given twice")
         try:
             read, _ = parse_yaml(f"value: {given}", name)
         except OptiSenseError:
             raise ValueError(f"the value in '{text}' can't be read") from None
-        found[name.strip().replace("-", "_")] = read["value"]
+        found[name] = read["value"]
     return found
 
 

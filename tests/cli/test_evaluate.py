@@ -120,6 +120,7 @@ def test_a_failure_is_told_the_rest_goes_on_and_the_exit_code_is_1(tmp_path: Pat
         (("-b", "nothing.py"), "no file"),
         (("--set", "depth"), "NAME=VALUE"),
         (("--set", "depth=[1"), "can't be read"),
+        (("--set", "depth=0.4", "--set", "depth=0.5"), "'depth' is given twice"),
         (("--set", "depth=9"), "9"),
         (("--set", "photons=1e30"), "more than 10,000,000,000"),
         (("--set", "dept=0.2"), "Did you mean 'depth'"),

@@ -70,6 +70,7 @@ def test_the_command_offers_what_can_be_written() -> None:
         (("gelsight-mini-ideal", "--mass", "20"), "needs --for"),
         (("gelsight-mini-ideal", "--for", "urdf", "--density", "gel"), "housing=1.24"),
         (("gelsight-mini-ideal", "--for", "urdf", "--density", "gell=1"), "gel, tray, guide"),
+        (("gelsight-mini-ideal", "--for", "urdf", *2 * ("--density", "gel=1")), "given twice"),
         (("gelsight-mini-ideal", "--for", "urdf", "--mass", "-1"), "above 0"),
     ],
 )

@@ -94,6 +94,7 @@ def test_reconstruction_of_given_objects(tmp_path: Path) -> None:
         ("reconstruction", "gelsight-mini-ideal", "--method", "guess"),
         ("reconstruction", "gelsight-mini-ideal", "--depth", "0.2:9"),
         ("reconstruction", "gelsight-mini-ideal", "--object", "ball:3"),
+        ("reconstruction", "gelsight-mini-ideal", *2 * ("--object", "sphere:3@0,0:0.5")),
         ("reconstruction", "gelsight-mini-ideal", "--object", "sphere:3@90,0:0.5"),
     ],
     ids=" ".join,
