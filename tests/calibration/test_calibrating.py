@@ -335,7 +335,12 @@ def test_an_interrupted_calibration_goes_on_where_it_was(
 
 
 def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
-    design = with_single_lights(mini.design)
+    # Kernels are compiled for a number of groups: three single lights are as many as other tests
+    # have, and compile nothing.
+    start = mini.design.model_copy(deep=True)
+    row = start.lights["red"]
+    start.lights = {"red": row.model_copy(update={"lights": row.lights[::2]})}
+    design = with_single_lights(start)
     real = ots.OpticalModel(set_value(design, "lights.red-2.flux", 1.0))
     balls = [ots.Contact(ots.Sphere(3.0), at=place, depth=0.6) for place in PLACES[:2]]
     shown = photograph_model(real, balls, resolution=SMALLER, photons=200_000, seed=5)
@@ -343,9 +348,9 @@ def test_a_dim_light_of_a_row_is_found(mini: OpticalModel) -> None:
     settings = CalibrationSettings(
         families=chosen_families(kept, ["leds"]), rounds=1, photons=200_000, held_out=()
     )
-    found = calibrate(mini.design, shown, settings)
+    found = calibrate(start, shown, settings)
     power = {each.path.split(".")[1]: each.after for each in found.numbers}
-    others = np.mean([power[f"red-{number}"] for number in (1, 3, 4, 5)])
+    others = np.mean([power[f"red-{number}"] for number in (1, 3)])
     assert power["red-2"] / others == pytest.approx(1.0 / 2.1, abs=0.2)
     assert list(found.design.lights) == list(design.lights)
 
