@@ -63,6 +63,7 @@ class LambertianSensor:
             normals=rays.normals,
             contact_mask=rays.hit & (rays.region == 2),
             points=rays.points,
+            settings={"versions": {}},
         )
 
 

@@ -6,6 +6,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,8 @@ from optisense.design import LightGroup
 from optisense.errors import ContactError, OutputError, TaskError
 from optisense.tasks import ContactDraw, Dataset, DatasetSettings, generate
 from optisense.tasks.dataset_tables import LATER_COLUMNS
+
+from .conftest import LambertianSensor
 
 COUNT = 4
 SETTINGS = DatasetSettings(
@@ -87,8 +90,9 @@ def test_rows_and_columns_are_the_middles_of_contacts_in_a_tall_picture(
     # A narrow field of view, so that the picture shows skin only.
     model = OpticalModel(set_value(mini.design, "camera.fov", 45.0))
     draw = ContactDraw(("sphere:1.5",), depth=(0.3, 0.3))
-    settings = DatasetSettings(contacts=draw, resolution=(48, 64), photons=5_000, seed=2)
-    for sample in generate(model, tmp_path / "data", 2, settings):
+    settings = DatasetSettings(contacts=draw, resolution=(48, 64), seed=2)
+    sensor = LambertianSensor(model, model.chief_rays)
+    for sample in generate(sensor, tmp_path / "data", 2, settings):
         rows, columns = np.nonzero(sample.mask)
         middle = columns.mean() + 0.5, rows.mean() + 0.5
         assert middle == pytest.approx((sample.labels["column"], sample.labels["row"]), abs=0.7)
@@ -221,17 +225,16 @@ def test_contacts_that_cannot_be_made_are_recorded(mini: OpticalModel, tmp_path:
     assert "mm thick" in dataset.failures[0]["reason"]
 
 
-def test_a_picture_of_too_few_pixels_says_so(mini: OpticalModel, tmp_path: Path) -> None:
+def test_a_picture_of_too_few_pixels_says_so(lambertian: Any, tmp_path: Path) -> None:
     """A pixel at 8 x 6 is 5 mm² large: more than a ball touches."""
     coarse = DatasetSettings(
         ContactDraw(("sphere:1.5",), depth=(0.3, 0.3)),
         resolution=(8, 6),
-        photons=20_000,
         skin="conforming",
     )
-    dataset = generate(mini, tmp_path / "d", 1, coarse)
+    dataset = generate(lambertian, tmp_path / "d", 1, coarse)
     assert "fewer than 4 pixels of 8x6 show the contact" in dataset.failures[0]["reason"]
-    fine = generate(mini, tmp_path / "fine", 1, replace(coarse, resolution=(32, 24)))
+    fine = generate(lambertian, tmp_path / "fine", 1, replace(coarse, resolution=(32, 24)))
     assert len(fine) == 1
 
 
@@ -265,16 +268,14 @@ def test_a_dataset_of_a_sensor_with_an_own_lamp_opens_and_continues_elsewhere(
     design = load("gelsight-mini-ideal")
     lamps = design.lights["red"].model_dump() | {"model": "our-lamp"}
     design.lights["red"] = LightGroup.model_validate(lamps)
-    settings = replace(SETTINGS, radiance=False)
+    settings = replace(SETTINGS, radiance=False, skin="conforming")
     folder = tmp_path / "data"
-    generate(OpticalModel(design), folder, 1, settings)
-    assert len(generate(OpticalModel(design), folder, 2, settings)) == 2
+    model = OpticalModel(design)
+    generate(model, folder, 1, settings)
+    assert len(generate(model, folder, 2, settings)) == 2
     # Another machine has the folder, and not the lamp.
     monkeypatch.setenv("OPTISENSE_LIBRARY", str(tmp_path / "elsewhere"))
     assert len(generate(OpticalModel(load(folder / "design")), folder, 3, settings)) == 3
-
-
-FEW = 20_000  # photons, where only chief rays matter
 
 
 def edge_distance(mask: np.ndarray) -> int:
@@ -285,19 +286,15 @@ def edge_distance(mask: np.ndarray) -> int:
 
 
 def test_contacts_stay_clear_of_the_edge_unless_they_may_be_cut(
-    mini: OpticalModel, tmp_path: Path
+    lambertian: Any, tmp_path: Path
 ) -> None:
     settings = DatasetSettings(
-        ContactDraw(("sphere:1.5",)),
-        resolution=(100, 75),
-        photons=FEW,
-        seed=5,
-        skin="conforming",
+        ContactDraw(("sphere:1.5",)), resolution=(100, 75), seed=5, skin="conforming"
     )
-    kept = generate(mini, tmp_path / "kept", 8, settings)
+    kept = generate(lambertian, tmp_path / "kept", 8, settings)
     assert min(edge_distance(sample.mask) for sample in kept) >= 2  # of 100 pixels
     cut = replace(settings, contacts=replace(settings.contacts, margin=0.0))
-    free = generate(mini, tmp_path / "cut", 8, cut)
+    free = generate(lambertian, tmp_path / "cut", 8, cut)
     assert min(edge_distance(sample.mask) for sample in free) == 0
     assert len(kept.failures) == len(free.failures) == 0
     # Contacts are drawn at another place only, so that what fits rarely is not drawn less often.
@@ -309,12 +306,10 @@ def test_contacts_stay_clear_of_the_edge_unless_they_may_be_cut(
     assert len(same) >= 3
 
 
-def test_an_indenter_larger_than_the_view_keeps_no_margin(
-    mini: OpticalModel, tmp_path: Path
-) -> None:
+def test_an_indenter_larger_than_the_view_keeps_no_margin(lambertian: Any, tmp_path: Path) -> None:
     draw = ContactDraw(("sphere:40",), depth=(1.0, 1.5))
-    settings = DatasetSettings(draw, resolution=(60, 45), photons=FEW, seed=1, skin="conforming")
-    made = generate(mini, tmp_path / "large", 3, settings)
+    settings = DatasetSettings(draw, resolution=(60, 45), seed=1, skin="conforming")
+    made = generate(lambertian, tmp_path / "large", 3, settings)
     assert len(made) == 3
     assert all(edge_distance(sample.mask) == 0 for sample in made)
 
@@ -341,10 +336,10 @@ def test_samples_tell_their_points_splits_and_whether_they_are_cut(
         np.testing.assert_allclose(-away[:, 2], sample.depth[sample.mask], atol=2e-3)
 
 
-def test_contacts_that_the_edge_cuts_are_told(mini: OpticalModel, tmp_path: Path) -> None:
+def test_contacts_that_the_edge_cuts_are_told(lambertian: Any, tmp_path: Path) -> None:
     draw = ContactDraw(("sphere:3",), depth=(0.9, 0.9), margin=0.0)
-    settings = DatasetSettings(draw, resolution=(40, 30), photons=FEW, hold_out=("sphere:3",))
-    found = generate(mini, tmp_path / "cut", 8, settings)
+    settings = DatasetSettings(draw, resolution=(40, 30), hold_out=("sphere:3",))
+    found = generate(lambertian, tmp_path / "cut", 8, settings)
     cut = [sample.labels["cut"] for sample in found]
     assert 0 < sum(cut) < len(cut)
     for sample in found:
