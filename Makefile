@@ -62,9 +62,10 @@ demo: setup
 	@printf '\nThat was the demo. What to try next:\n'; sh scripts/next_steps.sh
 
 # Each of these runs whatever becomes of the others, several at a time; a summary at the end says
-# what failed. Those that take longest begin first.
-CHECKS := pytest-rest pytest-docs pytest-tasks pytest-optics pytest-scoring-pages pytest-search \
-    pytest-sensors pytest-pages studio-tests types docs bare-pytest lint import-rules
+# what failed. Those that take longest begin first, but for two that render nothing: while they run,
+# the process that programs of tests are forks of renders, and compiles kernels that the others load.
+CHECKS := pytest-rest types pytest-docs docs pytest-tasks pytest-optics pytest-scoring-pages \
+    pytest-search pytest-sensors pytest-pages studio-tests bare-pytest lint import-rules
 test: setup
 	@MAKE="$(MAKE)" sh scripts/run_checks.sh $(CHECKS)
 
