@@ -13,7 +13,7 @@ from paper.evaluations import NINE, picture, scores, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, image, line
 from paper.mini_shapes import OBJECTIVES, best_text
-from paper.spread import best, is_larger, number, shown, spread
+from paper.spread import best, best_satisfies, number, shown, spread
 from paper.unit import Unit
 
 if TYPE_CHECKING:
@@ -117,27 +117,21 @@ def claims(numbers: Values) -> list[Claim]:
 def coating_is_dull(column: Values, title: str) -> Claim:
     """Return the paper's statement on the best coating, with its verdict from scores."""
     top, alike = best(column)
-    agrees: bool | None = None
-    if top is not None:
-        agrees = float(top) < MOST_SPECULAR
-        if not agrees and any(float(value) < MOST_SPECULAR for value in alike):
-            agrees = None
     return Claim(
         f"A specularity below {MOST_SPECULAR:g} is best ({title}).",
         best_text(column, top, alike),
-        agrees,
+        best_satisfies(alike, lambda value: float(value) < MOST_SPECULAR),
         WHY_COATING,
     )
 
 
 def third_is_best(column: Values, title: str) -> Claim:
     """Return the paper's statement on the third light design, with its verdict from scores."""
-    larger = is_larger(column["3"], column["2"])
     texts = [f"design {name}: {shown(each)}" for name, each in column.items()]
     return Claim(
         f"Design 3, with the belt bent over a small roller, is the best ({title}).",
         ", ".join(texts),
-        None if larger is None else best(column)[0] == "3",
+        best_satisfies(best(column)[1], lambda design: design == "3"),
         WHY_THIRD,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from paper.claims import Claim
 from paper.experiment import Values
 from paper.mini_shapes import OBJECTIVES
-from paper.spread import best, number, shown, spearman
+from paper.spread import best, best_satisfies, number, shown, spearman
 
 PAPER = {
     "GRRGGRRG": {"normdiff": -37.745, "rgb2normal": 0.909},
@@ -53,13 +53,7 @@ def colour_claims(colourings: Values) -> list[Claim]:
             if top is None
             else f"{top} ({shown(column[top], 4)}); not significantly different: "
             f"{_all_but(alike, top)}; with {LITTLE_NOISE}: {little}",
-            None
-            if top is None
-            else True
-            if top == "RGBRGBRG"
-            else None
-            if "RGBRGBRG" in alike
-            else False,
+            best_satisfies(alike, lambda letters: letters == "RGBRGBRG"),
             WHY_NORMDIFF,
         )
     )
@@ -115,11 +109,7 @@ def _alike(colourings: Values) -> Claim:
 
 def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
     top, alike = best(tips)
-    near = {str(PAPERS_TIP + step) for step in (-1, 0, 1)}
     score = None if top is None else float(tips[top]["mean"])
-    agrees: bool | None = None
-    if top is not None:
-        agrees = top in near or (None if near & set(alike) else False)
     return [
         Claim(
             f"Of the tips 0 (flat) to 10 (conical), {PAPERS_TIP} (or a neighbour) has the best "
@@ -128,7 +118,7 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
             if top is None
             else f"tip {top} ({shown(tips[top])}); not significantly different: "
             f"{_all_but(alike, top)}",
-            agrees,
+            best_satisfies(alike, lambda tip: abs(float(tip) - PAPERS_TIP) <= 1.0),
             "The shapes between the ends of the family are assumed, and so are the height and the "
             "width of the tip. 2to3PW depends on the uniformity over the whole image, so that the "
             "wall and the field of view of the camera matter as much as the tip. A neighbour of "
@@ -151,16 +141,13 @@ def _tips(tips: Values, with_leaps: Values) -> list[Claim]:
 
 def _resin(column: Values, title: str) -> Claim:
     top, alike = best(column)
-    agrees: bool | None = None
-    if top is not None and len(alike) < len(column):
-        agrees = str(PAPERS_RESIN) in alike
     return Claim(
         f"Of the resins 0 (even shell) to 10 (almost flat inside), {PAPERS_RESIN} is best "
         f"({title}).",
         "no scores"
         if top is None
         else f"{top} ({shown(column[top])}); not significantly different: {_all_but(alike, top)}",
-        agrees,
+        best_satisfies(alike, lambda resin: float(resin) == PAPERS_RESIN),
         "The thicknesses of gel and shell, the positions of the LEDs in the wall and the shapes "
         "between the ends of the family are assumed. The resin refracts the camera's view and the "
         "light only at the tip, and most of the nine places are on the wall.",

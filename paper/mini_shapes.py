@@ -12,7 +12,7 @@ from paper.claims import Claim, Table
 from paper.evaluations import NINE, picture, scores, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, image, line
-from paper.spread import best, number, shown, spread
+from paper.spread import best, best_satisfies, number, shown, spread
 from paper.unit import Unit
 
 if TYPE_CHECKING:
@@ -116,26 +116,20 @@ def claims(numbers: Values) -> list[Claim]:
 
 def _cylinder(column: Values, title: str) -> Claim:
     top, alike = best(column)
-    agrees = None if top is None or len(alike) == len(column) else f"{CYLINDER_BEST:g}" in alike
     return Claim(
         f"On the cylinder, a specularity of about {CYLINDER_BEST:g} is best ({title}).",
         best_text(column, top, alike),
-        agrees,
+        best_satisfies(alike, lambda value: float(value) == CYLINDER_BEST),
         WHY_COATING,
     )
 
 
 def _sphere(column: Values, title: str) -> Claim:
     top, alike = best(column)
-    agrees: bool | None = None
-    if top is not None:
-        agrees = float(top) <= SPHERE_MOST
-        if not agrees and any(float(value) <= SPHERE_MOST for value in alike):
-            agrees = None
     return Claim(
         f"On the sphere, a specularity of up to {SPHERE_MOST:g} is best ({title}).",
         best_text(column, top, alike),
-        agrees,
+        best_satisfies(alike, lambda value: float(value) <= SPHERE_MOST),
         WHY_COATING,
     )
 

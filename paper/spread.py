@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -74,6 +74,20 @@ def best(values: Mapping[str, Spread]) -> tuple[str | None, list[str]]:
     top = max(there, key=lambda name: there[name]["mean"])
     alike = [name for name in there if name == top or not is_larger(there[top], there[name])]
     return top, alike
+
+
+def best_satisfies(alike: Sequence[str], satisfies: Callable[[str], bool]) -> bool | None:
+    """Return whether the best of several variants satisfies a condition, from those that may be it.
+
+    The result is True only if all of them satisfy it, False only if none does, and otherwise None.
+
+    Args:
+        alike: names of the best variant and of those that do not differ significantly from it, as
+            from `best`; the result is None if there are none.
+        satisfies: function of a name.
+    """
+    found = {satisfies(name) for name in alike}
+    return found.pop() if len(found) == 1 else None
 
 
 def spearman(first: Sequence[float], second: Sequence[float]) -> tuple[float, float]:

@@ -162,7 +162,9 @@ This page compares the statements of the OptiSense paper with experiments on mod
 sensors. One command runs each experiment. The geometry of three of the sensors is partly
 [assumed](sensors.md), and nothing was tuned towards the paper's figures. Where a statement does not
 hold, the text says so and gives the likely cause. Verdicts are computed from the numbers.
-*Inconclusive* means that the differences are within the random scatter of the seeds.
+*Inconclusive* means that the differences are within the random scatter of the seeds (t tests at
+95 %). A statement on the best of several variants is also inconclusive if it holds for some of the
+variants that do not differ significantly from the best one, and not for the others.
 
 The experiments are a part of the source and not of the installed package. Type their commands in
 the folder of the clone. Without a name, the command lists the experiments. A quick run makes fewer

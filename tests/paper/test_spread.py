@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from paper.spread import best, is_larger, number, shown, spearman, spread
+from paper.spread import best, best_satisfies, is_larger, number, shown, spearman, spread
 
 
 def test_mean_and_deviation_of_a_sample() -> None:
@@ -52,6 +52,13 @@ def test_best_names_all_that_cannot_be_told_from_it() -> None:
     assert top == "b"
     assert alike == ["a", "b"]
     assert best({"d": columns["d"]}) == (None, [])
+
+
+def test_the_best_satisfies_what_all_that_may_be_it_satisfy() -> None:
+    assert best_satisfies(["0", "0.2"], lambda value: float(value) < 0.3) is True
+    assert best_satisfies(["0.4", "0.6"], lambda value: float(value) < 0.3) is False
+    assert best_satisfies(["0", "0.4"], lambda value: float(value) < 0.3) is None
+    assert best_satisfies([], lambda value: True) is None
 
 
 def test_spearman_and_its_chance() -> None:
