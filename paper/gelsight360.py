@@ -21,9 +21,9 @@ from paper.evaluations import (
 )
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, line
-from paper.gelsight360_claims import LITTLE_NOISE, PAPER, claims
+from paper.gelsight360_claims import LITTLE_NOISE, PAPER, claims, papers_order
 from paper.mini_shapes import OBJECTIVES
-from paper.spread import number, shown, spearman, spread
+from paper.spread import number, shown, spread
 from paper.unit import Record, Unit
 
 if TYPE_CHECKING:
@@ -337,11 +337,8 @@ def tables(numbers: Values) -> list[Table]:
 
 
 def _correlation(colourings: Values, way: str) -> str:
-    rows = [
-        (PAPER[name]["normdiff"], each["ways"][way]["mean"]) for name, each in colourings.items()
-    ]
-    there = [(paper, mean) for paper, mean in rows if mean is not None]
-    return number(spearman([p for p, _ in there], [m for _, m in there])[0], 2)
+    column = {letters: each["ways"][way] for letters, each in colourings.items()}
+    return number(papers_order(column, "normdiff")[0], 2)
 
 
 def draw(numbers: Values, pictures: Pictures) -> Figure:

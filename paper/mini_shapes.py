@@ -12,7 +12,7 @@ from paper.claims import Claim, Table
 from paper.evaluations import NINE, picture, scores, sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import COLOURS, finish, image, line
-from paper.spread import best, best_satisfies, number, shown, spread
+from paper.spread import Spread, best, best_satisfies, is_larger, number, shown, spread
 from paper.unit import Unit
 
 if TYPE_CHECKING:
@@ -135,24 +135,26 @@ def _sphere(column: Values, title: str) -> Claim:
 
 
 def _similar(all_scores: Values, label: str) -> Claim:
-    below, texts = [], []
+    verdicts: set[bool | None] = set()
+    texts = []
     for name, title in OBJECTIVES.items():
-        flat, bent = (_best_mean(all_scores[shape][name]) for shape in ("flat", label))
+        flat, bent = (_of_best(all_scores[shape][name]) for shape in ("flat", label))
         if flat is None or bent is None:
             continue
-        below.append(flat - bent <= SIMILAR[name] * abs(flat))
-        texts.append(f"{title} {number(bent)}, flat sensor {number(flat)}")
+        least = [None if v is None else v - SIMILAR[name] * abs(v) for v in flat["values"]]
+        verdicts.add(is_larger(bent, spread(least)))
+        texts.append(f"{title} {number(bent['mean'])}, flat sensor {number(flat['mean'])}")
     return Claim(
         f"With the best coating, the {label} is about as good as the flat sensor.",
         ", ".join(texts) or "no scores",
-        all(below) if below else None,
+        False if False in verdicts else True if verdicts == {True} else None,
         WHY_FLAT,
     )
 
 
-def _best_mean(column: Values) -> float | None:
+def _of_best(column: Values) -> Spread | None:
     top, _ = best(column)
-    return None if top is None else float(column[top]["mean"])
+    return None if top is None else column[top]
 
 
 def best_text(column: Values, top: str | None, alike: list[str]) -> str:

@@ -66,6 +66,20 @@ def is_larger(one: Spread, other: Spread) -> bool | None:
     return mean > 0.0
 
 
+def exceeds(found: Spread, limit: float) -> bool | None:
+    """Return whether a mean is larger than a number, by the test of `is_larger`."""
+    return is_larger(found, spread([limit] * len(found["values"])))
+
+
+def by_seed(numbers: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return dicts of spreads, nested to any depth, once for each seed with its values alone."""
+    parts: dict[str, list[Any]] = {
+        name: [spread([value]) for value in each["values"]] if "values" in each else by_seed(each)
+        for name, each in numbers.items()
+    }
+    return [dict(zip(parts, row, strict=True)) for row in zip(*parts.values(), strict=True)]
+
+
 def best(values: Mapping[str, Spread]) -> tuple[str | None, list[str]]:
     """Return the name with the largest mean, and all names that do not differ significantly."""
     there = {name: each for name, each in values.items() if each["mean"] is not None}

@@ -7,7 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from paper.spread import best, best_satisfies, is_larger, number, shown, spearman, spread
+from paper.spread import (
+    best,
+    best_satisfies,
+    by_seed,
+    exceeds,
+    is_larger,
+    number,
+    shown,
+    spearman,
+    spread,
+)
 
 
 def test_mean_and_deviation_of_a_sample() -> None:
@@ -39,6 +49,19 @@ def test_one_seed_is_compared_plainly_and_gaps_are_left_out() -> None:
     assert is_larger(spread([1.0]), spread([1.0])) is None
     assert is_larger(spread([None, 2.0]), spread([5.0, 1.0])) is True
     assert is_larger(spread([None]), spread([1.0])) is None
+
+
+def test_a_limit_within_the_scatter_is_neither_exceeded_nor_kept() -> None:
+    found = spread([0.34, 0.525, 0.64])
+    assert [exceeds(found, limit) for limit in (0.1, 0.45, 0.9)] == [True, None, False]
+
+
+def test_numbers_of_each_seed_alone() -> None:
+    numbers = {"a": spread([1.0, None]), "b": {"c": spread([3.0, 4.0])}}
+    assert by_seed(numbers) == [
+        {"a": spread([1.0]), "b": {"c": spread([3.0])}},
+        {"a": spread([None]), "b": {"c": spread([4.0])}},
+    ]
 
 
 def test_best_names_all_that_cannot_be_told_from_it() -> None:
