@@ -15,7 +15,7 @@ from paper.claims import Claim, Table
 from paper.evaluations import sensor
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import finish
-from paper.spread import number, shown, spread
+from paper.spread import exceeds, number, shown, spread
 from paper.timing import image_times
 from paper.unit import Unit
 
@@ -82,18 +82,18 @@ def claims(numbers: Values) -> list[Claim]:
         for size, row in numbers["times"].get(name, {}).items():
             if seconds is None:
                 continue
-            mean = row["new_light"]["mean"]
-            slow = None if mean is None or _was_busy(row, numbers["machine"]) else False
+            longer = exceeds(row["new_light"], seconds)
+            undecided = longer is None or (longer and _was_busy(row, numbers["machine"]))
             found.append(
                 Claim(
                     f"An image of {name} takes {seconds:g} s.",
                     f"{shown(row['new_light'])} s at {size} with {row['photons']:,} photons and "
                     f"{number(row['noise']['mean'], 2)} % noise; a further image of the same "
                     f"sensor takes {shown(row['light_kept'])} s",
-                    True if mean is not None and mean <= seconds else slow,
+                    None if undecided else not longer,
                     "Times depend on the machine and on its other load (compare the processor "
-                    "seconds). A time that is not longer counts as agreement; a longer time on a "
-                    "busy machine is inconclusive.",
+                    "seconds). A shorter time counts as agreement; a longer time on a busy machine "
+                    "is inconclusive.",
                 )
             )
     return found

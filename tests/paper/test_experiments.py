@@ -216,16 +216,16 @@ def test_readings_tell_what_decides(answered: Answered) -> None:
     assert mirror[1:] == ["100 / 100", "100 / 100"]
 
 
-def test_a_slow_image_on_a_busy_machine_tells_nothing(answered: Answered) -> None:
+def test_slow_images_on_a_busy_machine_and_scattered_times_tell_nothing(answered: Answered) -> None:
     experiment = EXPERIMENTS["speed"]
     finding, _ = answered(experiment, experiment.settings())
     numbers = finding.numbers
     numbers["machine"]["processors"] = 2
 
-    def verdict(seconds: float, processor: float) -> str:
+    def verdict(seconds: float, processor: float, scatter: float = 0.1) -> str:
         for sizes in numbers["times"].values():
             for row in sizes.values():
-                row["new_light"]["mean"] = seconds
+                row["new_light"] = spread([seconds - scatter, seconds, seconds + scatter])
                 row["new_light_processor"]["mean"] = processor
         (said,) = {claim.verdict for claim in experiment.claims(numbers)}
         return said
@@ -233,6 +233,7 @@ def test_a_slow_image_on_a_busy_machine_tells_nothing(answered: Answered) -> Non
     assert verdict(2.0, 3.9) == "agrees"
     assert verdict(20.0, 39.0) == "disagrees"
     assert verdict(20.0, 4.0) == "inconclusive"
+    assert verdict(7.4, 14.5, scatter=5.0) == "inconclusive"
 
 
 def test_the_page_collects_results_beside_it(answered: Answered, tmp_path: Path) -> None:
