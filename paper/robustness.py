@@ -3,7 +3,7 @@
 Each dimension of a sensor that no source gives is set to both ends of its plausible range, one at
 a time; then all of them are drawn at random. In each of these geometries, a conclusion has a margin
 and holds if the margin is above 0. The noise of a margin is its standard deviation over seeds on
-the sensor as assumed; a margin within the noise is inconclusive.
+the sensor as assumed; a margin is inconclusive if a t test can't tell it from 0.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from paper.claims import Claim, Table
 from paper.experiment import Experiment, Finding, Pictures, Steps, Values
 from paper.figures import finish
 from paper.robustness_questions import CONCLUSIONS, QUESTIONS, Question
-from paper.spread import number, spread
+from paper.spread import CONFIDENCE, exceeds, number, quantile, spread
 from paper.unit import Unit
 
 if TYPE_CHECKING:
@@ -64,19 +64,21 @@ def steps(settings: Values) -> Steps:
         found = question.margins([next(records) for _ in units], settings)
         for name in question.conclusions:
             margins[name].setdefault(geometry, []).append(found[name])
-    return Finding({"margins": {name: _with_verdicts(rows) for name, rows in margins.items()}})
+    return Finding({"margins": {name: with_verdicts(rows) for name, rows in margins.items()}})
 
 
-def _with_verdicts(rows: Mapping[str, list[float | None]]) -> Values:
+def with_verdicts(rows: Mapping[str, list[float | None]]) -> Values:
     """Return the margin as assumed with its noise, and margin and verdict of each geometry."""
     nominal = spread(rows[AS_ASSUMED])
-    noise = nominal["standard_deviation"] or 0.0
+    count = sum(value is not None for value in nominal["values"])
+    noise = nominal["standard_deviation"]
+    least = quantile(count - 1) * noise if noise else 0.0
     verdicts: dict[str, Any] = {}
     for geometry, values in rows.items():
-        value = nominal["mean"] if geometry == AS_ASSUMED else values[0]
-        sure = value is not None and abs(value) > noise
-        holds = bool(value is not None and value > 0.0) if sure else None
+        value = values[0]
+        holds = None if value is None or abs(value) <= least else value > 0.0
         verdicts[geometry] = {"margin": value, "holds": holds}
+    verdicts[AS_ASSUMED] = {"margin": nominal["mean"], "holds": exceeds(nominal, 0.0)}
     return {"as_assumed": nominal, "geometries": verdicts}
 
 
@@ -100,12 +102,12 @@ def _claim(text: str, found: Values) -> Claim:
     if failing and not holding:
         agrees = False
     why = (
-        "The statement does not hold for any of these values of the assumed dimensions, so that "
-        "another cause explains the difference."
+        "The statement is found to hold for none of these values of the assumed dimensions, so "
+        "that another cause explains the difference."
         if agrees is False
         else "The statement depends on assumed dimensions."
         if failing
-        else "In some geometries, the margin is no larger than its noise."
+        else "In some geometries, the margin is within its noise."
     )
     return Claim(text, here, agrees, why)
 
@@ -117,7 +119,9 @@ def notes(numbers: Values) -> list[str]:
         "with random values of all of them. A statement agrees if it holds in all geometries, and "
         "disagrees if it holds in none. A margin is the amount by which a statement holds, and is "
         "negative if it does not. Its noise is the standard deviation over the seeds of the sensor "
-        "as assumed."
+        "as assumed. A margin of one seed is within the noise if it is smaller than the noise "
+        f"times the {100 * CONFIDENCE:.0f} % quantile of the t distribution, which is "
+        f"{quantile(2):.1f} for three seeds."
     ]
 
 

@@ -61,7 +61,7 @@ def is_larger(one: Spread, other: Spread) -> bool | None:
     if len(differences) == 1 or np.ptp(differences) == 0.0:
         return None if mean == 0.0 else mean > 0.0
     error = float(differences.std(ddof=1)) / math.sqrt(len(differences))
-    if abs(mean) <= _quantile(len(differences) - 1) * error:
+    if abs(mean) <= quantile(len(differences) - 1) * error:
         return None
     return mean > 0.0
 
@@ -122,7 +122,7 @@ def spearman(first: Sequence[float], second: Sequence[float]) -> tuple[float, fl
     return reached, float((orders @ a / scale >= reached - 1e-9).mean())
 
 
-def _quantile(freedom: int) -> float:
+def quantile(freedom: int) -> float:
     """Return the quantile of the t distribution at `CONFIDENCE`, for these degrees of freedom."""
     from scipy.stats import t
 

@@ -15,6 +15,7 @@ from optisense.json_values import json_ready
 from paper import EXPERIMENTS, Experiment, Finding, Record, find, write_page
 from paper.errors import ExperimentError
 from paper.experiment import gaps, write
+from paper.robustness import AS_ASSUMED, with_verdicts
 from paper.spread import spread
 from paper.text import PICTURE, RESULT, TEXT
 
@@ -192,6 +193,19 @@ def test_robustness_counts_geometries(answered: Answered) -> None:
     claim = next(c for c in experiment.claims(finding.numbers) if "cylindrical" in c.says)
     assert claim.verdict == "inconclusive"
     assert claim.here == "holds in 8 of 9 geometries; does not hold for: guide_thickness 6"
+
+
+def test_margins_are_held_against_the_noise_of_single_seeds() -> None:
+    """With three seeds, a margin is decided from 2.92 times the noise on."""
+    rows = {AS_ASSUMED: [1.0, 2.0, 3.0], "a": [2.9], "b": [2.93], "c": [-2.93], "d": [None]}
+    found = with_verdicts(rows)["geometries"]
+    assert {name: each["holds"] for name, each in found.items()} == {
+        AS_ASSUMED: True,
+        "a": None,
+        "b": True,
+        "c": False,
+        "d": None,
+    }
 
 
 def test_readings_tell_what_decides(answered: Answered) -> None:
