@@ -184,8 +184,8 @@ WHY_FLAT = (
 
 FITTED_NOTE = (
     "With the light and camera of a real unit (the built-in `gelsight-mini` and its cylindrical "
-    "and spherical forms), statements 2 and 6 hold, 1 is inconclusive, and the others do not hold; "
-    "[the page on calibration](calibration.md#a-real-gelsight-mini) has the scores."
+    "and spherical forms), three of the six verdicts change; [the page on "
+    "calibration](calibration.md#a-real-gelsight-mini) has the scores."
 )
 
 
