@@ -131,8 +131,8 @@ class Press:
         """Return the colours (n, 3), 0 to 1, of the pixels of a mask (h, w).
 
         Args:
-            kind: "picture": sRGB-encoded, as a robot reads it from the camera, before rounding to 8
-                bits; or "response": linear.
+            kind: "picture": after the tone curve of the camera, as a robot reads them from the
+                picture, before rounding to 8 bits; or "response": linear.
 
         Raises:
             ObjectiveError: there is no such kind.
