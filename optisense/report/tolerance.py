@@ -34,6 +34,7 @@ def render_tolerance(tolerance: Tolerance) -> str:
         headline=[
             ("sensors tried", f"{tolerance.sensors:,}"),
             ("failed", f"{sum(tolerance.failures.values()):,}"),
+            ("seed", str(tolerance.seed)),
             ("time", f"{tolerance.seconds:,.0f} s"),
         ],
         interrupted=tolerance.interrupted,

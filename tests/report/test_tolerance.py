@@ -52,6 +52,7 @@ def test_percentiles_and_shares_are_on_the_page(found: Tolerance) -> None:
             f'<td class="tight">{share.error:.2f}</td>' in page
         )
     assert "limit of a uniform distribution" in page
+    assert '<span class="soft">seed</span> <b>0</b>' in page
     assert len(re.findall(r'<img [^>]*src="data:image/png', page)) == 1
 
 

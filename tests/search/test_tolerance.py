@@ -174,6 +174,15 @@ def test_results_are_json(result: Tolerance) -> None:
     assert again["objectives"]["linear"]["shares"][RED]["value"] > 0.8
 
 
+def test_each_score_is_written_with_the_values_that_gave_it(result: Tolerance) -> None:
+    again = result.to_dict()
+    assert again["seed"] == 0
+    assert again["versions"]["optisense"] == ots.__version__
+    assert again["names"] == list(WEIGHTS)
+    scores = np.asarray(again["values"]) @ list(WEIGHTS.values())
+    assert scores == pytest.approx(np.asarray(again["objectives"]["linear"]["scores"]))
+
+
 def test_usual_errors_fit_every_sensor() -> None:
     for name in ("gelsight-mini-ideal", "gelsight360", "gelsight-svelte", "gelbelt"):
         design = ots.load(name)

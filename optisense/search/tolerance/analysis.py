@@ -24,6 +24,7 @@ from optisense.search.executors.base import run_jobs
 from optisense.search.space.manufacturing import ManufacturingErrors, ToleranceDistribution
 from optisense.search.study.failures import cause_of
 from optisense.search.study.rescoring import fresh_seeds
+from optisense.search.study.settings import package_versions
 from optisense.search.tolerance.sensitivity import (
     Estimate,
     paired_errors,
@@ -120,12 +121,13 @@ class Tolerance:
         errors: manufacturing errors.
         results: distribution of the score by objective.
         sensors: number of sensors that were tried.
+        seed: seed of the errors and of the light.
         failures: causes for which sensors have no score (see `failures.cause_of`), each with the
             number of sensors.
         interrupted: whether the analysis was stopped early.
         seconds: wall time, s.
         settings: settings of the objectives.
-        values: values (rows, k, d) of the numbers with errors, for plots.
+        values: values (rows, k, d) of the numbers with errors.
         names: names (d) of these numbers.
     """
 
@@ -133,6 +135,7 @@ class Tolerance:
     errors: ManufacturingErrors
     results: Mapping[str, ScoreDistribution]
     sensors: int
+    seed: int
     failures: Mapping[str, int]
     interrupted: bool
     seconds: float
@@ -141,9 +144,14 @@ class Tolerance:
     names: Sequence[str] = field(repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all results, ready for JSON."""
+        """Return all results, ready for JSON.
+
+        ``values`` has a row for each of the ``scores``, and a column for each of the ``names``.
+        """
         return {
             "design": self.design.name,
+            "versions": package_versions(),
+            "seed": self.seed,
             "errors": self.errors.to_plain(),
             "sensors": self.sensors,
             "interrupted": self.interrupted,
@@ -151,6 +159,8 @@ class Tolerance:
             "settings": dict(self.settings),
             "failures": dict(self.failures),
             "objectives": {name: _plain(each) for name, each in self.results.items()},
+            "names": list(self.names),
+            "values": self.values.reshape(-1, len(self.names)).tolist(),
         }
 
 
@@ -245,6 +255,7 @@ def tolerance(
             for name in evaluator.names
         },
         sensors=len(outcomes),
+        seed=seed,
         failures=Counter(cause_of(each.failure) for each in outcomes if each.failure is not None),
         interrupted=interrupted,
         seconds=time.perf_counter() - began,
