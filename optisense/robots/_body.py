@@ -15,6 +15,7 @@ from optisense.design.looks import ROLE_LOOKS
 from optisense.design.projection import image_edges
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.bodies import united
 from optisense.geometry.common_space import as_manifold, of_manifold
 from optisense.geometry.surface import closest_points
 from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
@@ -206,7 +207,7 @@ def _without_overlaps(design: SensorDesign, solids: list[Shape]) -> dict[str, An
     bodies = {each.name: as_manifold(each.mesh) for each in solids}
     meshes = design.deformed_meshes()
     air = [name for name in design.parts if is_air(design, name) and meshes[name].is_closed]
-    bodies |= {name: as_manifold(meshes[name]) for name in air}
+    bodies |= {name: as_manifold(united(meshes[name])) for name in air}
     kept, taken = {}, None
     for name in sorted(bodies, key=rank, reverse=True):
         body = bodies[name]

@@ -10,9 +10,9 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import Role
 from optisense.geometry import TriangleMesh
+from optisense.geometry.bodies import bodies
 from optisense.workshop._profiles import OutlinePiece, pieces
 from optisense.workshop._recognised import extruded_along
-from optisense.workshop._step_format import bodies
 from optisense.workshop.shapes import Shape
 
 THICKEST = 10.0

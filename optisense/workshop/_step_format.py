@@ -12,13 +12,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from optisense.design.looks import ROLE_LOOKS
 from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.containment import inside
-from optisense.geometry.patches import patches
+from optisense.geometry.bodies import bodies
 from optisense.geometry.step import no_step
 from optisense.version import __version__
 from optisense.workshop._exact_shapes import WORTH_IT, exact_body
@@ -114,23 +111,6 @@ def _sign(writer: Any) -> None:
     text = TCollection_HAsciiString(f"OptiSense Studio {__version__}")
     head.SetAuthorValue(1, text)
     head.SetOriginatingSystem(text)
-
-
-def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:
-    """Return the bodies of a closed mesh: for each its outside first, then its cavities.
-
-    A cavity's normals point inward, so that its volume is subtracted from its body's; it belongs to
-    the smallest body around it.
-    """
-    everything = np.arange(len(mesh.faces))
-    pieces = [mesh.with_faces(mesh.faces[faces]).compacted() for faces in patches(mesh, everything)]
-    found = [[piece] for piece in sorted(pieces, key=lambda p: p.volume) if piece.volume > 0.0]
-    for cavity in (piece for piece in pieces if piece.volume <= 0.0):
-        for body in found:
-            if inside(cavity.vertices[:1], body[0])[0]:
-                body.append(cavity)
-                break
-    return found
 
 
 def _boundary(shape: Shape) -> Any:

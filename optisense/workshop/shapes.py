@@ -8,6 +8,7 @@ from optisense.design import Cage, Role, SensorDesign
 from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.bodies import united
 from optisense.workshop._thickened import thickened
 
 AIR = 1.0
@@ -59,8 +60,8 @@ def is_air(design: SensorDesign, name: str) -> bool:
 def shapes(design: SensorDesign) -> list[Shape]:
     """Return all parts of a design except its indenters and those of air, in their current shape.
 
-    Sheets have the thickness that the design gives for manufacturing, and gels have only the space
-    that solids of higher priority leave them.
+    Bodies of one part that overlap are one body, sheets have the thickness that the design gives
+    for manufacturing, and gels have only the space that solids of higher priority leave them.
 
     Raises:
         DesignError: a part has no mesh, or lies outside of the cage that deforms it.
@@ -80,6 +81,9 @@ def shapes(design: SensorDesign) -> list[Shape]:
         if mesh.is_closed and mesh.volume < 0.0:
             mesh = mesh.flipped()
         cage = next((each for each in design.cages.values() if name in each.parts), None)
+        if mesh.is_closed and (whole := united(mesh)) is not mesh:
+            mesh, cage = whole, None
+            meshes[name] = whole
         if part.role is Role.ELASTOMER:
             left = carved(design, meshes, name)
             if left is not meshes[name]:

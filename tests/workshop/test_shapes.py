@@ -15,8 +15,9 @@ from optisense import sensors
 from optisense.design import Part, Point, Role, SensorDesign
 from optisense.errors import DesignError, OutputError, SetupError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.bodies import bodies, united
 from optisense.workshop import bill_of_materials, export
-from optisense.workshop._step_format import bodies, write_step
+from optisense.workshop._step_format import write_step
 from optisense.workshop.mesh_formats import NAMESPACE, three_mf_bytes
 from optisense.workshop.shapes import Shape, shapes
 
@@ -165,6 +166,21 @@ def test_bodies_keep_their_cavities() -> None:
     found = bodies(hollow_and_apart())
     volumes = sorted([round(piece.volume, 9) for piece in body] for body in found)
     assert volumes == [[1.0], [1.0], [27.0, -8.0]]
+
+
+def test_overlapping_bodies_of_a_part_are_one(flat: SensorDesign) -> None:
+    """Their common space is counted once; bodies that touch, and cavities, stay as they are."""
+    cubes = [TriangleMesh.box((x, 0, 40), (x + 10, 10, 50)) for x in (0, 5, 30)]
+    cubes.append(TriangleMesh.box((40, 1, 41), (41, 2, 42)))
+    cubes.append(TriangleMesh.box((30, 0, 40), (35, 5, 60)))
+    flat = flat.model_copy(deep=True)
+    flat.parts["frame"] = Part(role=Role.BLOCKER, mesh="meshes/frame.obj")
+    flat.meshes["frame"] = TriangleMesh.joined(cubes)
+    (frame,) = [each for each in shapes(flat) if each.name == "frame"]
+    assert frame.volume == pytest.approx(1500.0 + 1250.0 + 1.0)
+    assert sorted(body[0].volume for body in bodies(frame.mesh)) == pytest.approx([1, 1250, 1500])
+    apart = hollow_and_apart()
+    assert united(apart) is apart
 
 
 @needs_step
