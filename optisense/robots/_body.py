@@ -128,8 +128,8 @@ def sensor_body(
             `optisense.robots._densities`.
 
     Raises:
-        DesignError: a part has no mesh or lies outside of its cage; nothing of the sensor is solid;
-            there is no sensing surface; a mass or density is not above 0; or a density is of no
+        DesignError: a part has no mesh or lies outside of its cage; nothing of the sensor is solid,
+            or only within air; there is no sensing surface; a mass or density is not above 0; or a density is of no
             solid part.
     """
     made = shapes(design)
@@ -141,6 +141,13 @@ def sensor_body(
     _check(design, solids, mass, given)
     notes: list[str] = []
     real = _without_overlaps(design, solids)
+    for each in [each for each in solids if real[each.name].is_empty()]:
+        solids.remove(each)
+        notes.append(
+            f"{each.name} has neither mass nor contacts, as other parts fill all of its space"
+        )
+    if not solids:
+        raise DesignError("parts of air fill the space of all solids", where=design.where("parts"))
     masses = [given.get(each.name, density_of(each)) * KILOGRAMS for each in solids]
     total, centre, inertia = mass_properties([real[each.name] for each in solids], masses)
     if mass is None:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from optisense import sensors
-from optisense.design import SensorDesign
+from optisense.design import Part, Role, SensorDesign
 from optisense.design.projection import picture_places
 from optisense.errors import DesignError, OwnCodeError
+from optisense.geometry import TriangleMesh
 from optisense.geometry.common_space import as_manifold
 from optisense.robots import RobotFormat, SensorBody, export_robot, sensor_body
 from optisense.robots._body import KILOGRAMS, _skin_frame, mass_properties
@@ -148,6 +149,20 @@ def test_a_weighed_sensor() -> None:
     gel = next(each.volume for each in shapes(design) if each.name == "gel")
     assert gel is not None
     assert heavier.mass - one.mass == pytest.approx(1.03e-6 * gel, rel=1e-3)
+
+
+def test_a_solid_inside_another_one_is_left_out() -> None:
+    """Nothing remains of it, so that it adds neither mass nor a hull."""
+    design = sensors.build("gelsight-mini-ideal")
+    for name, half, priority in (("outer", 10.0, 1), ("inner", 2.0, 0)):
+        design.parts[name] = Part(role=Role.BLOCKER, mesh=f"meshes/{name}.obj", priority=priority)
+        low, high = np.array([0.0, 0.0, -50.0]) + half * np.array([[-1.0], [1.0]])
+        design.meshes[name] = TriangleMesh.box(low, high)
+    both = sensor_body(design)
+    assert any(note.startswith("inner has neither mass nor contacts") for note in both.notes)
+    assert "inner-hull" not in {each.name for each in both.hulls}
+    del design.parts["inner"]
+    assert both.mass == pytest.approx(sensor_body(design).mass, rel=1e-12)
 
 
 def test_wrong_numbers_are_refused() -> None:
