@@ -84,7 +84,10 @@ class SensorBody:
         centre: (3,) centre of mass, m.
         inertia: (3, 3) about the centre of mass along the axes of the frame, kg m^2.
         camera: pose of the camera: x to the right and y down in the picture, z where it looks.
-        camera_angle: vertical angle of view of a pinhole camera, degrees.
+        camera_angle: vertical angle of view of a pinhole camera with its axis in the middle of the
+            picture, degrees.
+        camera_middle: place (across, down) of the camera's axis in the picture, in shares of its
+            width and height.
         resolution: width and height of the picture, pixels.
         skin: pose of the skin: the origin is its point next to its centroid (of several, the one
             farthest to the right in the picture), z points out of the sensor and x as near to the
@@ -102,6 +105,7 @@ class SensorBody:
     inertia: FloatArray
     camera: Frame
     camera_angle: float
+    camera_middle: tuple[float, float]
     resolution: tuple[int, int]
     skin: Frame
     skin_box: tuple[FloatArray, FloatArray]
@@ -175,6 +179,7 @@ def sensor_body(
         inertia=inertia,
         camera=Frame(METRES * np.array(camera.position), np.stack([right, -up, forward], axis=1)),
         camera_angle=_vertical_angle(design),
+        camera_middle=(0.5, 0.5) if camera.distortion is None else camera.distortion.centre,
         resolution=camera.resolution,
         skin=skin_frame,
         skin_box=((low + high) / 2.0, (high - low) / 2.0),
@@ -317,6 +322,9 @@ def _tell_of_camera(design: SensorDesign, notes: list[str]) -> None:
     """Say what a pinhole camera in a robot simulator leaves out."""
     if design.camera.projection == "equidistant":
         notes.append("the camera is a fisheye, and a simulator's camera is a pinhole")
+    lens = design.camera.distortion
+    if lens is not None and any(lens.coefficients()):
+        notes.append("the camera's lens distorts, which a simulator's camera does not")
     if design.parts_of(Role.MIRROR):
         notes.append("the camera looks by way of mirrors, which a simulator's camera does not")
 

@@ -14,6 +14,11 @@ LEAST_HALF_SIDE = 5e-4
 mm: objects rest on the skin with their contacts up to some tenths of a millimetre off it."""
 
 
+SENSOR_HEIGHT = 1e-3
+"""Height (m) of the image sensor to which the focal length refers where the camera's axis is off
+the middle of the picture: only their ratio counts."""
+
+
 def mjcf(body: SensorBody, folder: str) -> str:
     """Return the text of an MJCF file.
 
@@ -53,8 +58,7 @@ def mjcf(body: SensorBody, folder: str) -> str:
     width, height = body.resolution
     lines.append(
         f'      <camera name="camera" pos="{numbers(body.camera.origin)}" '
-        f'xyaxes="{numbers((*right, *-down))}" fovy="{body.camera_angle:.9g}" '
-        f'resolution="{width} {height}"/>'
+        f'xyaxes="{numbers((*right, *-down))}" {_view(body)} resolution="{width} {height}"/>'
     )
     skin, (middle, half) = body.skin, body.skin_box
     axes = numbers((*skin.axes[:, 0], *skin.axes[:, 1]))
@@ -71,6 +75,24 @@ def mjcf(body: SensorBody, folder: str) -> str:
     lines.append('    <touch name="normal_force" site="touched"/>')
     lines += ["  </sensor>", "</mujoco>"]
     return "\n".join(lines) + "\n"
+
+
+def _view(body: SensorBody) -> str:
+    """Return the attributes of the camera's angle of view, and of its axis if it is off the middle.
+
+    MuJoCo's `principal` is the place of the picture's middle from the axis, to the right and down.
+    """
+    width, height = body.resolution
+    across, down = body.camera_middle
+    if across == down == 0.5:
+        return f'fovy="{body.camera_angle:.9g}"'
+    size = SENSOR_HEIGHT * np.array([width / height, 1.0])
+    focal = 0.5 * SENSOR_HEIGHT / np.tan(np.radians(0.5 * body.camera_angle))
+    principal = size * (0.5 - np.array([across, down]))
+    return (
+        f'sensorsize="{numbers(size)}" focal="{numbers((focal, focal))}" '
+        f'principal="{numbers(principal)}"'
+    )
 
 
 _UPPER = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

@@ -10,6 +10,7 @@ import pytest
 
 from optisense import sensors
 from optisense.design import Part, Role, SensorDesign
+from optisense.design.lenses.brown_conrady import BrownConrady
 from optisense.design.projection import picture_places
 from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry import TriangleMesh
@@ -233,6 +234,36 @@ def test_the_camera_looks_where_the_design_does(made: Made) -> None:
     across, down = picture_places(straight, points)
     np.testing.assert_allclose(0.5 + 0.5 * right / -back / wide, across, atol=1e-5)
     np.testing.assert_allclose(0.5 - 0.5 * up / -back / high, down, atol=1e-5)
+
+
+def test_the_axis_of_the_camera_may_be_off_the_middle_of_the_picture(tmp_path: Path) -> None:
+    """A design's lens has a centre; the frustum with which MuJoCo draws has the same one."""
+    design = sensors.build("gelsight-mini-ideal")
+    lens = BrownConrady(kind="brown-conrady", centre=(0.55, 0.42))
+    design.camera = design.camera.model_copy(update={"distortion": lens})
+    mjcf, *_ = export_robot(design, tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(mjcf))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    scene, camera = mujoco.MjvScene(model, 100), mujoco.MjvCamera()
+    camera.type, camera.fixedcamid = mujoco.mjtCamera.mjCAMERA_FIXED, 0
+    every = mujoco.mjtCatBit.mjCAT_ALL
+    mujoco.mjv_updateScene(model, data, mujoco.MjvOption(), None, camera, every, scene)
+    view = scene.camera[0]
+    points = design.meshes["skin"].vertices[::97]
+    right, up, back = ((1e-3 * points - data.cam_xpos[0]) @ data.cam_xmat[0].reshape(3, 3)).T
+    x, y = (view.frustum_near * each / -back for each in (right, up))
+    tall = view.frustum_top - view.frustum_bottom
+    wide = tall * design.camera.resolution[0] / design.camera.resolution[1]
+    expected = np.array(picture_places(design.camera, points))
+    found = np.array([0.5 + (x - view.frustum_center) / wide, (view.frustum_top - y) / tall])
+    shown = ((expected > 0.0) & (expected < 1.0)).all(axis=0)
+    assert shown.sum() > 5
+    np.testing.assert_allclose(found[:, shown], expected[:, shown], atol=1e-5)
+    assert "lens distorts" not in " ".join(sensor_body(design).notes)
+    bent = BrownConrady(kind="brown-conrady", k1=-0.1)
+    design.camera = design.camera.model_copy(update={"distortion": bent})
+    assert "lens distorts" in " ".join(sensor_body(design).notes)
 
 
 def test_urdf_has_the_same_body_and_frames(made: Made) -> None:
