@@ -38,6 +38,11 @@ equally far to the right. It is small, so that right decides before up, yet abov
 WIDEST_PINHOLE = 170.0
 """Largest vertical angle (degrees) of the pinhole camera that stands for a fisheye. A pinhole sees
 less than 180 degrees, and near this limit nearly all of its picture shows the rim of its view."""
+LEAST_INERTIA = 1e-13
+"""Smallest principal moment of inertia, kg m^2: MuJoCo takes 1e-15 for 0. A cube of 1 mm of plastic
+has 2e-13, and a sensor more."""
+RESERVED = "world"
+"""Name that the body without motion has in simulators, and no other one can have."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ class SensorBody:
     """Sensor as a rigid body, in the frame of the design but in metres.
 
     Attributes:
-        name: name of the design, of letters, digits, '-' and '_'.
+        name: name of the design, of letters, digits, '-' and '_'; `world-sensor` for `world`.
         looks: meshes to be shown.
         hulls: convex meshes for contacts.
         mass: kg.
@@ -133,8 +138,8 @@ def sensor_body(
 
     Raises:
         DesignError: a part has no mesh or lies outside of its cage; nothing of the sensor is solid,
-            or only within air; there is no sensing surface; a mass or density is not above 0; or a density is of no
-            solid part.
+            or only within air; there is no sensing surface; a mass or density is not above 0, or so
+            small that the inertia is none; or a density is of no solid part.
     """
     made = shapes(design)
     skin = next((each.mesh for each in made if each.role is Role.SENSING_SURFACE), None)
@@ -163,6 +168,13 @@ def sensor_body(
     else:
         inertia *= 1e-3 * mass / total
         total = 1e-3 * mass
+    least = float(np.linalg.eigvalsh(inertia)[0])
+    if least < LEAST_INERTIA:
+        raise DesignError(
+            f"with a mass of {1e3 * total:.3g} g, the smallest moment of inertia is {least:.2g} "
+            "kg m^2, which simulators take for 0",
+            hint="Give a larger mass, or check densities (g/cm^3) and the size of parts (mm)",
+        )
     hulls = _hulls(solids, real, skin, notes)
     camera = design.camera
     right, up, forward = camera.axes()
@@ -170,8 +182,9 @@ def sensor_body(
     local = METRES * skin.vertices @ skin_frame.axes - skin_frame.origin @ skin_frame.axes
     low, high = local.min(axis=0), local.max(axis=0)
     _tell_of_camera(design, notes)
+    name = file_name(design.name)
     return SensorBody(
-        name=file_name(design.name),
+        name=f"{name}-sensor" if name == RESERVED else name,
         looks=[_body_mesh(each.name, each.mesh, each) for each in made],
         hulls=hulls,
         mass=total,
@@ -281,6 +294,8 @@ def _hulls(
 
 
 def _body_mesh(name: str, mesh: TriangleMesh, shape: Shape) -> BodyMesh:
+    if len(mesh.vertices) < 4:
+        mesh = _divided(mesh)
     text, opacity = ROLE_LOOKS[shape.role.value]
     red, green, blue = (int(text[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     return BodyMesh(
@@ -290,6 +305,14 @@ def _body_mesh(name: str, mesh: TriangleMesh, shape: Shape) -> BodyMesh:
         shape.is_solid,
         shape.role is Role.ELASTOMER,
     )
+
+
+def _divided(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh with a vertex in the middle of each face: MuJoCo takes none of fewer than 4."""
+    middles = len(mesh.vertices) + np.arange(len(mesh.faces), dtype=mesh.faces.dtype)
+    ends = [np.column_stack([mesh.faces[:, [k, (k + 1) % 3]], middles]) for k in range(3)]
+    vertices = np.concatenate([mesh.vertices, mesh.triangles.mean(axis=1)])
+    return TriangleMesh(vertices, np.concatenate(ends))
 
 
 def _skin_frame(skin: TriangleMesh, right: FloatArray, up: FloatArray) -> Frame:

@@ -166,10 +166,22 @@ def test_a_solid_inside_another_one_is_left_out() -> None:
     assert both.mass == pytest.approx(sensor_body(design).mass, rel=1e-12)
 
 
+def test_mujoco_reads_a_sheet_of_one_triangle_and_a_design_named_world(tmp_path: Path) -> None:
+    """Its meshes have four vertices or more, and `world` is its own body."""
+    design = sensors.build("gelsight-mini-ideal").model_copy(update={"name": "world"})
+    design.parts["flap"] = Part(role=Role.BLOCKER, mesh="meshes/flap.obj")
+    design.meshes["flap"] = TriangleMesh(np.eye(3) - [0.0, 0.0, 50.0], np.array([[0, 1, 2]]))
+    mjcf, *_ = export_robot(design, tmp_path)
+    model = mujoco.MjModel.from_xml_path(str(mjcf))
+    assert model.body(1).name == mjcf.stem == "world-sensor"
+
+
 def test_wrong_numbers_are_refused() -> None:
     design = sensors.build("gelsight-mini-ideal")
     with pytest.raises(DesignError, match="the mass is 0"):
         sensor_body(design, mass=0.0)
+    with pytest.raises(DesignError, match="mass of 1e-09 g, the smallest moment of inertia"):
+        sensor_body(design, mass=1e-9)
     with pytest.raises(DesignError, match="no solid part 'skin'"):
         sensor_body(design, densities={"skin": 1.0})
 
