@@ -63,7 +63,8 @@ def test_a_window_sends_its_power_to_a_distant_camera(
     shape: EmitterShape, exponent: float, turned: float
 ) -> None:
     """A lamp of 1 mW with a profile cos^m has a radiant intensity of (m + 1) / (2 pi) cos^m
-    mW/sr; ``turned`` is the angle (radians) of its axis with the direction to the camera.
+    mW/sr, and a radiance of that over its projected area; ``turned`` is the angle (radians) of its
+    axis with the direction to the camera.
     """
     axis = (0.0, float(np.sin(turned)), -float(np.cos(turned)))
     lamp = Emitter(0, (0, 0, DISTANCE), axis, (1, 0, 0), shape, (2.4, 2.4), exponent)
@@ -71,6 +72,8 @@ def test_a_window_sends_its_power_to_a_distant_camera(
     side = 2 * np.tan(np.radians(FOV / 2)) / PIXELS
     intensity = (exponent + 1) / (2 * np.pi) * np.cos(turned) ** exponent
     assert radiance.sum() * side**2 * DISTANCE**2 == pytest.approx(intensity, rel=NOISE)
+    middle = radiance[PIXELS // 2, PIXELS // 2]
+    assert middle * lamp.area * np.cos(turned) == pytest.approx(intensity, rel=NOISE)
 
 
 def test_lights_of_several_groups_at_one_place_are_all_seen() -> None:
@@ -162,7 +165,7 @@ def test_a_tabulated_window_shows_the_light_that_photons_carry_away() -> None:
     grid = np.stack([sine * np.cos(phi), sine * np.sin(phi), np.cos(theta)]).T @ lamp.frame
     radiance, group, lit = LampWindows.of([first, lamp]).radiance(mi.UInt32(2), mi.Vector3f(grid.T))
     assert np.all(np.asarray(lit)) and np.all(np.asarray(group) == 2)
-    power = np.asarray(radiance) * np.cos(theta) * lamp.window_area * sine
+    power = np.asarray(radiance) * np.cos(theta) * lamp.area * sine
     power *= (np.pi / 1200) * (np.pi / 360)
 
     def shares(directions: np.ndarray, weights: np.ndarray) -> np.ndarray:

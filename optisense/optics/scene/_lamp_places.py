@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatingArray
 from optisense.design.lights import frame_of
-from optisense.optics.scene.emitters import DISC_CORNERS, Emitter, EmitterShape
+from optisense.optics.scene.emitters import DISC_CORNERS, DISC_REACH, Emitter, EmitterShape
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
 
@@ -95,7 +95,7 @@ def _window_of(
     half = np.array(size) / 2
     if shape is EmitterShape.DISC:
         turn = np.arange(DISC_CORNERS) * 2 * np.pi / DISC_CORNERS
-        outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half
+        outline = np.stack([np.cos(turn), np.sin(turn)], axis=1) * half * DISC_REACH
     else:
         outline = SIGNS * half
     points = np.asarray(position) + outline[:, :1] * s + outline[:, 1:] * t

@@ -33,8 +33,11 @@ UP_TURN = 90.0
 """Angle (degrees) about a light's direction, right-handed, from the width axis of its frame to its
 `up`, at which the azimuth of its profile is 0."""
 DISC_CORNERS = 12
-"""Number of corners of the polygon that represents a round light window for rays that meet it.
-Twelve give 95 % of the disc's area; photons start from the exact disc."""
+"""Number of corners of the polygon that represents a round light window for rays that meet it. With
+twelve, its outline is within 2.4 % of the radius of the disc; photons start from the exact disc."""
+DISC_REACH = float(np.sqrt(2 * np.pi / (DISC_CORNERS * np.sin(2 * np.pi / DISC_CORNERS))))
+"""Distance of these corners from the middle, in radii of the disc, with which the polygon has the
+disc's area."""
 FLOATS_PER_EMITTER = 20
 """Number of floats of a light in the emitter table; five gathers of four floats read them."""
 FLOATS_PER_CELL = 5
@@ -84,14 +87,6 @@ class Emitter:
             EmitterShape.DISC: np.pi / 4,
         }[self.shape]
         return float(self.size[0] * self.size[1] * filled)
-
-    @property
-    def window_area(self) -> float:
-        """Area (mm^2) of the face that rays meet: the area, or for a disc that of the polygon whose
-        corners lie on its outline.
-        """
-        turn = 2 * np.pi / DISC_CORNERS
-        return self.area * (np.sin(turn) / turn if self.shape is EmitterShape.DISC else 1.0)
 
     @property
     def frame(self) -> FloatingArray:

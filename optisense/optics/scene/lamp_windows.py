@@ -64,7 +64,7 @@ class LampWindows:
         numbers: dict[int, int] = {}
         tables: list[FloatingArray] = []
         for row, emitter in zip(rows[1:], emitters, strict=True):
-            area = emitter.window_area
+            area = emitter.area
             row[0:3], row[4:7] = emitter.frame[2], emitter.frame[0]
             row[7] = emitter.exponent
             if emitter.intensity is None:
@@ -113,8 +113,8 @@ class LampWindows:
         """Return the radiance (n,), 1/(mm^2 sr), of windows in unit directions away from them,
         their light groups (n,), and whether there is a window.
 
-        A window of area A (that of the face that rays meet) whose intensity is proportional to
-        cos^m has the radiance (m + 1) / (2 pi A) cos^(m - 1): 1 / (pi A) if it is Lambertian.
+        A window of area A whose intensity is proportional to cos^m has the radiance
+        (m + 1) / (2 pi A) cos^(m - 1): 1 / (pi A) if it is Lambertian.
 
         Args:
             light: number + 1 (n,) of the light, 0 for none.
