@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import drjit as dr
 import mitsuba as mi
 import numpy as np
@@ -12,9 +14,11 @@ from optisense import OpticalModel, load
 from optisense.design.emitters import Intensity
 from optisense.design.materials import Dielectric
 from optisense.design.parts import Role
-from optisense.geometry import parse_contact
+from optisense.geometry import TriangleMesh, parse_contact
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.scene.emitters import Emitter, EmitterShape
+from optisense.optics.scene._lamp_places import with_media
+from optisense.optics.scene._solids import Solid
+from optisense.optics.scene.emitters import Emitter, EmitterShape, StartMedium, emit, emitter_table
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import CLEAR, RGB, Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points
@@ -86,9 +90,29 @@ def test_light_is_absorbed_by_the_medium_that_it_starts_in() -> None:
     narrow = Intensity(np.array([0.0, 0.02]), np.zeros(1), np.ones((1, 2)))
     gel = box("gel", (-10, -10, 0), (10, 10, 4), glass(), without=["-z"])
     for absorption in (ABSORPTION, CLEAR):
-        lamp = Emitter(0, (0, 0, 3), (0, 0, -1), intensity=narrow, absorption=absorption)
+        lamp = Emitter(
+            0, (0, 0, 3), (0, 0, -1), intensity=narrow, media=(StartMedium(0, absorption),)
+        )
         power = landed([gel, floor(0.0, 0.0)], lamp)[1].sum(axis=0)
         assert power == pytest.approx(np.exp(-3 * np.array(absorption)), rel=SINGLE)
+
+
+def test_lights_on_the_border_of_two_solids_start_in_each() -> None:
+    """The window lies across the faces of two gels; then most of it does."""
+    gels = [
+        Solid(name, TriangleMesh.box((-8, -6, low), (8, 6, low + 3)), name, 1.41, absorption=taken)
+        for name, low, taken in (("upper", -3.0, ABSORPTION), ("lower", -6.0, (0.3, 0.1, 0.0)))
+    ]
+    square = Emitter(0, (-5, 0, -3), (1, 0, 0), None, EmitterShape.RECTANGLE, (2.0, 2.0))
+    for height, share in ((-3.0, 0.5), (-3.5, 0.25), (-4.5, 0.0)):
+        (lamp,) = with_media([replace(square, position=(-5, 0, height))], gels)
+        assert {medium.absorption for medium in lamp.media} <= {gel.absorption for gel in gels}
+        assert np.mean([medium.solid == 0 for medium in lamp.media]) == share
+    table = emitter_table(with_media([square], gels), 1)
+    corner = mi.Point2f([0.1, 0.9, 0.1, 0.9], [0.1, 0.1, 0.9, 0.9])
+    origin, _, _, cell = emit(table, dr.zeros(mi.UInt32, 4), mi.Point2f(0.5), corner)
+    below = np.asarray(origin)[2] < -3
+    assert np.array_equal(np.asarray(dr.gather(mi.UInt32, table.solids, cell)) == 2, below)
 
 
 def test_light_between_two_media_is_absorbed_by_each() -> None:

@@ -243,7 +243,7 @@ def test_a_disc_emits_evenly_over_its_face() -> None:
 def test_the_pose_turns_positions_and_directions_alike() -> None:
     lamp = Emitter(3, (1, 2, 3), (2, 0, 0), (0, 0, 1), EmitterShape.RECTANGLE, (4.0, 2.0))
     table = emitter_table([lamp], 4)
-    corner, way, group = emit(
+    corner, way, group, _ = emit(
         table, mi.UInt32([0, 0]), mi.Point2f([0, 0.3], [0, 0.1]), mi.Point2f([1, 0.5], [1, 0.5])
     )
     # Shining along +x with +z up, the width axis is up x direction = +y.

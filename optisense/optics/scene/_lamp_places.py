@@ -1,4 +1,4 @@
-"""The windows of lights in the scene, and their places off faces."""
+"""The windows of lights in the scene, their places off faces, and the media in front of them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,18 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatingArray
 from optisense.design.lights import frame_of
-from optisense.optics.scene.emitters import DISC_CORNERS, DISC_REACH, Emitter, EmitterShape
+from optisense.optics.scene._media_beside import PROBE, solid_at
+from optisense.optics.scene._solids import AROUND, Solid
+from optisense.optics.scene.emitters import (
+    DISC_CORNERS,
+    DISC_REACH,
+    FACE_CELLS,
+    Emitter,
+    EmitterShape,
+    StartMedium,
+)
 from optisense.optics.scene.ray_scene import Piece
-from optisense.optics.scene.surfaces import RAY_OFFSET, Surface, SurfaceKind
+from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, Surface, SurfaceKind
 
 OFF_FACE = 3 * RAY_OFFSET
 """Distance (mm) by which the window of a light on a face is shifted: beyond any face that is up to
@@ -23,6 +32,51 @@ ROUNDING = 1e-5
 30 mm in single precision."""
 SIGNS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
 """Corners (4, 2) of a window, or of the square around a round one, in half widths and heights."""
+
+ASIDE = np.array([0.004, 0.003])
+"""Distances (mm), along the width and the height of a light, by which the medium in front of it is
+looked up off the place itself: a light in the middle of its parts may lie on the faces of two that
+touch. Each is longer than the 0.002 mm below which faces touch, and they differ, as such a face may
+also run along a diagonal of the light."""
+TRIED = np.array([(x, y) for y in (-0.99, 0.0, 0.99) for x in (-0.99, 0.0, 0.99)])
+"""Places (9, 2) on a window, in half widths and heights, at which its medium is looked up first."""
+
+
+def with_media(emitters: Sequence[Emitter], solids: Sequence[Solid]) -> list[Emitter]:
+    """Return lights with the media that their photons start in: one for each light if it is the
+    same at `TRIED` places of its window, else one for each of its cells.
+
+    Where no solid absorbs, the lights are unchanged, as their media make no difference.
+    """
+    lights = list(emitters)
+    if all(solid.absorption == CLEAR for solid in solids):
+        return lights
+    found = _solids_before(lights, solids, TRIED)
+    mixed = np.flatnonzero((found != found[:, :1]).any(axis=1))
+    numbers = dict(enumerate(found[:, :1].tolist()))
+    middle = (2 * np.arange(FACE_CELLS) + 1) / FACE_CELLS - 1
+    cells = np.stack([np.tile(middle, FACE_CELLS), np.repeat(middle, FACE_CELLS)], axis=1)
+    each = _solids_before([lights[i] for i in mixed], solids, cells)
+    numbers.update(zip(mixed.tolist(), each.tolist(), strict=True))
+    around = [*solids, AROUND]
+    return [
+        replace(lamp, media=tuple(StartMedium(k, around[k].absorption) for k in numbers[i]))
+        for i, lamp in enumerate(lights)
+    ]
+
+
+def _solids_before(
+    lights: Sequence[Emitter], solids: Sequence[Solid], places: FloatingArray
+) -> NDArray[np.int64]:
+    """Return the numbers (n, k) of the solids in front of places (k, 2) of each of n windows, in
+    half widths and heights; -1 for air.
+    """
+    axes = np.array([lamp.frame for lamp in lights]).reshape(-1, 3, 3)
+    half = np.array([lamp.size for lamp in lights]).reshape(-1, 2) / 2
+    flat = places * half[:, None] + ASIDE
+    points = flat @ axes[:, :2] + PROBE * axes[:, 2:]
+    points += np.array([lamp.position for lamp in lights]).reshape(-1, 1, 3)
+    return solid_at(points.reshape(-1, 3), solids).reshape(-1, len(places))
 
 
 def off_faces(emitters: Sequence[Emitter], pieces: Sequence[Piece]) -> list[Emitter]:

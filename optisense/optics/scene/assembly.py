@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense import library
-from optisense.design import Light, LightGroup, LightModel, SensorDesign
+from optisense.design import LightGroup, LightModel, SensorDesign
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.priorities import carved
@@ -17,13 +17,13 @@ from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
 from optisense.optics.scene._finishes import ShapeCache, finishes_of, frosted
-from optisense.optics.scene._lamp_places import off_faces, window
-from optisense.optics.scene._media_beside import PROBE, media_beside, solid_at, split_by_media
+from optisense.optics.scene._lamp_places import off_faces, window, with_media
+from optisense.optics.scene._media_beside import media_beside, split_by_media
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 from optisense.optics.scene.emitters import Emitter, EmitterShape
 from optisense.optics.scene.media import Media, same_faces
 from optisense.optics.scene.ray_scene import Piece
-from optisense.optics.scene.surfaces import CLEAR, RGB, Region, Surface, SurfaceKind
+from optisense.optics.scene.surfaces import RGB, Region, Surface, SurfaceKind
 
 SMOOTH_METAL = 0.01
 """GGX roughness below which a metal is an ideal mirror. With 0.01, half of the micro-facets tilt by
@@ -328,17 +328,6 @@ def _piece(name: str, mesh: TriangleMesh, surface: Surface) -> Piece:
     return Piece(name, smooth.vertices, smooth.faces, surface, smooth.normals)
 
 
-def _absorption_at(places: list[Light], solids: list[Solid]) -> list[RGB]:
-    """Return the absorption coefficients (1/mm) at R, G, B of the medium in front of each light."""
-    if all(solid.absorption == CLEAR for solid in solids):
-        return [CLEAR] * len(places)
-    points = np.array([light.position for light in places])
-    ways = np.array([light.direction for light in places])
-    points += PROBE * ways / np.linalg.norm(ways, axis=1, keepdims=True)
-    around = [*solids, AROUND]
-    return [around[number].absorption for number in solid_at(points, solids).tolist()]
-
-
 def _emitters(design: SensorDesign, solids: list[Solid]) -> list[Emitter]:
     emitters = []
     for number, group in enumerate(design.lights.values()):
@@ -346,8 +335,7 @@ def _emitters(design: SensorDesign, solids: list[Solid]) -> list[Emitter]:
             lamp = _built_in_lamp(group.model)
         else:
             lamp = _lamp(library.emitter(group))
-        media = _absorption_at(group.lights, solids)
-        for light, absorption in zip(group.lights, media, strict=True):
+        for light in group.lights:
             emitters.append(
                 replace(
                     lamp,
@@ -355,12 +343,11 @@ def _emitters(design: SensorDesign, solids: list[Solid]) -> list[Emitter]:
                     position=light.position,
                     direction=light.direction,
                     up=light.up,
-                    absorption=absorption,
                 )
             )
     if not emitters:
         raise DesignError("the design has no lights", where=design.where("lights"))
-    return emitters
+    return with_media(emitters, solids)
 
 
 @lru_cache(maxsize=64)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -19,7 +20,7 @@ import numpy as np
 from optisense.array_types import FloatingArray
 from optisense.design.emitters import Intensity
 from optisense.design.lights import frame_of
-from optisense.optics.backend.arrays import floats
+from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.surfaces import CLEAR, RAY_OFFSET, RGB
 
 POLAR_CELLS = 512
@@ -38,6 +39,10 @@ twelve, its outline is within 2.4 % of the radius of the disc; photons start fro
 DISC_REACH = float(np.sqrt(2 * np.pi / (DISC_CORNERS * np.sin(2 * np.pi / DISC_CORNERS))))
 """Distance of these corners from the middle, in radii of the disc, with which the polygon has the
 disc's area."""
+FACE_CELLS = 16
+"""Number of cells across and down the face of a light whose photons start in several media. The
+photons of each cell start in one medium, so that a border across the face is off by at most half a
+cell, which is 3 % of the face."""
 FLOATS_PER_EMITTER = 20
 """Number of floats of a light in the emitter table; five gathers of four floats read them."""
 FLOATS_PER_CELL = 5
@@ -50,6 +55,18 @@ class EmitterShape(IntEnum):
     POINT = 0
     RECTANGLE = 1
     DISC = 2
+
+
+class StartMedium(NamedTuple):
+    """The medium that photons of a light start in.
+
+    Attributes:
+        solid: number of the solid; -1 for air.
+        absorption: its absorption coefficient at R, G, B, 1/mm.
+    """
+
+    solid: int = -1
+    absorption: RGB = CLEAR
 
 
 @dataclass(frozen=True)
@@ -65,7 +82,8 @@ class Emitter:
         size: width and height of the emitting face, mm.
         exponent: power of the cosine of a profile without a table (1 is Lambertian).
         intensity: table of the angular profile; None for a power of the cosine.
-        absorption: absorption coefficient (1/mm, at R, G, B) of the medium in front of the light.
+        media: the medium in front of each cell of the face (`FACE_CELLS` along its width, then the
+            next row along its height), or a single one if it is the same for all.
     """
 
     group: int
@@ -76,7 +94,7 @@ class Emitter:
     size: tuple[float, float] = (0.0, 0.0)
     exponent: float = 1.0
     intensity: Intensity | None = None
-    absorption: RGB = CLEAR
+    media: tuple[StartMedium, ...] = (StartMedium(),)
 
     @property
     def area(self) -> float:
@@ -99,8 +117,9 @@ class EmitterTable:
     """All lights on the device.
 
     ``rows`` holds `FLOATS_PER_EMITTER` floats per light, ``polar`` and ``azimuth`` the inverse
-    tables of the profiles, with five floats per cell, and ``absorption`` three floats per light
-    (1/mm at R, G, B).
+    tables of the profiles, with five floats per cell. For each of the ``across`` x ``across`` cells
+    of the face of each light, ``absorption`` holds three floats (1/mm at R, G, B) of the medium in
+    front, and ``solids`` its number plus 1, which is less than ``media``; 0 is air.
     """
 
     count: int
@@ -108,7 +127,10 @@ class EmitterTable:
     rows: mi.Float
     polar: mi.Float
     azimuth: mi.Float
+    across: int
     absorption: mi.Float
+    solids: mi.UInt32
+    media: int
     emitters: list[Emitter] = field(default_factory=list)
 
 
@@ -214,13 +236,22 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
         row[3], row[16], row[17] = bits.view(np.float32)
     if not polar:
         polar, azimuth = [np.zeros(FLOATS_PER_CELL)], [np.zeros(FLOATS_PER_CELL)]
+    across = FACE_CELLS if any(len(emitter.media) > 1 for emitter in emitters) else 1
+    media = [
+        medium
+        for emitter in emitters
+        for medium in emitter.media * (across**2 // len(emitter.media))
+    ]
     return EmitterTable(
         count=len(emitters),
         groups=groups,
         rows=floats(rows),
         polar=floats(np.concatenate(polar)),
         azimuth=floats(np.concatenate(azimuth)),
-        absorption=floats(np.array([e.absorption for e in emitters])),
+        across=across,
+        absorption=floats(np.array([medium.absorption for medium in media])),
+        solids=indices(np.array([medium.solid + 1 for medium in media])),
+        media=max(medium.solid for medium in media) + 2,
         emitters=list(emitters),
     )
 
@@ -272,9 +303,9 @@ def _place(table: mi.Float, cell: mi.UInt32, share: mi.Float, active: mi.Bool) -
 
 def emit(
     table: EmitterTable, light: mi.UInt32, angle: mi.Point2f, place: mi.Point2f
-) -> tuple[mi.Point3f, mi.Vector3f, mi.UInt32]:
-    """Return origin (3, n), mm, unit direction (3, n) and light group (n,) of photons of equal
-    power.
+) -> tuple[mi.Point3f, mi.Vector3f, mi.UInt32, mi.UInt32]:
+    """Return origin (3, n), mm, unit direction (3, n), light group (n,) and number (n,) of the cell
+    of all lights' faces, of photons of equal power.
 
     Args:
         light: number (n,) of the light.
@@ -296,4 +327,9 @@ def emit(
     offset = dr.select(shape == int(EmitterShape.DISC), disc, square)
     point = mi.Point3f(a.x, a.y, a.z) + s * (offset.x * b.w) + t * (offset.y * c.w) + n * RAY_OFFSET
     direction = s * local.x + t * local.y + n * local.z
-    return mi.Point3f(point), mi.Vector3f(direction), group
+    column, row = (
+        dr.minimum(mi.UInt32((along + 1) * (table.across / 2)), table.across - 1)
+        for along in (offset.x, offset.y)
+    )
+    cell = (light * table.across + row) * table.across + column
+    return mi.Point3f(point), mi.Vector3f(direction), group, cell

@@ -101,12 +101,14 @@ class Flight:
         throughput: their power.
         group: their light group and half, as bits.
         number: their index in the pass.
+        medium: number of the solid that they start in, plus 1; 0 for air.
     """
 
     ray: Ray
     throughput: mi.Color3f
     group: mi.UInt32
     number: mi.UInt32
+    medium: mi.UInt32
 
 
 @dataclass
@@ -146,11 +148,11 @@ def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[Flig
     number = first + place
     u0, u1, u2, u3 = sequence_4d(number, light, seed)
     angle, weight, cell = warp(emission.guide, light, mi.Point2f(u0, u1))
-    origin, direction, group = emit(table, light, angle, mi.Point2f(u2, u3))
+    origin, direction, group, face_cell = emit(table, light, angle, mi.Point2f(u2, u3))
     ray = Ray(origin, direction, dr.full(mi.Bool, True, photons))
     power = mi.Color3f(weight / mi.Float(per_light))
     if scene.absorbing:
-        ray.absorption = dr.gather(mi.Color3f, table.absorption, light)
+        ray.absorption = dr.gather(mi.Color3f, table.absorption, face_cell)
     if scene.dispersive:
         ray.channel = number % 3
         power = mi.Color3f(*(dr.select(ray.channel == k, 3 * power[k], 0) for k in range(3)))
@@ -159,6 +161,7 @@ def launch(scene: RayScene, emission: Emission, lights: mi.UInt32) -> tuple[Flig
         throughput=power,
         group=group | ((number & 1) << HALF_SHIFT),
         number=place * table.count + light,
+        medium=dr.gather(mi.UInt32, table.solids, face_cell),
     )
     return flight, light * (GUIDE_CELLS * GUIDE_CELLS) + cell
 
