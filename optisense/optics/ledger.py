@@ -264,8 +264,8 @@ class LedgerPlace:
     """The meaning of a row of the ledger's sums.
 
     Attributes:
-        surface: number of the surface; the number after the last surface stands for the lights
-            themselves.
+        surface: number of the surface; the numbers after the last surface stand for the lights
+            themselves, in air and in each solid.
         fate: the fate of light at the surface.
         where: name of the part or medium at which the light ends.
         kind: the way in which the light ends.
@@ -294,7 +294,11 @@ def places_of(assembly: Assembly) -> Iterator[LedgerPlace]:
     last = len(assembly.pieces)
     for fate in (Fate.SEEN, Fate.ABSORBED, Fate.BEHIND):
         yield LedgerPlace(last, fate, GIVEN_UP, LightEnd.LOST)
-    yield LedgerPlace(last, Fate.BEFORE, "absorbed around the lights", LightEnd.MEDIUM)
+    solids = assembly.media.names
+    for number in {medium.solid for emitter in assembly.emitters for medium in emitter.media}:
+        if number >= 0:
+            medium = f"absorbed in {media.get(solids[number], solids[number])}"
+            yield LedgerPlace(last + 1 + number, Fate.BEFORE, medium, LightEnd.MEDIUM)
     yield LedgerPlace(last, Fate.ESCAPED, "escaped at once", LightEnd.ESCAPED)
 
 

@@ -130,7 +130,9 @@ def test_parts_without_a_border_between_them_have_one_line() -> None:
 
 
 def test_a_beam_through_an_absorbing_block_is_booked_by_beer_lambert() -> None:
-    """A lamp in air, a gel on a black skin: what the gel takes, and what its face sends back."""
+    """A lamp in air, a gel on a black skin: what the gel takes, and what its face sends back. Then
+    the gel surrounds the lamp and reaches through the black wall, 10 mm below.
+    """
     design = sphere(None)
     data = design.model_dump(mode="json")
     data["materials"]["gel"] = {"kind": "dielectric", "ior": 1.5, "absorption": [0.1] * 3}
@@ -143,6 +145,10 @@ def test_a_beam_through_an_absorbing_block_is_booked_by_beer_lambert() -> None:
     reflected, left = 0.04, np.exp(-0.1 * 4.0)
     once = (1 - reflected) * (1 - left) / (1 - reflected * left)
     assert found.share("white", "absorbed in gel") == pytest.approx(once, rel=0.01)
+    made.meshes["gel"] = ots.geometry.TriangleMesh.box((-3, -3, -12), (3, 3, 2))
+    cast = ledger_of(made)
+    assert cast.share("white", "absorbed in gel") == pytest.approx(1 - np.exp(-0.1 * 10), rel=0.01)
+    assert cast.share("white", "absorbed by housing") == pytest.approx(np.exp(-0.1 * 10), rel=0.01)
 
 
 def test_rough_faces_and_paint_have_their_lines() -> None:

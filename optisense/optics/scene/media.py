@@ -165,11 +165,16 @@ class Media:
         return interfaces
 
     @property
+    def names(self) -> list[str]:
+        """The names of the solids, in the order in which they were given."""
+        return [solid.name for solid in self._solids]
+
+    @property
     def joined(self) -> list[list[str]]:
         """The names of touching solids of equal media, which light passes between without noticing;
         sorted within each group of solids.
         """
-        names = [solid.name for solid in self._solids]
+        names = self.names
         pairs = [
             [names.index(name) for name in face.names]
             for face in self._faces

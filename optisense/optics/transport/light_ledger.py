@@ -61,11 +61,11 @@ class LedgerSums:
     """The sums of the ledger.
 
     Attributes:
-        power: (batches, groups, 3, surfaces + 1, fates) power (mW), for lights of 1 mW in each
-            channel. The last surface stands for the lights themselves, and holds the losses before
-            any surface.
+        power: (batches, groups, 3, surfaces + media, fates) power (mW), for lights of 1 mW in each
+            channel. The rows after the surfaces stand for the lights themselves, one for each
+            medium that they start in (air first), and hold the losses before any surface.
         rest: (batches, groups, 3) power (mW) of photons whose paths were cut off.
-        exits: (batches, groups, 3, surfaces + 1, sides) power (mW) that escapes, by the orientation
+        exits: (batches, groups, 3, surfaces, sides) power (mW) that escapes, by the orientation
             of the face that it leaves through (see `SIDES`). Light that meets no surface is not
             included.
     """
@@ -77,12 +77,15 @@ class LedgerSums:
 
 @dataclass
 class _Sums:
-    """Device arrays of `LedgerSums`, in double precision, and their sizes."""
+    """Device arrays of `LedgerSums`, in double precision, the number of surfaces, and that with the
+    additional rows of the lights.
+    """
 
     power: mi.Float64
     rest: mi.Float64
     exits: mi.Float64
     surfaces: int
+    rows: int
 
     def record(
         self, line: mi.UInt32, surface: mi.UInt32, fate: mi.UInt32, what: mi.Color3f, where: mi.Bool
@@ -96,7 +99,7 @@ class _Sums:
             what: power (mW) per channel.
             where: mask of the lanes that count.
         """
-        row = (line * self.surfaces + surface) * FATES + fate
+        row = (line * self.rows + surface) * FATES + fate
         for k in range(3):
             dr.scatter_add(self.power, mi.Float64(what[k]), row * 3 + k, where)
 
@@ -109,7 +112,7 @@ class _Sums:
         """
         self.record(line, end.last, mi.UInt32(int(Fate.ESCAPED)), end.escaped, mi.Bool(True))
         through = (line * self.surfaces + end.last) * len(SIDES) + _side_of(end.outward)
-        leaves = end.last < self.surfaces - 1
+        leaves = end.last < self.surfaces
         for k in range(3):
             dr.scatter_add(self.exits, mi.Float64(end.escaped[k]), through * 3 + k, leaves)
             dr.scatter_add(self.rest, mi.Float64(end.given_up[k]), line * 3 + k)
@@ -177,6 +180,7 @@ def _follow(
     power: mi.Color3f,
     line: mi.UInt32,
     number: mi.UInt32,
+    medium: mi.UInt32,
     sums: _Sums,
     seen: TargetCells,
     seed: mi.UInt32,
@@ -187,11 +191,11 @@ def _follow(
     rng = mi.PCG32()
     first, second = mi.sample_tea_32(number, seed)
     rng.seed(mi.UInt64(first), mi.UInt64(second))
-    last = mi.UInt32(sums.surfaces - 1)
+    last = mi.UInt32(sums.surfaces)
     outward = mi.Vector3f(0, 0, 1)
     gone = mi.Color3f(0)
-    # The interface that bounds the medium, and the medium's side of it.
-    bound = mi.UInt32(sums.surfaces - 1)
+    # The interface that bounds the medium, and the medium's side of it; at first, the light's row.
+    bound = sums.surfaces + medium
     side = mi.UInt32(int(Fate.BEFORE))
     least = LEAST_SHARE * dr.max(power)
     while ray.active:
@@ -240,10 +244,11 @@ def trace_ledger(
     per_light = max(BATCHES, photons // table.count // BATCHES * BATCHES)
     lines = BATCHES * table.groups
     sums = _Sums(
-        dr.zeros(mi.Float64, lines * (surfaces + 1) * FATES * 3),
+        dr.zeros(mi.Float64, lines * (surfaces + table.media) * FATES * 3),
         dr.zeros(mi.Float64, lines * 3),
-        dr.zeros(mi.Float64, lines * (surfaces + 1) * len(SIDES) * 3),
-        surfaces + 1,
+        dr.zeros(mi.Float64, lines * surfaces * len(SIDES) * 3),
+        surfaces,
+        surfaces + table.media,
     )
     guide = uniform_guide(table.count)
     at_once = max(BATCHES, PASS_PHOTONS // table.count // BATCHES * BATCHES)
@@ -258,16 +263,18 @@ def trace_ledger(
         line = batch * table.groups + group
         power = flight.throughput * (count * BATCHES / per_light)
         stream = dr.opaque(mi.UInt32, seed_of(seed, 6, first))
-        end = _follow(scene, flight.ray, power, line, flight.number, sums, seen, stream)
+        end = _follow(
+            scene, flight.ray, power, line, flight.number, flight.medium, sums, seen, stream
+        )
         sums.record_end(line, end)
         dr.eval(sums.power, sums.rest, sums.exits)
 
-    def by_surface(values: mi.Float64) -> NDArray[np.float64]:
+    def by_surface(values: mi.Float64, rows: int) -> NDArray[np.float64]:
         each = np.asarray(values, dtype=np.float64)
-        return np.moveaxis(each.reshape(BATCHES, table.groups, surfaces + 1, -1, 3), 4, 2)
+        return np.moveaxis(each.reshape(BATCHES, table.groups, rows, -1, 3), 4, 2)
 
     return LedgerSums(
-        by_surface(sums.power),
+        by_surface(sums.power, sums.rows),
         np.asarray(sums.rest, dtype=np.float64).reshape(BATCHES, table.groups, 3),
-        by_surface(sums.exits),
+        by_surface(sums.exits, surfaces),
     )

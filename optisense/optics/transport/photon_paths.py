@@ -61,7 +61,7 @@ class _Course:
 
     Attributes:
         points: coordinates (mm) of `POINTS` points for each photon.
-        surfaces: number of surfaces, without the additional row of the lights.
+        surfaces: number of surfaces, without the additional rows of the lights.
     """
 
     points: mi.Float
@@ -81,6 +81,7 @@ def _follow(
     power: mi.Color3f,
     weights: mi.Color3f,
     photon: mi.UInt32,
+    medium: mi.UInt32,
     course: _Course,
     seen: TargetCells,
     seed: mi.UInt32,
@@ -99,7 +100,7 @@ def _follow(
     ending = mi.UInt32(course.surfaces)
     fate = mi.UInt32(int(Fate.ABSORBED))
     last = mi.UInt32(course.surfaces)
-    bound = mi.UInt32(course.surfaces)
+    bound = course.surfaces + medium
     side = mi.UInt32(int(Fate.BEFORE))
     while ray.active:
         sample = LobeSample(rng.next_float32(), mi.Point2f(rng.next_float32(), rng.next_float32()))
@@ -174,6 +175,7 @@ def trace_photon_paths(
         mi.Color3f(flight.throughput),
         weights,
         dr.arange(mi.UInt32, count),
+        flight.medium,
         course,
         seen,
         dr.opaque(mi.UInt32, seed_of(seed, 8)),
