@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from optisense import library
 from optisense.array_types import BoolArray, FloatArray
 from optisense.design import Diagnostic, LightGroup, LightModel, Role, SensorDesign
+from optisense.design.arrangement import one_medium
 from optisense.design.check import OPAQUE_ROLES
 from optisense.design.lights import frame_of
 from optisense.design.material_checks import is_gas
@@ -20,7 +21,7 @@ from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.rays import ray_hits
-from optisense.geometry.surface import closest_points
+from optisense.geometry.surface import closest_points, distance_within
 
 FLUSH = 0.1
 """Largest depth in a part of the window of a light that lies against its face, mm. A flat window
@@ -225,8 +226,8 @@ def _overlap(one: FloatArray, other: FloatArray) -> bool:
 def _buried(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
     """Return warnings about windows that are partly in a part, one for each group and part.
 
-    A window that is wholly in a clear part is cast into it, and one whose middle is in an opaque
-    part is an error of its own.
+    A window that is wholly in clear parts of one medium is cast into them, and one whose middle is
+    in an opaque part is an error of its own.
     """
     solid = {
         name: mesh
@@ -237,7 +238,7 @@ def _buried(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagn
     found: dict[tuple[str, str], list[float]] = {}
     for each in windows_in(design, solid, set()):
         opaque = design.parts[each.part].role in OPAQUE_ROLES
-        if each.middle if opaque else each.whole:
+        if each.middle if opaque else each.whole or _is_cast(design, each, solid):
             continue
         depth = each.depth(solid[each.part])
         if depth > FLUSH:
@@ -254,6 +255,19 @@ def _buried(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagn
         )
         for (group, part), depths in found.items()
     ]
+
+
+def _is_cast(design: SensorDesign, found: WindowIn, solid: dict[str, TriangleMesh]) -> bool:
+    """Return whether a window that is partly in a clear part is wholly in clear parts that are one
+    medium with it, or on their faces.
+    """
+    meshes = [mesh for name, mesh in solid.items() if one_medium(design, found.part, name)]
+    window = _samples(design.lights[found.group])[found.number]
+    covered = np.any([inside(window, mesh) for mesh in meshes], axis=0)
+    return all(
+        min(distance_within(mesh, point, TOGETHER) for mesh in meshes) <= TOGETHER
+        for point in window[~covered]
+    )
 
 
 def _is_gap(design: SensorDesign, name: str) -> bool:

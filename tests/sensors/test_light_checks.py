@@ -57,6 +57,15 @@ def test_a_window_that_is_wholly_in_a_clear_part_is_cast_into_it(mini: SensorDes
     gel = mini.meshes["gel"].bounds.mean(axis=0)
     cast = mini.lights["green"].lights[0].model_copy(update={"position": tuple(gel)})
     assert messages(with_green(mini, [cast])) == []
+    divided = with_green(mini, [cast])
+    low, high = divided.meshes["gel"].bounds
+    divided.parts["upper"] = divided.parts["gel"]
+    for part, ends in (("gel", (low, (*high[:2], gel[2]))), ("upper", ((*low[:2], gel[2]), high))):
+        divided.meshes[part] = TriangleMesh.box(*ends)
+    assert messages(divided) == []
+    glass = divided.parts["upper"].model_copy(update={"material": "acrylic"})
+    other = divided.model_copy(update={"parts": {**divided.parts, "upper": glass}})
+    assert any("partly inside part 'upper'" in found for found in messages(other))
 
 
 def test_lights_closer_than_their_bodies(mini: SensorDesign) -> None:
