@@ -23,6 +23,7 @@ from optisense.folders import held
 from optisense.geometry import Contact
 from optisense.json_values import json_ready
 from optisense.mechanics import CONFORMING
+from optisense.mechanics.skins import refuse_drags
 from optisense.optics.estimators import RADIANCE_CACHE, current_name
 from optisense.reading.camera_noise import add_camera_noise
 from optisense.tasks._records import KEPT, CsvTable, read_object, refuse_differences
@@ -220,6 +221,8 @@ def collect(
     if settings.count < 1:
         raise TaskError(f"{settings.count} samples are asked for", hint="Ask for 1 or more")
     task.check(model)
+    first, _ = _contact(task, model, settings, 0)
+    refuse_drags([first], settings.skin)
     names = (*task.features, *task.targets)
     with ExitStack() as kept:
         table = None
@@ -256,8 +259,7 @@ class _Camera:
     def sample(self, index: int) -> list[float]:
         """Return features and targets of one contact."""
         seed = self._settings.seed
-        rng = np.random.default_rng([seed, index, _CONTACT])
-        contact, targets = self._task.contact(self._model, rng)
+        contact, targets = _contact(self._task, self._model, self._settings, index)
         image = self._render([contact])
         picture = add_camera_noise(
             image.picture(self._exposure, (seed, index, _SENSOR)),
@@ -274,6 +276,13 @@ class _Camera:
             estimator=self._settings.estimator,
             only_contacts=bool(contacts) and self._task.contact_only,
         )
+
+
+def _contact(
+    task: PerceptionTask, model: OpticalModel, settings: SampleSettings, index: int
+) -> tuple[Contact, Sequence[float]]:
+    """Return the contact of a sample, and its targets."""
+    return task.contact(model, np.random.default_rng([settings.seed, index, _CONTACT]))
 
 
 def _resolution(

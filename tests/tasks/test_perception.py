@@ -209,12 +209,17 @@ def test_a_force_is_read_from_the_spread(mini: OpticalModel) -> None:
         perceive(BallForce(radius=5.0, most=5.0), mini, settings)
 
 
-def test_the_mean_motion_of_dots_in_pictures_tells_the_shear(mini: OpticalModel) -> None:
+def test_the_mean_motion_of_dots_in_pictures_tells_the_shear(
+    mini: OpticalModel, tmp_path: Path
+) -> None:
     with pytest.raises(TaskError, match="the design has none"):
         perceive(BallShear(), mini, SampleSettings(count=10))
     design = mini.design.copy()
     design.markers = Markers(grid=(7, 5), pitch=2.4, radius=0.5)
     dotted = OpticalModel(design)
+    with pytest.raises(ContactError, match="conforming"):
+        collect(BallShear(), dotted, SampleSettings(count=8, skin="conforming"), tmp_path)
+    assert not list(tmp_path.iterdir())
     samples = collect(BallShear(), dotted, SampleSettings(count=8, photons=60_000))
     along, down = samples.features[:, 0], samples.features[:, 1]
     shear_u, shear_v = samples.targets.T
