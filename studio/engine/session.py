@@ -13,6 +13,8 @@ from bpy.props import BoolProperty, FloatProperty, StringProperty
 
 from ..core.engine import Answer, Engine, EngineError, Request
 from ..core.numbers import duration
+from ..scene.objects_at import objects_at, select
+from ..scene.subject import Subject
 from .preferences import HOW_TO_GET, engine_command, when_changed
 
 TICK, BRISK = 0.05, 0.01
@@ -189,10 +191,14 @@ def start_job(
     now.fraction = 0.0
     now.cancelling = False
     now.about = title
+    subject = Subject(bpy.context.scene)
 
     def result(answer: dict[str, Any]) -> None:
         _over()
         on_result(answer)
+
+    def failed(error: EngineError) -> None:
+        _failed(error, subject)
 
     def event(message: dict[str, Any]) -> None:
         if message.get("event") == "progress":
@@ -211,10 +217,10 @@ def start_job(
         now.busy = title
         at_work = engine()
         begun = _job = at_work.send(
-            what, on_result=result, on_error=_failed, on_event=event, **fields
+            what, on_result=result, on_error=failed, on_event=event, **fields
         )
     except EngineError as error:
-        _failed(error)
+        failed(error)
         return False
     if wait:
         at_work.wait(begun)
@@ -254,16 +260,19 @@ def clear_problem() -> None:
     now.problem = now.hint = ""
 
 
-def say(error: EngineError) -> None:
-    """Show an error in the panels, and select the object that it is about."""
+def say(error: EngineError, subject: Subject | None = None) -> None:
+    """Show an error in the panels, and select the object that it is about.
+
+    Args:
+        subject: sensor that the error is about; None for that of the present scene as it is.
+    """
     now = state()
     _about.clear()
     texts = [error.where, f"{error.hint[:1].upper()}{error.hint[1:]}" if error.hint else ""]
-    if error.part or error.path or error.contact is not None:
-        from ..scene.objects_at import objects_at, select
-
-        scene = bpy.context.scene
-        found = objects_at(scene, error.path or "", error.part or "", error.contact)
+    subject = subject or Subject(bpy.context.scene)
+    is_placed = error.part or error.path or error.contact is not None
+    if is_placed and subject.scene == bpy.context.scene:
+        found = objects_at(subject, error.path or "", error.part or "", error.contact)
         chosen = select(found)
         if found:
             _about.extend(each.name for each in found)
@@ -310,13 +319,13 @@ def _over() -> None:
     now.cancelling = False
 
 
-def _failed(error: EngineError) -> None:
+def _failed(error: EngineError, subject: Subject) -> None:
     _over()
     if error.kind == "Cancelled":
         state().note = "Cancelled"
         redraw()
     else:
-        say(error)
+        say(error, subject)
 
 
 def _tick() -> float | None:

@@ -7,26 +7,30 @@ import re
 import bpy
 
 from .collections import objects_of, select_only
-from .contacts import pressing, sensing_surface
-from .gather import part_names
+from .contacts import sensing_surface
+from .subject import Subject
 
 
 def objects_at(
-    scene: bpy.types.Scene, path: str, part: str, contact: int | None = None
+    subject: Subject, path: str, part: str, contact: int | None = None
 ) -> list[bpy.types.Object]:
-    """Return the objects at a place in the design; empty if there are none.
+    """Return the objects at a place in a design that was sent; empty if there are none any more.
 
     Args:
         path: dotted path, such as `lights.red.lights[0].position`; may be empty.
         part: name of the part in the error; may be empty.
         contact: number of the visible contact, from 0; None if the error is about none.
     """
+    scene = subject.scene
+    if scene is None:
+        return []
     if contact is not None:
-        return pressing(scene)[contact:][:1]
+        found = subject.contacts()[contact:][:1]
+        return [each for each in found if each is not None and each.visible_get()]
     light = re.match(r"lights\.([^.\[]+)(?:\.lights\[(\d+)\])?", path)
     if light:
-        group = [e for e in objects_of(scene, "LIGHT") if e.optisense.group == light[1]]
-        return group if light[2] is None else group[int(light[2]) :][:1]
+        group = light[1]
+        return subject.lights(group) if light[2] is None else subject.light(group, int(light[2]))
     if path.partition(".")[0] == "camera":
         return objects_of(scene, "CAMERA")
     cage = re.match(r"cages\.([^.\[]+)", path)
@@ -38,8 +42,7 @@ def objects_at(
     material = re.match(r"materials\.([^.\[]+)", path)
     if material:
         return [e for e in objects_of(scene, "PART") if e.optisense.material == material[1]]
-    found = part_names(scene).get(part)
-    return [] if found is None else [found]
+    return subject.part(part)
 
 
 def select(found: list[bpy.types.Object]) -> list[bpy.types.Object]:

@@ -13,6 +13,7 @@ from ..engine import catalogue, design_transfer, polls, session
 from ..engine.operators import ChoosingFile, Starting, fail, report_error, start
 from ..scene.drawings import ignored_edits
 from ..scene.paths import chosen, suggested
+from ..scene.subject import Subject
 from .opening import digests, open_empty, open_source, saved_in
 
 
@@ -112,7 +113,7 @@ class _Saves:
             design = design_transfer.design(scene)
         except EngineError as error:
             return fail(self, error)
-        name = scene.name
+        subject = Subject(scene)
         own = scene.optisense.is_saved and Path(scene.optisense.folder) == Path(folder)
 
         known = {"digest": digests[folder]} if own and folder in digests else {}
@@ -120,7 +121,7 @@ class _Saves:
         def saved(result: dict[str, Any]) -> None:
             if result.get("digest"):
                 digests[result["folder"]] = result["digest"]
-            scene = bpy.data.scenes.get(name)
+            scene = subject.scene
             if scene is not None:
                 saved_in(scene, result["folder"])
             session.state().note = f"Saved in {result['folder']}"
@@ -176,22 +177,22 @@ class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
     bl_label = "Check"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        name = context.scene.name
-
-        def checked(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
-            # Other warnings may follow from edits that are ignored.
-            problems = [*([] if scene is None else ignored_edits(scene)), *result["problems"]]
-            if not problems:
-                session.state().note = "The design is in order"
-                return
-            worst = next((p for p in problems if p["severity"] == "error"), problems[0])
-            session.say(EngineError({"kind": "DesignError", **worst}))
-
         try:
             design = design_transfer.design(context.scene)
         except EngineError as error:
             return fail(self, error)
+        subject = Subject(context.scene)
+        # Other warnings may follow from edits that are ignored.
+        ignored = ignored_edits(context.scene)
+
+        def checked(result: dict[str, Any]) -> None:
+            problems = [*ignored, *result["problems"]]
+            if not problems:
+                session.state().note = "The design is in order"
+                return
+            worst = next((p for p in problems if p["severity"] == "error"), problems[0])
+            session.say(EngineError({"kind": "DesignError", **worst}), subject)
+
         session.start_job("Checking", "check", checked, wait=bpy.app.background, design=design)
         return {"FINISHED"}  # the panels show what is wrong with the design
 

@@ -10,6 +10,7 @@ import bpy
 from ..core.engine import EngineError, Request
 from ..engine import design_transfer, session
 from ..scene.collections import is_edited
+from ..scene.subject import Subject
 from ..sensor import opening, warming
 from . import requests, stored_drafts
 from .exposure import exposure
@@ -82,14 +83,14 @@ def _ask() -> None:
     if not scene.optisense.is_open:
         return
     warming.put_off()
-    asked = scene.session_uid
+    subject = Subject(scene)
     try:
         design = design_transfer.design(scene)
         contacts = design_transfer.contacts(scene)
         _open.append(
             session.engine().send(
                 "simulate",
-                on_result=lambda result: _take(result, asked),
+                on_result=lambda result: _take(result, subject),
                 on_error=_ignored if first else _refused,
                 design=design,
                 contacts=contacts,
@@ -116,19 +117,18 @@ def _first(scene: bpy.types.Scene, draft: str | None) -> None:
         _opened = True
 
 
-def _take(result: dict[str, Any], asked: int) -> None:
+def _take(result: dict[str, Any], subject: Subject) -> None:
     """Show a draft, and schedule a complete one if it reused earlier results.
 
-    Args:
-        asked: session id of the scene of the draft, which is dropped if the user left that scene.
+    The draft is dropped if the user left its scene or opened another sensor.
     """
     global _again, _began, _pace
     now = time.monotonic()
     _began, _pace = now, now - _began
     scene = bpy.context.scene
-    if scene.session_uid != asked:
+    if subject.scene != scene:
         return
-    requests.take(result, scene, draft=True)
+    requests.take(result, subject, draft=True)
     if session.state().note.startswith(NONE):
         session.state().note = ""
     settings = result["settings"]

@@ -14,6 +14,7 @@ from ..engine import polls, session
 from ..engine.operators import Starting, fail, refuse, start, start_with_design
 from ..scene.collections import objects_of, select_only
 from ..scene.contacts import add_contact, sensing_surface, tree_of
+from ..scene.subject import Subject
 from ..scene.world import world_matrix
 from . import editors, picture, requests, viewing
 
@@ -42,12 +43,10 @@ class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
             fields = requests.fields(context.scene)
         except EngineError as error:
             return fail(self, error, "Simulating")
-        name = context.scene.name
+        subject = Subject(context.scene)
 
         def taken(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
-            if scene is not None:
-                requests.take(result, scene, draft=False)
+            requests.take(result, subject, draft=False)
 
         return start(self, "Simulating", "simulate", taken, wait=wait, **fields)
 
@@ -154,10 +153,10 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
     checks = (*polls.ASKING, polls.in_object_mode)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        name, like = context.scene.name, self._like(context)
+        subject, like = Subject(context.scene), self._like(context)
 
         def placed(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
+            scene = subject.scene
             surface = None if scene is None else sensing_surface(scene)
             if scene is None or surface is None:
                 return

@@ -8,9 +8,9 @@ import bpy
 import numpy as np
 
 from ..engine import design_transfer, session
-from ..scene.contacts import pressing
 from ..scene.drawings import ignored_edits
 from ..scene.objects_at import select
+from ..scene.subject import Subject
 from . import picture, relight
 from .exposure import exposure, keep_exposure, resolution, shown_size
 
@@ -43,8 +43,11 @@ def fields(scene: bpy.types.Scene) -> dict[str, Any]:
     return asked
 
 
-def take(result: dict[str, Any], scene: bpy.types.Scene, *, draft: bool) -> None:
-    """Show the picture of a scene's sensor in the engine's answer."""
+def take(result: dict[str, Any], subject: Subject, *, draft: bool) -> None:
+    """Show the picture in the engine's answer, unless its sensor is gone."""
+    scene = subject.scene
+    if scene is None:
+        return
     picture.show(np.load(result["files"]["pixels"]), shown_size(scene) if draft else None)
     keep_exposure(scene, result["exposure"])
     now = bpy.context.window_manager.optisense_picture
@@ -56,19 +59,22 @@ def take(result: dict[str, Any], scene: bpy.types.Scene, *, draft: bool) -> None
     now.is_relit = now.is_before = now.is_stored = False
     now.file = result["files"].get("picture", "")
     now.summary = summary(result)
-    now.presses = presses(result, [each.name for each in pressing(scene)])
-    _sink(scene, result)
+    contacts = subject.contacts()
+    now.presses = presses(result, [each and each.name for each in contacts])
+    _sink(contacts, result)
     if not all(group.shown for group in scene.optisense.light_groups):
         relight.wanted()
-    _tell_unseen(scene, result.get("unseen") or [])
+    _tell_unseen([contacts[each] for each in result.get("unseen") or []])
     if not draft:
         _tell_ignored(scene)
     session.redraw()
 
 
-def _sink(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
+def _sink(contacts: list[bpy.types.Object | None], result: dict[str, Any]) -> None:
     """Draw contacts that are pressed by a force as deep as the picture has them."""
-    for contact, row in zip(pressing(scene), _pressed(result), strict=False):
+    for contact, row in zip(contacts, _pressed(result), strict=False):
+        if contact is None:
+            continue
         values = contact.optisense
         if values.press_by == "FORCE" and abs(values.depth - row["depth_mm"]) > SAME_DEPTH:
             values.depth = row["depth_mm"]
@@ -79,10 +85,9 @@ def _pressed(result: dict[str, Any]) -> list[dict[str, Any]]:
     return [] if result.get("draft") else (result.get("settings") or {}).get("presses") or []
 
 
-def _tell_unseen(scene: bpy.types.Scene, numbers: list[int]) -> None:
+def _tell_unseen(contacts: list[bpy.types.Object | None]) -> None:
     """Select the contacts that the picture does not show, and report them."""
-    contacts = pressing(scene)
-    chosen = select([contacts[each] for each in numbers if each < len(contacts)])
+    chosen = select([each for each in contacts if each is not None and each.visible_get()])
     if chosen:
         names = ", ".join(each.name for each in chosen)
         session.state().note = (
@@ -100,14 +105,16 @@ def _tell_ignored(scene: bpy.types.Scene) -> None:
         now.note = ". ".join(text for text in (now.note, message) if text)
 
 
-def presses(result: dict[str, Any], names: list[str]) -> str:
+def presses(result: dict[str, Any], names: list[str | None]) -> str:
     """Return force, pressure and area of each contact of a full picture, one line each.
 
     Args:
-        names: names of the contacts in the order of the request.
+        names: names of the contacts in the order of the request; None for contacts without a line.
     """
     lines = []
     for name, row in zip(names, _pressed(result), strict=False):
+        if name is None:
+            continue
         text = (
             f"{name}: {row['force_n']:.3g} N at {row['depth_mm']:.3g} mm, up to "
             f"{1000 * row['greatest_pressure_mpa']:.3g} kPa on {row['area_mm2']:.3g} mm²"

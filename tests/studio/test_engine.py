@@ -19,6 +19,7 @@ from studio.engine import session
 from studio.scene.collections import object_of, objects_of
 from studio.scene.gather import gather_document
 from studio.scene.objects_at import objects_at
+from studio.scene.subject import Subject
 from studio.sensor import warming
 from studio.sensor.warming import warm_up
 from studio.simulate import drafts, picture, relight
@@ -160,7 +161,7 @@ def test_places_in_the_design_are_found_in_the_scene(mini: Any) -> None:
         ("", "gel", 1),
         ("name", "", 0),
     ):
-        assert len(objects_at(mini, path, part)) == expected, path
+        assert len(objects_at(Subject(mini), path, part)) == expected, path
 
 
 def test_shapes_materials_and_lights_make_a_design_in_order(
@@ -271,9 +272,9 @@ def test_drafts_follow_a_dragged_light_and_the_last_is_whole(mini: Any) -> None:
     take, engine = drafts.requests.take, session.engine()
     light, settings = objects_of(mini, "LIGHT")[0], mini.optisense_simulation
 
-    def taken(result: dict[str, Any], scene: Any, *, draft: bool) -> None:
+    def taken(result: dict[str, Any], subject: Subject, *, draft: bool) -> None:
         pictures.append(result)
-        take(result, scene, draft=draft)
+        take(result, subject, draft=draft)
 
     drafts.requests.take, settings.draft = taken, True
     try:

@@ -11,6 +11,8 @@ from waiting import until
 
 from studio.engine import design_transfer, session
 from studio.scene.collections import object_of, objects_of
+from studio.scene.objects_at import objects_at
+from studio.scene.subject import Subject
 from studio.simulate import drafts
 
 IES = "IESNA:LM-63-2002\nTILT=NONE\n1 100 1 3 1 1 1 0 0 0\n1 1 1\n0 45 90\n0\n100 50 0\n"
@@ -65,6 +67,46 @@ def test_hidden_contacts_do_not_press(mini: Any) -> None:
         assert design_transfer.contacts(mini) == []
         setattr(folder, hide, False)
     assert len(design_transfer.contacts(mini)) == 2
+
+
+def test_forces_go_to_the_contacts_that_were_sent(mini: Any) -> None:
+    settings = mini.optisense_simulation
+    settings.size, settings.noise = "160", 100.0
+    for x, force in ((-4.0, 3.0), (0.0, 2.0), (4.0, 0.5)):
+        bpy.ops.optisense.add_contact()
+        contact = bpy.context.active_object
+        contact.location.x, contact.name = contact.location.x + x, f"{force} N"
+        contact.optisense.press_by, contact.optisense.force = "FORCE", force
+    hidden, gone, last = objects_of(mini, "CONTACT")
+    before = hidden.optisense.depth
+    assert bpy.ops.optisense.simulate(wait=False) == {"FINISHED"}
+    hidden.hide_set(True)
+    bpy.data.objects.remove(gone)
+    mini.name = "Another name"
+    until(lambda: not session.is_busy())
+    said = bpy.context.window_manager.optisense_picture.presses.splitlines()
+    assert [line.partition(":")[0] for line in said] == ["3.0 N", "0.5 N"]
+    assert hidden.optisense.depth != before, "it was pressed when the picture was asked for"
+    assert hidden.optisense.depth > last.optisense.depth
+
+
+def test_an_error_selects_what_it_was_about_when_the_design_was_sent(mini: Any) -> None:
+    for _ in range(3):
+        bpy.ops.optisense.add_contact()
+    hidden, gone, last = objects_of(mini, "CONTACT")
+    red = [each for each in objects_of(mini, "LIGHT") if each.optisense.group == "red"]
+    subject = Subject(mini)
+    assert objects_at(subject, "", "", 1) == [gone]
+    hidden.hide_set(True)
+    for each in (gone, red[0]):
+        bpy.data.objects.remove(each)
+    assert objects_at(subject, "", "", 2) == [last]
+    assert objects_at(subject, "", "", 1) == objects_at(subject, "", "", 0) == []
+    assert objects_at(subject, "lights.red.lights[1].position", "") == [red[1]]
+    assert objects_at(subject, "lights.red.lights[0].position", "") == []
+    assert objects_at(subject, "lights.red", "") == red[1:]
+    mini.optisense.opening = "another sensor"
+    assert subject.scene is None and not objects_at(subject, "lights.red", "")
 
 
 def test_a_draft_that_can_not_be_made_selects_nothing_and_is_forgotten(
