@@ -11,6 +11,7 @@ from ..engine import session
 from ..scene import properties
 from ..scene.gather import emitter_values
 from ..scene.lamps import redraw
+from ..scene.subject import scene_of
 
 
 def ask_for_windows(scene: bpy.types.Scene) -> None:
@@ -21,20 +22,28 @@ def ask_for_windows(scene: bpy.types.Scene) -> None:
 
 def ask_for_window(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
     """Query the lamps of a group, and draw them; if the engine refuses, the drawing stays."""
-    name, lamps = scene.name, group.name
-    value = emitter_values(group)
-    asked = {"entry": group.model} if value is None else {"value": value}
-    if value is not None and scene.optisense.folder:
-        asked["folder"] = scene.optisense.folder
+    number, name, asked = scene.session_uid, group.name, _lamp(scene, group)
 
     def known(result: dict[str, Any]) -> None:
-        scene = bpy.data.scenes.get(name)
-        group = None if scene is None else scene.optisense.light_groups.get(lamps)
-        if group is not None and emitter_values(group) == value:
-            group.drawn = json.dumps(result)
+        scene = scene_of(number)
+        group = None if scene is None else scene.optisense.light_groups.get(name)
+        if group is None or _lamp(scene, group) != asked:
+            return
+        drawn = json.dumps(result)
+        if group.drawn != drawn:
+            group.drawn = drawn
             redraw(scene, group)
 
     session.ask("lamp", known, lambda error: None, **asked)
+
+
+def _lamp(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> dict[str, Any]:
+    """Return the fields of a request for the lamps of a group."""
+    value = emitter_values(group)
+    if value is None:
+        return {"entry": group.model}
+    folder = scene.optisense.folder
+    return {"value": value, "folder": folder} if folder else {"value": value}
 
 
 def _reshaped(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
@@ -42,4 +51,16 @@ def _reshaped(scene: bpy.types.Scene, group: bpy.types.PropertyGroup) -> None:
         ask_for_window(scene, group)
 
 
-HOOKS = ((properties.when_reshaped, _reshaped),)
+@bpy.app.handlers.persistent
+def _undone(*_: Any) -> None:
+    """Draw the lamps again after undo or redo: a step may be older than the engine's answer."""
+    if session.running() is not None:
+        for scene in bpy.data.scenes:
+            ask_for_windows(scene)
+
+
+HOOKS = (
+    (properties.when_reshaped, _reshaped),
+    (bpy.app.handlers.undo_post, _undone),
+    (bpy.app.handlers.redo_post, _undone),
+)

@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 from shown_picture import shown
+from waiting import until
 
 from studio.core import rows
 from studio.lights.group_selection import lights_of
@@ -134,3 +135,21 @@ def test_the_frame_of_a_row_follows_it_and_its_light(mini: Any) -> None:
     assert abs(found[:3, 0] @ along) == pytest.approx(np.linalg.norm(along), rel=1e-3)
     assert found[:3, 2] == pytest.approx(-np.array(pose["direction"]), abs=1e-3)
     assert np.linalg.det(found[:3, :3]) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_lamps_keep_their_size_when_the_step_after_opening_is_undone(scene: Any) -> None:
+    def red() -> Any:
+        bpy.context.view_layer.update()
+        return lights_of(bpy.context.scene, "red")[0]
+
+    def are_drawn() -> bool:
+        return all(each.drawn for each in bpy.context.scene.optisense.light_groups)
+
+    assert bpy.ops.optisense.new(sensor="gelsight-mini") == {"FINISHED"}
+    until(are_drawn)
+    size = tuple(red().dimensions)
+    red().location.x += 1.0
+    bpy.ops.ed.undo_push(message="Move")
+    bpy.ops.ed.undo()
+    until(are_drawn)
+    assert tuple(red().dimensions) == size and size[0] > 1.0
