@@ -6,13 +6,15 @@ import json
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from ..core import ledger as core
 from ..core.engine import EngineError
 from ..engine import design_transfer, polls
 from ..engine.layout import paragraph, show_job, show_outcome
 from ..engine.operators import fail, start
+from ..scene.results import OfScene
+from ..scene.subject import Subject
 
 SHARE = 0.58
 """Share of a line of the ledger that its text takes; the rest has room for `0.253 µW/mm²`."""
@@ -20,9 +22,13 @@ SHARE = 0.58
 TITLE = "Tracing light"
 
 
-class OPTISENSE_PG_ledger(bpy.types.PropertyGroup):
+class OPTISENSE_PG_ledger(OfScene, bpy.types.PropertyGroup):
     """Last ledger; never saved."""
 
+    is_before: BoolProperty(
+        description="Whether the ledger belongs to the sensor that was open before",
+        options={"SKIP_SAVE"},
+    )
     groups: StringProperty(
         description="Light ledger of the light groups as JSON", options={"SKIP_SAVE"}
     )
@@ -46,17 +52,26 @@ class OPTISENSE_OT_ledger(polls.Asking, bpy.types.Operator):
         if active is not None and active.optisense.kind == "CONTACT" and active.select_get():
             held = active.evaluated_get(context.evaluated_depsgraph_get()).matrix_world
             at = [[round(value, 5) for value in held.translation]]
-        return start(self, TITLE, "ledger", _take, design=design, at=at)
+        subject = Subject(context.scene)
+
+        def traced(result: dict[str, Any]) -> None:
+            scene = subject.scene
+            if scene is not None:
+                take(result, scene)
+
+        return start(self, TITLE, "ledger", traced, design=design, at=at)
 
 
-def _take(result: dict[str, Any]) -> None:
+def take(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+    """Replace the ledger in the panel by that of a scene's sensor."""
     values = bpy.context.window_manager.optisense_ledger
+    values.is_before, values.scene = False, scene.session_uid
     values.groups = json.dumps(result["ledger"])
     values.places = json.dumps(result["places"])
 
 
-def draw(layout: bpy.types.UILayout) -> None:
-    """Draw the button, and the last ledger."""
+def draw(layout: bpy.types.UILayout, scene: bpy.types.Scene) -> None:
+    """Draw the button, and the last ledger; that of another sensor says so."""
     if not show_job(layout, TITLE):
         layout.operator("optisense.ledger", icon="LIGHT")
     show_outcome(layout, TITLE)
@@ -64,6 +79,9 @@ def draw(layout: bpy.types.UILayout) -> None:
     if not values.groups:
         return
     box = layout.box()
+    other = values.other_sensor(scene)
+    if other:
+        box.label(text=f"Light of the {other}", icon="INFO")
     for title, lines in core.group_rows(json.loads(values.groups)):
         paragraph(box, title, "LIGHT_POINT", boxed=True)
         column = box.column(align=True)

@@ -59,7 +59,7 @@ class OPTISENSE_PT_evaluate(SidebarPanel, bpy.types.Panel):
             row.operator("optisense.hide_rays", icon="X")
         if values.rays:
             paragraph(layout, values.rays)
-        ledger.draw(layout)
+        ledger.draw(layout, context.scene)
 
 
 def _strip(

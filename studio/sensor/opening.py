@@ -160,8 +160,8 @@ def open_empty(scene: bpy.types.Scene, document: dict[str, Any]) -> None:
 
 
 def picture_is_old(scene: bpy.types.Scene | None) -> None:
-    """Mark picture and scores of a scene as those of the sensor before; its picture can't be relit
-    any more.
+    """Mark picture, scores and light ledger of a scene as those of the sensor before; its picture
+    can't be relit any more.
 
     Args:
         scene: scene that gets another sensor; results of other scenes stay as they are. None if all
@@ -172,8 +172,9 @@ def picture_is_old(scene: bpy.types.Scene | None) -> None:
         now.image = ""
         now.is_before = now.shown
     evaluation = bpy.context.window_manager.optisense_evaluation
-    if scene is None or evaluation.is_of(scene):
-        evaluation.is_before = True
+    for each in (evaluation, bpy.context.window_manager.optisense_ledger):
+        if scene is None or each.is_of(scene):
+            each.is_before = True
     evaluation.rays = ""  # they go with the sensor that they were drawn in
 
 

@@ -14,9 +14,11 @@ from recording import draw
 from studio.core import ledger as words
 from studio.engine import design_transfer, session
 from studio.evaluate import ledger
+from studio.evaluate.ui import OPTISENSE_PT_evaluate
 from studio.looks import markers
 from studio.materials.ui import OPTISENSE_PT_materials
 from studio.scene.collections import objects_of
+from studio.sensor.opening import picture_is_old
 from studio.simulate.requests import presses
 
 
@@ -86,3 +88,22 @@ def test_the_ledger_tells_where_the_light_goes(mini: Any) -> None:
     (place,) = json.loads(values.places)
     assert len(words.place_text(place)) == 3
     assert session.state().about == ledger.TITLE
+
+
+def test_the_ledger_of_another_sensor_says_so(mini: Any) -> None:
+    emitted = {"emitted": {}, "entries": [], "camera": {"irradiance": {}}}
+
+    def said(scene: Any) -> str:
+        with bpy.context.temp_override(scene=scene):
+            return " ".join(draw(OPTISENSE_PT_evaluate).texts)
+
+    ledger.take({"ledger": emitted, "places": []}, mini)
+    other = bpy.data.scenes.new("Other")
+    other.optisense.document = mini.optisense.document
+    assert "Light of the" not in said(mini)
+    assert f"Light of the sensor of the scene '{mini.name}'" in said(other)
+    picture_is_old(other)
+    assert "Light of the" not in said(mini)
+    picture_is_old(mini)
+    assert f"Light of the sensor of the scene '{mini.name}'" in said(other)
+    assert "Light of the sensor that was open before" in said(mini)
