@@ -58,13 +58,12 @@ def _write_meshes(scene: bpy.types.Scene, document: dict[str, Any], folder: Path
             _written[str(path)] = digest
 
 
-def contents(scene: bpy.types.Scene) -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the scene's design without its meshes, and the digest of each part's mesh by name.
+def contents(given: dict[str, Any]) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return a design without its meshes, and the digest of each part's mesh by name.
 
-    Raises:
-        EngineError: there is no engine, or the scene does not form a design.
+    Args:
+        given: what `design` has just returned.
     """
-    given = design(scene)
     parts, place = given["data"]["parts"], Path(given["folder"])
     digests = {name: _written[str(place / part["mesh"])].hex() for name, part in parts.items()}
     return given["data"], digests

@@ -87,10 +87,11 @@ def _ask() -> None:
     try:
         design = design_transfer.design(scene)
         contacts = design_transfer.contacts(scene)
+        what = stored_drafts.shown_by(scene, design, contacts)
         _open.append(
             session.engine().send(
                 "simulate",
-                on_result=lambda result: _take(result, subject),
+                on_result=lambda result: _take(result, subject, what),
                 on_error=_ignored if first else _refused,
                 design=design,
                 contacts=contacts,
@@ -117,10 +118,13 @@ def _first(scene: bpy.types.Scene, draft: str | None) -> None:
         _opened = True
 
 
-def _take(result: dict[str, Any], subject: Subject) -> None:
+def _take(result: dict[str, Any], subject: Subject, what: list[Any] | None) -> None:
     """Show a draft, and schedule a complete one if it reused earlier results.
 
     The draft is dropped if the user left its scene or opened another sensor.
+
+    Args:
+        what: all that the draft depends on; None if it is not to be stored.
     """
     global _again, _began, _pace
     now = time.monotonic()
@@ -137,7 +141,7 @@ def _take(result: dict[str, Any], subject: Subject) -> None:
     if scene.optisense_simulation.draft and any(settings.get(each) for each in REUSED):
         _again = time.monotonic() + REST
     elif all(each.done for each in _open):
-        stored_drafts.keep(scene, result)
+        stored_drafts.keep(what, result)
 
 
 def _ignored(_: EngineError) -> None:

@@ -33,13 +33,31 @@ def folder() -> Path | None:
         return None
 
 
-def keep(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
-    """Store the draft in the engine's answer for the scene's sensor, unless it has contacts.
+def shown_by(
+    scene: bpy.types.Scene, design: dict[str, Any], contacts: list[dict[str, Any]]
+) -> list[Any] | None:
+    """Return all that a draft depends on, the engine's version included; None with contacts.
 
-    A draft that can't be written is not stored.
+    Args:
+        design, contacts: fields of a request for a draft, in which the scene is as now.
+
+    Raises:
+        EngineError: there is no engine.
+    """
+    if contacts:
+        return None
+    return [session.engine().version, exposure(scene), *design_transfer.contents(design)]
+
+
+def keep(what: list[Any] | None, result: dict[str, Any]) -> None:
+    """Store the draft in the engine's answer; one with contacts or that can't be written is not
+    stored.
+
+    Args:
+        what: all that the draft depends on, from `shown_by` when it was requested.
     """
     try:
-        file = _file(scene)
+        file = _file(what)
         if file is None:
             return
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -49,14 +67,15 @@ def keep(scene: bpy.types.Scene, result: dict[str, Any]) -> None:
         newest = sorted(file.parent.glob("*.npy"), key=lambda each: each.stat().st_mtime)
         for old in newest[:-MOST]:
             old.unlink()
-    except (OSError, EngineError):
+    except OSError:
         return
 
 
 def show_kept(scene: bpy.types.Scene) -> bool:
     """Show the stored draft of the scene's sensor; return whether there is one."""
     try:
-        return _show(scene, _file(scene))
+        design, contacts = design_transfer.design(scene), design_transfer.contacts(scene)
+        return _show(scene, _file(shown_by(scene, design, contacts)))
     except EngineError:
         return False
 
@@ -91,17 +110,12 @@ def _show(scene: bpy.types.Scene, file: Path | None) -> bool:
     return True
 
 
-def _file(scene: bpy.types.Scene) -> Path | None:
-    """Return the file of the draft of the scene's sensor without contacts; None with contacts.
-
-    Its name is a digest of all that the picture depends on, the engine's version included.
-
-    Raises:
-        EngineError: there is no engine, or the scene does not form a design.
+def _file(what: list[Any] | None) -> Path | None:
+    """Return the file of a draft, whose name is a digest of all that it depends on; None if it is
+    not stored.
     """
     place = folder()
-    if place is None or design_transfer.contacts(scene):
+    if place is None or what is None:
         return None
-    asked = [session.engine().version, exposure(scene), *design_transfer.contents(scene)]
-    text = json.dumps(asked, sort_keys=True).encode()
+    text = json.dumps(what, sort_keys=True).encode()
     return place / f"{hashlib.blake2b(text, digest_size=16).hexdigest()}.npy"

@@ -44,6 +44,20 @@ def test_a_sensor_that_is_opened_again_shows_its_draft_at_once(
     assert not stored_drafts.show_kept(mini)
 
 
+def test_a_draft_is_stored_for_the_sensor_that_it_shows(
+    mini: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = tmp_path / "drafts"
+    monkeypatch.setattr(stored_drafts, "folder", lambda: place)
+    drafts._opened = True
+    drafts._ask()
+    mini.optisense.light_groups[0].flux *= 2.0
+    until(lambda: place.is_dir() and any(place.glob("*.npy")))
+    assert not stored_drafts.show_kept(mini)
+    mini.optisense.light_groups[0].flux /= 2.0
+    assert stored_drafts.show_kept(mini)
+
+
 def test_a_built_in_sensor_shows_the_draft_of_the_engine_at_once(
     mini: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
