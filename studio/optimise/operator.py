@@ -16,6 +16,7 @@ from ..engine.operators import ChoosingFile, Starting, fail, refuse, start
 from ..evaluate import rays
 from ..evaluate.operator import draw_again
 from ..scene.paths import chosen, objective
+from ..scene.subject import scene_of
 from ..sensor.opening import new_stage, open_stage
 from . import search_advice, search_progress
 from .suggestions import suggestions
@@ -147,7 +148,7 @@ class OPTISENSE_OT_search(polls.Checked, Starting, bpy.types.Operator):
         except EngineError as error:
             return fail(self, error, TITLE)
         fields |= more_fields(search)
-        search_progress.begin()
+        search_progress.begin(context.scene)
         bpy.context.window_manager.optisense_found.expected = expected
         return start(
             self,
@@ -207,7 +208,7 @@ class OPTISENSE_OT_resume(_WithStudy, Starting, bpy.types.Operator):
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         search = context.scene.optisense_search
-        study = study_of(context.scene)
+        study, number = study_of(context.scene), context.scene.session_uid
         fields: dict[str, Any] = {"workers": search.workers, "go_on": search.go_on}
         if search.budget:
             fields["budget"] = search.budget
@@ -225,7 +226,10 @@ class OPTISENSE_OT_resume(_WithStudy, Starting, bpy.types.Operator):
                 search_progress.finished(result)
 
         def known(result: dict[str, Any]) -> None:
-            search_progress.take_curve(result["curve"])
+            scene = scene_of(number)
+            if scene is None:
+                return
+            search_progress.take_curve(scene, result["curve"])
             if result.get("running"):
                 follow("watch", watched)
             else:
@@ -242,7 +246,7 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         scene = context.scene
-        name, folder, saved = scene.name, scene.optisense.folder, scene.optisense.is_saved
+        number, folder, saved = scene.session_uid, scene.optisense.folder, scene.optisense.is_saved
         wait = bpy.app.background
         try:
             stage = new_stage()
@@ -250,7 +254,7 @@ class OPTISENSE_OT_apply_best(_WithStudy, bpy.types.Operator):
             return fail(self, error, "Applying")
 
         def applied(_: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
+            scene = scene_of(number)
             if scene is not None:
                 search_progress.clear_ghosts(scene)
                 open_stage(

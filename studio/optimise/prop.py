@@ -12,6 +12,7 @@ from bpy.props import (
 )
 
 from ..engine import catalogue
+from ..scene.results import OfScene
 
 _objective_items: catalogue.Items = []
 
@@ -139,9 +140,10 @@ def _method_chosen(found: bpy.types.PropertyGroup, context: bpy.types.Context) -
         context.scene.optisense_search.method = found.method_choice
 
 
-class OPTISENSE_PG_found(bpy.types.PropertyGroup):
+class OPTISENSE_PG_found(OfScene, bpy.types.PropertyGroup):
     """Results of the running search; never saved."""
 
+    is_before = False  # opening another sensor clears them
     objective_choice: EnumProperty(
         name="Objective", items=_objectives, options={"SKIP_SAVE"},
         description="Choose an objective",

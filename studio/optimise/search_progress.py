@@ -14,6 +14,7 @@ from ..engine import session
 from ..scene.collections import collection, object_of, objects_of
 from ..scene.kinds import GHOST
 from ..scene.meshes import part_mesh
+from ..scene.subject import scene_of
 from ..simulate import picture
 
 CURVE = "OptiSense search"
@@ -32,23 +33,25 @@ _curve: dict[int, float | None] = {}
 """Score of each trial by its number; trials may be reported twice."""
 
 
-def begin() -> None:
-    """Clear the results of the search before."""
+def begin(scene: bpy.types.Scene) -> None:
+    """Clear the results of the search before; those that come are of a scene's sensor."""
     _curve.clear()
     found = bpy.context.window_manager.optisense_found
+    found.scene = scene.session_uid
     found.best = found.values = found.start = found.ended = found.offer = found.conditions = ""
-    clear_ghosts(bpy.context.scene)
+    clear_ghosts(scene)
 
 
 def take(event: dict[str, Any]) -> None:
     """Handle an event of a search: show a trial that is finished."""
-    if event.get("event") != "trial":
+    found = bpy.context.window_manager.optisense_found
+    scene = scene_of(found.scene)
+    if event.get("event") != "trial" or scene is None:
         return
     scores = event.get("scores") or {}
-    objective = bpy.context.scene.optisense_search.objective
+    objective = scene.optisense_search.objective
     score = scores.get(objective, next(iter(scores.values()), None))
     _curve[event["number"]] = score
-    found = bpy.context.window_manager.optisense_found
     if score is not None and event.get("start"):
         found.start = f"{score:.4g}"
     if score is not None and event.get("best"):
@@ -62,15 +65,15 @@ def take(event: dict[str, Any]) -> None:
             for each in event.get("conditions") or []
             if each["value"] is not None
         )
-        show_ghosts(bpy.context.scene, event.get("shapes") or {})
+        show_ghosts(scene, event.get("shapes") or {})
     in_order = [_curve[number] for number in sorted(_curve)]
     picture.show_icon(CURVE, curve_picture(in_order, CURVE_SIZE))
     session.redraw()
 
 
-def take_curve(rows: list[dict[str, Any]]) -> None:
-    """Show all trials of a study at once."""
-    begin()
+def take_curve(scene: bpy.types.Scene, rows: list[dict[str, Any]]) -> None:
+    """Show all trials of a study of a scene's sensor at once."""
+    begin(scene)
     best = None
     for row in rows:
         score = next(iter((row.get("scores") or {}).values()), None)
@@ -136,8 +139,9 @@ def finished(result: dict[str, Any]) -> None:
     done = result.get("done")
     why = "stopped" if result.get("interrupted") else result.get("ended") or "finished"
     found.ended = f"{done} trials: {why}"
-    if result.get("interrupted"):  # the scene stays as before the search
-        clear_ghosts(bpy.context.scene)
+    scene = scene_of(found.scene)
+    if result.get("interrupted") and scene is not None:  # it stays as before the search
+        clear_ghosts(scene)
     notes = [str(note) for note in result.get("notes") or []]
     session.state().note = "; ".join(notes)
     session.redraw()

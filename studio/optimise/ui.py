@@ -74,6 +74,9 @@ class OPTISENSE_PT_optimise(SidebarPanel, bpy.types.Panel):
                 "others, or choose another objective"
             )
             paragraph(layout, text, "ERROR")
+        other = found.other_sensor(context.scene)
+        if other and has_trials():
+            layout.label(text=f"Search of the {other}", icon="INFO")
         curve = icon(CURVE) if has_trials() else 0
         if curve:
             layout.template_icon(icon_value=curve, scale=8.0)

@@ -10,6 +10,7 @@ import bpy
 from ..core.engine import EngineError
 from ..engine import session
 from ..scene.paths import absolute
+from ..scene.subject import scene_of
 from ..sensor import opening
 from . import search_progress
 
@@ -42,16 +43,16 @@ def offer(scene: bpy.types.Scene) -> None:
     The study is the one that the scene names, otherwise the last one beside the design's folder:
     the .blend file may have been saved before the search began, or never.
     """
-    search_progress.begin()
+    search_progress.begin(scene)
     design, study = scene.optisense, study_of(scene)
     if not study and design.is_open and design.is_saved:
         study = next((str(each) for each in reversed(studies_beside(Path(design.folder)))), "")
     if not study or not Path(study).is_dir():
         return
-    name = scene.name
+    number = scene.session_uid
 
     def known(result: dict[str, Any]) -> None:
-        scene = bpy.data.scenes.get(name)
+        scene = scene_of(number)
         if scene is None or session.is_busy() or result["design"] != scene.optisense.title:
             return
         search, running = scene.optisense_search, result["running"]
@@ -62,7 +63,7 @@ def offer(scene: bpy.types.Scene) -> None:
             search.objective = ", ".join(result["objectives"])
             search.method = result["method"]
             search.require = ", ".join(result["requirements"])
-        search_progress.take_curve(result["curve"])
+        search_progress.take_curve(scene, result["curve"])
         done = sum(not row["start"] for row in result["curve"])
         far = f"{done} of {search.budget or result['budget']} trials"
         bpy.context.window_manager.optisense_found.offer = (
