@@ -9,6 +9,7 @@ from typing import Any
 import bpy
 
 from ..core.engine import EngineError, Request
+from ..scene.subject import Subject
 from . import design_transfer, session
 
 
@@ -64,14 +65,15 @@ class LatestRequest:
     def send(
         self,
         what: str,
-        take: session.Answer,
+        take: Callable[[dict[str, Any], bpy.types.Scene], None],
         refused: Callable[[EngineError], None] = lambda error: None,
         **fields: Any,
     ) -> None:
         """Send the request with the scene's design.
 
         Args:
-            take: function that is called with the answer.
+            take: function that is called with the answer and the scene of the sensor, unless that
+                is gone or has another sensor by then.
             refused: function that is called with an error; none is shown by default, as the
                 buttons show those of the design.
             fields: further fields of the request.
@@ -82,4 +84,11 @@ class LatestRequest:
         except EngineError as error:
             refused(error)
             return
-        self.open = session.ask(what, take, refused, design=design, **fields)
+        subject = Subject(bpy.context.scene)
+
+        def taken(result: dict[str, Any]) -> None:
+            scene = subject.scene
+            if scene is not None:
+                take(result, scene)
+
+        self.open = session.ask(what, taken, refused, design=design, **fields)

@@ -41,14 +41,7 @@ def _ask() -> None:
         return
     scene, names = bpy.context.scene, objectives(bpy.context)
     if scene is not None and scene.optisense.is_open and names:
-        name = scene.name
-
-        def taken(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
-            if scene is not None:
-                take_live(result, scene)
-
-        _request.send("evaluate", taken, objectives=names, name="live")
+        _request.send("evaluate", take_live, objectives=names, name="live")
     else:
         _request.drop()
 

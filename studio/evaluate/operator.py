@@ -13,6 +13,7 @@ from ..core.numbers import shown_number
 from ..engine import catalogue, design_transfer, polls, session
 from ..engine.operators import Starting, refuse, start_with_design
 from ..scene.paths import objective
+from ..scene.subject import Subject
 from ..simulate import editors
 from . import figures, rays
 
@@ -53,10 +54,10 @@ class OPTISENSE_OT_evaluate(polls.Checked, Starting, bpy.types.Operator):
     checks = (*polls.ASKING, polls.requires(lambda c: chosen(c), "Choose an objective first"))
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
-        name = context.scene.name
+        subject = Subject(context.scene)
 
         def taken(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
+            scene = subject.scene
             if scene is not None:
                 take(result, scene)
 
@@ -183,10 +184,10 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
 
 def draw_again(scene: bpy.types.Scene, _: str | None) -> None:
     """Trace the chief rays of a sensor that replaced another one, without waiting."""
-    name = scene.name
+    subject = Subject(scene)
 
     def traced(result: dict[str, Any]) -> None:
-        scene = bpy.data.scenes.get(name)
+        scene = subject.scene
         if scene is not None:
             bpy.context.window_manager.optisense_evaluation.rays = rays.show(scene, result)
 
@@ -207,10 +208,10 @@ class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):
     bl_label = "Show Chief Rays"
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        name = context.scene.name
+        subject = Subject(context.scene)
 
         def traced(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
+            scene = subject.scene
             if scene is not None:
                 text = rays.show(scene, result)
                 bpy.context.window_manager.optisense_evaluation.rays = text

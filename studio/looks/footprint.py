@@ -67,24 +67,18 @@ def _ask() -> None:
     scene = bpy.context.scene
     if not is_on(scene) or not _request.is_due:
         return
-    name = scene.name
-
-    def seen(result: dict[str, Any]) -> None:
-        if bpy.context.scene is not None and bpy.context.scene.name == name:
-            _take(result)
-
-    _request.send("footprint", seen, _refused, name="footprint")
+    _request.send("footprint", _take, _refused, name="footprint")
 
 
-def _take(result: dict[str, Any]) -> None:
-    if not is_on(bpy.context.scene):
+def _take(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+    if scene != bpy.context.scene or not is_on(scene):
         return
     points, hit = np.load(result["files"]["points"]), np.load(result["files"]["hit"]) > 0
     normals = np.load(result["files"]["normals"]).reshape(-1, 3)
     quads, border = outlines.grid_quads(points, hit)
     flat = points.reshape(-1, 3)
     triangles = quads[:, [0, 1, 2, 0, 2, 3]].ravel()
-    surface = sensing_surface(bpy.context.scene)
+    surface = sensing_surface(scene)
     _shown["of"] = None if surface is None else surface.as_pointer()
     _shown["seen"] = np.concatenate(
         [(flat + side * LIFT * normals)[triangles] for side in (1.0, -1.0)]

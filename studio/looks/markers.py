@@ -62,13 +62,15 @@ def _ask() -> None:
         _request.send("markers", _take, name="markers")
 
 
-def _take(result: dict[str, Any]) -> None:
+def _take(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+    if scene != bpy.context.scene:
+        return
     _shown.clear()
     if result["count"]:
         points = np.load(result["files"]["points"])
         normals = np.load(result["files"]["normals"])
         _shown["corners"] = discs(points, normals, result["radius"])
-        surface = footprint.sensing_surface(bpy.context.scene)
+        surface = footprint.sensing_surface(scene)
         _shown["of"] = None if surface is None else surface.as_pointer()
     session.redraw()
 

@@ -14,6 +14,7 @@ from ..engine.layout import labelled, show_job
 from ..engine.operators import fail, start
 from ..scene.kinds import ROLES
 from ..scene.paths import absolute
+from ..scene.subject import scene_of
 from .opening import new_stage, open_stage, tell_opened
 from .workspace import show_sidebar
 
@@ -165,7 +166,7 @@ class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        found, name, wait = now(), context.scene.name, bpy.app.background
+        found, number, wait = now(), context.scene.session_uid, bpy.app.background
         try:
             stage = new_stage()
         except EngineError as error:
@@ -173,7 +174,7 @@ class OPTISENSE_OT_make_from_cad(polls.Replacing, bpy.types.Operator):
         fields: dict[str, Any] = {} if found.has_units else {"units": found.units}
 
         def made(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
+            scene = scene_of(number)
             if scene is None:
                 return
             now().bodies.clear()

@@ -15,6 +15,7 @@ from ..lights.windows import ask_for_windows
 from ..scene.build import build
 from ..scene.selection_state import looks_of, restore
 from ..scene.startup import clear_startup
+from ..scene.subject import scene_of
 from ..scene.views import show_design
 from .warming import warm_up
 
@@ -75,10 +76,10 @@ def open_source(scene: bpy.types.Scene, source: str, folder: str, *, wait: bool)
     Raises:
         EngineError: there is no engine.
     """
-    name, stage = scene.name, new_stage()
+    number, stage = scene.session_uid, new_stage()
 
     def written(result: dict[str, Any]) -> None:
-        scene = bpy.data.scenes.get(name)
+        scene = scene_of(number)
         if scene is not None:
             if folder and result.get("source_digest"):
                 digests[folder] = result["source_digest"]
@@ -111,10 +112,10 @@ def open_stage(
             the sensor counts as the same one, with other values.
         then: called with the scene and the engine's draft when the sensor is open.
     """
-    name = scene.name
+    number = scene.session_uid
 
     def opened(result: dict[str, Any]) -> None:
-        scene = bpy.data.scenes.get(name)
+        scene = scene_of(number)
         if scene is None:
             return
         document = design_transfer.without_nulls(result["data"])

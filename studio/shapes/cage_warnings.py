@@ -33,7 +33,7 @@ def _look() -> None:
         _request.drop()
 
 
-def _take(result: dict[str, Any]) -> None:
+def _take(result: dict[str, Any], scene: bpy.types.Scene) -> None:
     _found.clear()
     for problem in result["problems"]:
         about = re.match(r"cages\.([^.\[]+)", problem["path"] or "")

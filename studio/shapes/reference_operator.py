@@ -18,6 +18,7 @@ from ..scene.collections import REFERENCE, collection, select_only
 from ..scene.contacts import add_contact, sensing_surface, tree_of
 from ..scene.gather import free_name, part_names
 from ..scene.meshes import new_mesh, part_mesh
+from ..scene.subject import scene_of
 from ..sensor.cad import ChoosingFiles
 
 READING = "Reading the mesh"
@@ -63,10 +64,10 @@ class OPTISENSE_OT_add_mesh(polls.Replacing, ChoosingFiles, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         if not (self.filepath.strip() or self.directory.strip()):
             return refuse(self, "Name a file first")
-        paths, name, scale = self.paths(), context.scene.name, self.scale
+        paths, number, scale = self.paths(), context.scene.session_uid, self.scale
 
         def read(result: dict[str, Any]) -> None:
-            scene = bpy.data.scenes.get(name)
+            scene = scene_of(number)
             if scene is not None:
                 made = [
                     _bring(scene, each, 1.0 if each["own_units"] else scale)
