@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -51,7 +51,8 @@ def export(
         The paths of the files, in the order of the parts.
 
     Raises:
-        DesignError: a part has no mesh, or lies outside of its cage; or a gel has no mould.
+        DesignError: a part has no mesh, or lies outside of its cage; a gel has no mould; or files
+            of two parts, plates or moulds would have one name, also in another case.
         SetupError: a format needs a package that is not installed.
         OutputError: there is no such format, two formats have files of one name, a format writes
             none, the folder can't be written, or it holds a design or files of the user with such
@@ -62,19 +63,21 @@ def export(
         FORMATS.find(name).require()
     made = shapes(design)
     writers: dict[str, Writer] = {}
+    stem = file_name(design.name)
     for name in wanted:
-        _add(writers, name, _shape_writers(name, design.name, made))
+        _add_shapes(writers, name, stem, design.name, made)
     if with_moulds:
         cast = moulds(made)
         halves = [half for each in cast for half in each.shapes()]
         for name in wanted if halves else ():
-            _add(writers, name, _shape_writers(name, f"{design.name}-moulds", halves))
+            _add_shapes(writers, name, f"{stem}-moulds", f"{design.name}-moulds", halves)
         if notes is not None:
             notes += [note for each in cast for note in each.notes()]
     for plate in plates(made):
-        writers[f"{plate.name}-cut.dxf"] = _bytes_writer(cut_file(plate).encode("ascii"))
-        sheet = drawing(plate, design.name)
-        writers[f"{plate.name}-drawing.svg"] = _bytes_writer(sheet.encode("utf-8"))
+        outline = cut_file(plate).encode("ascii")
+        sheet = drawing(plate, design.name).encode("utf-8")
+        _add(writers, f"{plate.name}-cut.dxf", _bytes_writer(outline), plate.name)
+        _add(writers, f"{plate.name}-drawing.svg", _bytes_writer(sheet), plate.name)
     bill = bill_of_materials(design)
     placed = placements(design)
     for file, text in (
@@ -83,26 +86,21 @@ def export(
         (BILL_FILES[0], bill.csv()),
         (BILL_FILES[1], bill.markdown()),
     ):
-        writers[file] = _bytes_writer(text.encode("utf-8"))
+        _add(writers, file, _bytes_writer(text.encode("utf-8")))
     return _write_all(Path(folder), writers, [] if notes is None else notes)
 
 
-def _shape_writers(name: str, title: str, made: Sequence[Shape]) -> dict[str, Writer]:
-    """Return the files of a format, and the function that writes each."""
+def _add_shapes(
+    writers: dict[str, Writer], name: str, stem: str, title: str, made: Sequence[Shape]
+) -> None:
+    """Add the files of a format; one that holds all shapes is called by the stem."""
     kind = FORMATS.find(name)
     if kind.holds_all:
-        return {f"{file_name(title)}{kind.suffix}": _ShapeWriter(name, kind, title, made)}
-    files: dict[str, Writer] = {}
+        _add(writers, f"{stem}{kind.suffix}", _ShapeWriter(name, kind, title, made))
+        return
     for shape in made:
-        file = f"{shape.name}{kind.suffix}"
-        if file.casefold() in {other.casefold() for other in files}:
-            raise DesignError(
-                f"parts '{shape.name}' and another one differ only in upper and lower case",
-                where=f"parts.{shape.name}",
-                hint="Rename one: their files would overwrite each other on some systems",
-            )
-        files[file] = _ShapeWriter(name, kind, title, [shape])
-    return files
+        write = _ShapeWriter(name, kind, title, [shape])
+        _add(writers, f"{shape.name}{kind.suffix}", write, shape.name)
 
 
 @dataclass(frozen=True)
@@ -124,21 +122,29 @@ class _ShapeWriter:
         return notes
 
 
-def _add(writers: dict[str, Writer], name: str, files: Mapping[str, Writer]) -> None:
-    """Add the files of a format.
+def _add(writers: dict[str, Writer], file: str, write: Writer, part: str | None = None) -> None:
+    """Add a file.
 
     Raises:
         OutputError: another format has a file of the same name, also in another case.
+        DesignError: another part, or its mould or one of its plates, has such a file.
     """
-    before = {file.casefold(): writer for file, writer in writers.items()}
-    for file in files:
-        other = before.get(file.casefold())
-        if isinstance(other, _ShapeWriter) and other.name != name:
-            raise OutputError(
-                f"formats '{other.name}' and '{name}' would both write {file}",
-                hint="Export them into two folders",
-            )
-    writers.update(files)
+    same = file.casefold()
+    other = next((old for name, old in writers.items() if name.casefold() == same), None)
+    if other is None:
+        writers[file] = write
+        return
+    formats = [each.name for each in (other, write) if isinstance(each, _ShapeWriter)]
+    if len(set(formats)) > 1:
+        raise OutputError(
+            f"formats '{formats[0]}' and '{formats[1]}' would both write {file}",
+            hint="Export them into two folders",
+        )
+    raise DesignError(
+        f"two files would have the name '{file}'",
+        where="parts" if part is None else f"parts.{part}",
+        hint="Rename the part: their files would overwrite each other",
+    )
 
 
 def file_name(title: str) -> str:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from optisense.design import SensorDesign
-from optisense.errors import OutputError
+from optisense.design import Part, Role, SensorDesign
+from optisense.errors import DesignError, OutputError
+from optisense.geometry import TriangleMesh
 from optisense.workshop import FORMATS, ShapeFormat, export
 
 
@@ -27,6 +28,32 @@ def test_two_formats_that_would_write_the_same_files_are_refused(
         files = export(flat, tmp_path / "parts", ["stl2", "stl2"])
     assert (tmp_path / "parts" / "gel.STL").read_text() == flat.name
     assert len(files) == len(set(files))
+
+
+@pytest.mark.parametrize(
+    ("part", "clash"),
+    [("wall-1", "wall-1-cut.dxf"), ("gel-mould-front", "gel-mould-front.stl"), ("GEL", "GEL.stl")],
+)
+def test_no_file_of_a_part_replaces_that_of_another(
+    flat: SensorDesign, tmp_path: Path, part: str, clash: str
+) -> None:
+    """Plates of one part have numbers, and halves of moulds have the name of their gel."""
+    design = flat.model_copy(deep=True)
+    plate = TriangleMesh.box((0, 0, 40), (20, 10, 42))
+    two = TriangleMesh.joined([plate, TriangleMesh.box((0, 0, 50), (8, 8, 52))])
+    for name, mesh in (("wall", two), (part, plate)):
+        design.parts[name] = Part(role=Role.BLOCKER, mesh=f"meshes/{name}.obj")
+        design.meshes[name] = mesh
+    with pytest.raises(DesignError, match=f"two files would have the name '{clash}'") as found:
+        export(design, tmp_path / "parts", with_moulds=True)
+    assert found.value.where == f"parts.{part}"
+    assert not (tmp_path / "parts").exists()
+
+
+def test_a_long_name_keeps_the_file_of_the_moulds_apart(flat: SensorDesign, tmp_path: Path) -> None:
+    design = flat.model_copy(update={"name": "n" * 64})
+    names = {file.name for file in export(design, tmp_path, "3mf", with_moulds=True)}
+    assert {f"{design.name}.3mf", f"{design.name}-moulds.3mf"} <= names
 
 
 @pytest.mark.parametrize("holds_all", [False, True])
