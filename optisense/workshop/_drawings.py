@@ -1,12 +1,13 @@
 """Drawings of plates: an outline to cut (DXF), and a sheet with three views and dimensions (SVG).
 
-The plan is on top, the front view below it, and the left view beside it.
+The views are those of the third angle: the plan is on top, the front view below it, and the view
+from the right at its right.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from string import ascii_uppercase
 
 import numpy as np
 import shapely
@@ -17,6 +18,7 @@ from optisense.text import to_html
 from optisense.workshop._dxf import Pair, arc, circle, dxf, line
 from optisense.workshop._plates import Circle, Plate
 from optisense.workshop._profiles import OutlinePiece, centre_of
+from optisense.workshop._sheet import STYLE, TEXT, Sheet, number
 
 GAP = 16.0
 """Distance between two views, mm: room for a dimension and its number."""
@@ -27,12 +29,6 @@ BORDER = 8.0
 OFF = 7.0
 """Distance between a view and the line of its dimension, mm: nearly half of `GAP`, so that the
 number stands clear of both views."""
-
-TEXT = 2.5
-"""Height of letters, mm: the smallest of ISO 3098 that is read easily."""
-
-ARROW = 2.0
-"""Length of an arrow of a dimension, mm, a little less than the height of the letters beside it."""
 
 STEPS_OF_CURVE = 4
 """Number of points for each corner of a curve in a DXF file, whose release 12 has no splines."""
@@ -45,6 +41,16 @@ LEAST_TITLE = 90.0
 
 LEADER = 8.0
 """Length of the line from an arc to its radius, mm."""
+
+ROW = 2.2 * TEXT
+"""Distance between two lines of text, mm."""
+
+MOST_STEPS = 12
+"""Number of places of edges along x or y up to which each has its dimension. A plate of more is a
+freely curved or toothed one, which is cut from its file."""
+
+SAME = 1e-3
+"""Difference of lengths, mm, that counts as none: far below the accuracy of cutting."""
 
 
 def cut_file(plate: Plate) -> str:
@@ -92,95 +98,18 @@ def _through(points: FloatArray) -> FloatArray:
     return np.asarray(CubicSpline(lengths, points)(fine))
 
 
-@dataclass
-class _Sheet:
-    """Elements of the drawing, in mm with y up; SVG has y down."""
-
-    height: float
-    lines: list[str] = field(default_factory=list)
-
-    def at(self, point: FloatArray | tuple[float, float]) -> str:
-        """Return a point (x, y), mm, as SVG writes it."""
-        return f"{point[0]:.4f} {self.height - point[1]:.4f}"
-
-    def path(self, moves: str, kind: str) -> None:
-        """Add a path; `kind` is one of the classes of `STYLE`."""
-        self.lines.append(f'<path class="{kind}" d="{moves}"/>')
-
-    def line(self, start: tuple[float, float], end: tuple[float, float], kind: str) -> None:
-        """Add a straight line between two points, mm; `kind` is one of the classes of `STYLE`."""
-        self.path(f"M {self.at(start)} L {self.at(end)}", kind)
-
-    def text(
-        self, at: tuple[float, float], words: str, anchor: str = "middle", upright: bool = False
-    ) -> None:
-        """Add text at a point, mm; `anchor` is SVG's, and upright text runs upwards."""
-        x, y = at[0], self.height - at[1]
-        turn = f' transform="rotate(-90 {x:.3f} {y:.3f})"' if upright else ""
-        self.lines.append(
-            f'<text x="{x:.3f}" y="{y:.3f}" text-anchor="{anchor}"{turn}>{to_html(words)}</text>'
-        )
-
-    def arrow(self, tip: tuple[float, float], way: tuple[float, float]) -> None:
-        """Draw a full arrowhead at a tip; `way` is a unit vector along it."""
-        back = np.array(tip) - ARROW * np.array(way)
-        across = 0.17 * ARROW * np.array([-way[1], way[0]])
-        moves = f"M {self.at(tip)} L {self.at(back + across)} L {self.at(back - across)} Z"
-        self.path(moves, "arrow")
-
-    def across(self, x0: float, x1: float, foot: float, y: float) -> None:
-        """Draw a dimension along x, below or above the edge at `foot`."""
-        for x in (x0, x1):
-            self.line((x, foot), (x, y + np.sign(y - foot)), "thin")
-        self.line((x0, y), (x1, y), "thin")
-        self._arrows((x0, y), (x1, y), (1.0, 0.0))
-        self.text((0.5 * (x0 + x1), y + 0.7), number(x1 - x0))
-
-    def up(self, y0: float, y1: float, foot: float, x: float) -> None:
-        """Draw a dimension along y, beside the edge at `foot`."""
-        for y in (y0, y1):
-            self.line((foot, y), (x + np.sign(x - foot), y), "thin")
-        self.line((x, y0), (x, y1), "thin")
-        self._arrows((x, y0), (x, y1), (0.0, 1.0))
-        if y1 - y0 > 4.0 * TEXT:
-            self.text((x - 0.7, 0.5 * (y0 + y1)), number(y1 - y0), upright=True)
-        else:
-            self.text((x - 0.7, 0.5 * (y0 + y1 - TEXT)), number(y1 - y0), "end")
-
-    def _arrows(
-        self, start: tuple[float, float], end: tuple[float, float], way: tuple[float, float]
-    ) -> None:
-        """Draw arrows inside the dimension if there is room, else from outside."""
-        inside = abs(end[0] - start[0]) + abs(end[1] - start[1]) > 3.0 * ARROW
-        sign = 1.0 if inside else -1.0
-        ahead, behind = (sign * way[0], sign * way[1]), (-sign * way[0], -sign * way[1])
-        self.arrow(end, ahead)
-        self.arrow(start, behind)
-        if not inside:
-            for (x, y), (dx, dy) in ((end, behind), (start, ahead)):
-                tail = x - 2.0 * ARROW * -dx, y - 2.0 * ARROW * -dy
-                self.line((x, y), tail, "thin")
-
-
-STYLE = (
-    ".edge{fill:none;stroke:#000;stroke-width:.35}"
-    ".hidden{fill:none;stroke:#000;stroke-width:.25;stroke-dasharray:1.5 .8}"
-    ".thin{fill:none;stroke:#000;stroke-width:.13}.arrow{fill:#000}"
-    f"text{{font:{TEXT * 1.4:.2f}px sans-serif}}"
-)
-
-
 def drawing(plate: Plate, title: str) -> str:
     """Return three views of a plate at 1:1 with its dimensions, as an SVG picture in mm."""
     ring = _polygon(plate)  # with its arcs, of which a mesh has only chords
     width, depth, thick = ring.bounds[2], ring.bounds[3], plate.thickness
-    title_height = 8.0 * TEXT
-    left, bottom = BORDER + OFF + TEXT, BORDER + title_height
+    features = _features(plate)
+    words = _words(plate, title, [text for _, text in features])
+    left, bottom = BORDER + OFF + TEXT, BORDER + ROW * (len(words) + 0.5)
     front = bottom + OFF
     plan = front + thick + GAP
     side = left + width + GAP
     whole = max(side + thick + OFF + BORDER + 2.0 * TEXT, LEAST_TITLE), plan + depth + BORDER + OFF
-    sheet = _Sheet(whole[1])
+    sheet = Sheet(whole[1])
     corner = np.array([left, plan])
     for outline in plate.outlines:
         _plan(sheet, outline, corner)
@@ -189,15 +118,18 @@ def drawing(plate: Plate, title: str) -> str:
     sheet.across(left, left + width, plan + depth, plan + depth + OFF)
     sheet.up(plan, plan + depth, left, left - OFF)
     sheet.up(front, front + thick, left, left - OFF)
-    _round(sheet, plate, corner)
-    of = f", {plate.material}" if plate.material else ""
-    words = [
-        f"{plate.name}: {plate.count} x {number(thick)} mm{of}",
-        f"{title}; mm, 1:1",
-        "plan; below: from the front; right: from the left",
-    ]
+    for axis, foot in (
+        (0, (plan - 1.0, plan - 3.0)),
+        (1, (left + width + 1.0, left + width + 3.0)),
+    ):
+        steps = _steps(plate, ring, axis)
+        if steps and len(steps) <= MOST_STEPS:
+            sheet.ordinates([0.0, *steps], foot, corner, axis)
+    _round(sheet, plate, ring, corner)
+    for letter, (place, _) in zip(_letters(), features, strict=False):
+        sheet.text(tuple((place + corner).tolist()), letter, "start")
     for row, text in enumerate(words):
-        sheet.text((BORDER, BORDER + 2.2 * TEXT * (len(words) - 1 - row)), text, "start")
+        sheet.text((BORDER, BORDER + ROW * (len(words) - 1 - row)), text, "start")
     size = f'width="{whole[0]:.2f}mm" height="{whole[1]:.2f}mm"'
     return "\n".join([
         f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="0 0 {whole[0]:.2f} '
@@ -210,7 +142,7 @@ def drawing(plate: Plate, title: str) -> str:
     ])  # fmt: skip
 
 
-def _plan(sheet: _Sheet, outline: Circle | list[OutlinePiece], corner: FloatArray) -> None:
+def _plan(sheet: Sheet, outline: Circle | list[OutlinePiece], corner: FloatArray) -> None:
     """Draw an outline in the plan."""
     if isinstance(outline, Circle):
         x, y = (outline.centre + corner).tolist()
@@ -267,9 +199,9 @@ def _fine(piece: OutlinePiece) -> FloatArray:
 
 
 def _beside(
-    sheet: _Sheet, ring: shapely.Polygon, corner: tuple[float, float], thick: float, axis: int
+    sheet: Sheet, ring: shapely.Polygon, corner: tuple[float, float], thick: float, axis: int
 ) -> None:
-    """Draw a view along the plate: from the front (axis 0, below the plan) or from the left (1)."""
+    """Draw a view along the plate: from the front (0, below the plan) or from the right (1)."""
     low, high = ring.bounds[axis], ring.bounds[2 + axis]
 
     def at(along: float, up: float) -> tuple[float, float]:
@@ -294,58 +226,152 @@ def _beside(
 
 def _edges(points: FloatArray, axis: int) -> Iterator[FloatArray]:
     """Yield corners with a sharp bend, and the ends of a smooth outline along an axis."""
-    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
-    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
-    bend = np.degrees(np.abs(np.arctan2(cross, (before * after).sum(axis=1))))
-    yield from points[bend > SHARP]
+    yield from _corners(points)
     yield points[int(points[:, axis].argmin())]
     yield points[int(points[:, axis].argmax())]
 
 
+def _corners(points: FloatArray) -> FloatArray:
+    """Return the corners (k, 2) of a closed outline with a sharp bend."""
+    before, after = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
+    cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+    bend = np.degrees(np.abs(np.arctan2(cross, (before * after).sum(axis=1))))
+    return np.asarray(points[bend > SHARP])
+
+
 def _is_seen(ring: shapely.Polygon, place: FloatArray, axis: int) -> bool:
     """Return whether an edge is visible: nothing of the plate is before it, below it from the
-    front, left of it from the left.
+    front, right of it from the right.
     """
     end = place.copy()
-    end[1 - axis] = ring.bounds[1 - axis] - 1.0
+    end[1 - axis] = ring.bounds[1] - 1.0 if axis == 0 else ring.bounds[2] + 1.0
     way = shapely.LineString([place, end])
     return bool(way.intersection(ring).length < 1e-3)
 
 
-def _round(sheet: _Sheet, plate: Plate, corner: FloatArray) -> None:
-    """Draw diameters and positions of holes, and radii of arcs, each radius once."""
-    known: set[str] = set()
+def _words(plate: Plate, title: str, features: list[str]) -> list[str]:
+    """Return the lines of text under the views: the title, and a table of holes."""
+    of = f", {plate.material}" if plate.material else ""
+    words = [
+        f"{plate.name}: {plate.count} x {number(plate.thickness)} mm{of}",
+        f"{title}; mm, 1:1",
+        "plan, front view, right view (third angle)",
+    ]
+    if features:
+        words.append("(x, y) from the lower left corner:")
+    return words + [f"{letter}: {text}" for letter, text in zip(_letters(), features, strict=False)]
+
+
+def _letters() -> Iterator[str]:
+    """Yield A to Z, then AA to AZ, BA and so on."""
+    for before in ("", *ascii_uppercase):
+        for letter in ascii_uppercase:
+            yield before + letter
+
+
+def _features(plate: Plate) -> list[tuple[FloatArray, str]]:
+    """Return the place (2,) of the letter of each hole, mm, and what the table says of it."""
+    found: list[tuple[FloatArray, str]] = []
+    for index, outline in enumerate(plate.outlines):
+        if isinstance(outline, Circle):
+            beside = outline.centre + np.sqrt(0.5) * outline.radius + 0.8
+            words = f"⌀{number(2.0 * outline.radius)} at {_at(outline.centre)}"
+            found.append((beside, words))
+            continue
+        if index == 0:
+            continue
+        points = np.concatenate([_fine(piece) for piece in outline])
+        low, high = points.min(axis=0), points.max(axis=0)
+        slot = _slot(outline)
+        if slot is None:
+            words = f"opening {_by(high - low)}, lower left corner at {_at(low)}"
+            found.append((0.5 * (low + high), words))
+            continue
+        length, wide, angle = slot
+        turned = f", {number(angle)} degrees to x" if angle > SAME else ""
+        words = f"slot {number(length)} x {number(wide)} at {_at(0.5 * (low + high))}"
+        found.append((high, words + turned))
+    return found
+
+
+def _at(point: FloatArray) -> str:
+    return f"({number(point[0])}, {number(point[1])})"
+
+
+def _by(size: FloatArray) -> str:
+    return f"{number(size[0])} x {number(size[1])}"
+
+
+def _slot(outline: list[OutlinePiece]) -> tuple[float, float, float] | None:
+    """Return length and width (mm) of a slot with round ends, and its angle to x (degrees, from 0
+    to 180); None for another outline.
+    """
+    if [piece.kind for piece in outline] != ["line", "arc", "line", "arc"]:
+        return None
+    one, other = (outline[k].points for k in (1, 3))
+    widths = [float(np.linalg.norm(end[2] - end[0])) for end in (one, other)]
+    centres = [centre_of(*end) for end in (one, other)]
+    assert centres[0] is not None and centres[1] is not None
+    radii = [
+        float(np.linalg.norm(end[0] - c)) for end, c in zip((one, other), centres, strict=True)
+    ]
+    if np.ptp([*widths, *(2.0 * radius for radius in radii)]) > SAME:
+        return None
+    along = centres[1] - centres[0]
+    angle = float(np.degrees(np.arctan2(along[1], along[0]))) % 180.0
+    return (
+        float(np.linalg.norm(along)) + widths[0],
+        widths[0],
+        0.0 if 180.0 - angle < SAME else angle,
+    )
+
+
+def _steps(plate: Plate, ring: shapely.Polygon, axis: int) -> list[float]:
+    """Return the distances along an axis, mm, of corners and of straight edges across it, without
+    those of the plate's own sides, ascending.
+    """
+    found: set[float] = set()
+    for outline, loop in zip(plate.outlines, (ring.exterior, *ring.interiors), strict=True):
+        if isinstance(outline, Circle) or _slot(outline) is not None:
+            continue
+        places = list(_corners(np.array(loop.coords)[:-1]))
+        lines = [piece.points for piece in outline if piece.kind == "line"]
+        places += [ends[0] for ends in lines if abs(ends[1, axis] - ends[0, axis]) < SAME]
+        found |= {round(float(place[axis]), 2) for place in places}
+    return sorted(value for value in found if SAME < value < ring.bounds[2 + axis] - 0.01)
+
+
+def _round(sheet: Sheet, plate: Plate, ring: shapely.Polygon, corner: FloatArray) -> None:
+    """Draw axes of holes, and radii of arcs, each radius once, where it is farthest from holes."""
+    arcs: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
     for outline in plate.outlines:
         if isinstance(outline, Circle):
             x, y = (outline.centre + corner).tolist()
-            place = f"({number(outline.centre[0])}, {number(outline.centre[1])})"
-            words = f"⌀{number(2.0 * outline.radius)} at {place}"
-            sheet.text((x, y + outline.radius + 0.8), words)
             for dx, dy in ((1.0, 0.0), (0.0, 1.0)):
                 r = outline.radius + 1.0
                 sheet.line((x - dx * r, y - dy * r), (x + dx * r, y + dy * r), "thin")
+            continue
+        if _slot(outline) is not None:
             continue
         for piece in (each for each in outline if each.kind == "arc"):
             centre = centre_of(*piece.points)
             assert centre is not None
             radius = float(np.linalg.norm(piece.points[0] - centre))
-            words = f"R{number(radius)}"
-            if words in known:
-                continue
-            known.add(words)
-            tip = piece.points[1] + corner
             way = (piece.points[1] - centre) / radius
-            inner = tip - LEADER * way
-            (tx, ty), (ix, iy) = tip.tolist(), inner.tolist()
-            sheet.line((ix, iy), (tx, ty), "thin")
-            sheet.arrow((tx, ty), (float(way[0]), float(way[1])))
-            sheet.text(
-                (ix - np.sign(way[0]) * 0.5, iy - 0.4 * TEXT),
-                words,
-                "end" if way[0] > 0.0 else "start",
-            )
+            arcs.setdefault(f"R{number(radius)}", []).append((piece.points[1], way))
 
+    def room(arc: tuple[FloatArray, FloatArray]) -> float:
+        end = shapely.Point(arc[0] - LEADER * arc[1])
+        return min((float(end.distance(hole)) for hole in ring.interiors), default=0.0)
 
-def number(value: float) -> str:
-    """Format a length in mm, to a hundredth."""
-    return f"{value:.2f}".rstrip("0").rstrip(".")
+    for words, found in arcs.items():
+        tip, way = max(found, key=room)
+        inner = tip + corner - LEADER * way
+        (tx, ty), (ix, iy) = (tip + corner).tolist(), inner.tolist()
+        sheet.line((ix, iy), (tx, ty), "thin")
+        sheet.arrow((tx, ty), (float(way[0]), float(way[1])))
+        sheet.text(
+            (ix - np.sign(way[0]) * 0.5, iy - 0.4 * TEXT),
+            words,
+            "end" if way[0] > 0.0 else "start",
+        )

@@ -16,7 +16,8 @@ from optisense.design import Role
 from optisense.geometry import TriangleMesh
 from optisense.workshop import export
 from optisense.workshop._drawings import cut_file, drawing
-from optisense.workshop._plates import Circle, plates
+from optisense.workshop._plates import Circle, Plate, plates
+from optisense.workshop._sheet import LETTER, TEXT
 from optisense.workshop.shapes import Shape, shapes
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -108,8 +109,58 @@ def test_holes_have_diameters_and_places() -> None:
         [10.0, 3.0]
     )
     told = texts(drawing(plate, "a <design>"))
-    assert "⌀6 at (10, 10)" in told and "a <design>; mm, 1:1" in told
+    assert {"A", "B", "A: ⌀20 at (10, 10)", "B: ⌀6 at (10, 10)"} <= set(told)
+    assert "a <design>; mm, 1:1" in told
     assert [each["0"] for each in entities(cut_file(plate))] == ["CIRCLE", "CIRCLE"]
+
+
+def extruded(outline: shapely.Polygon, name: str = "it") -> Plate:
+    """A plate of 3 mm with this outline."""
+    solid = trimesh.creation.extrude_polygon(outline, 3.0)
+    mesh = TriangleMesh(solid.vertices, solid.faces).welded()
+    (plate,) = plates([Shape(name, Role.BLOCKER, None, mesh)])
+    return plate
+
+
+def boxes_of_texts(svg: str) -> list[shapely.Polygon]:
+    """What each text covers on the sheet, mm, with letters as wide as the widest usual font's."""
+    found = []
+    for each in ElementTree.fromstring(svg).iter(f"{SVG}text"):
+        wide = LETTER * len(each.text or "")
+        left = {"start": 0.0, "middle": -0.5 * wide, "end": -wide}[each.attrib["text-anchor"]]
+        x, y = float(each.attrib["x"]), float(each.attrib["y"])
+        box = shapely.box(x + left, y - TEXT, x + left + wide, y)
+        is_upright = "transform" in each.attrib
+        found.append(shapely.affinity.rotate(box, -90.0, origin=(x, y)) if is_upright else box)
+    return found
+
+
+def test_holes_are_lettered_and_no_text_covers_another() -> None:
+    outline = shapely.box(0, 0, 40, 25).buffer(-4).buffer(4, quad_segs=16)
+    for x, y, radius in ((8, 8, 1.6), (8, 12.5, 1.6), (32, 17, 2.5)):
+        outline = outline.difference(shapely.Point(x, y).buffer(radius, quad_segs=16))
+    slot = shapely.LineString([(21, 10), (21, 16)]).buffer(1.5, quad_segs=16)
+    outline = outline.difference(slot).difference(shapely.box(25, 4, 29, 10))
+    svg = drawing(extruded(outline), "a design")
+    rows = {text.split(": ", 1)[1] for text in texts(svg) if text[1:3] == ": "}
+    assert rows == {
+        "⌀3.2 at (8, 8)", "⌀3.2 at (8, 12.5)", "⌀5 at (32, 17)",
+        "slot 9 x 3 at (21, 13), 90 degrees to x", "opening 4 x 6, lower left corner at (25, 4)",
+    }  # fmt: skip
+    assert {"A", "B", "C", "D", "E", "R4"} <= set(texts(svg))
+    boxes = boxes_of_texts(svg)
+    assert not [
+        (one, other) for k, one in enumerate(boxes) for other in boxes[:k]
+        if one.intersection(other).area > 1e-9
+    ]  # fmt: skip
+
+
+def test_steps_have_their_distances_from_the_corner() -> None:
+    outline = shapely.box(0, 0, 20, 20).difference(shapely.box(8, 5, 20, 15))
+    told = texts(drawing(extruded(outline), "a design"))
+    assert sorted(told[:8]) == sorted(["20", "20", "3", "0", "8", "0", "5", "15"])
+    plain = texts(drawing(extruded(shapely.box(0, 0, 20, 10)), "a design"))
+    assert sorted(plain[:3]) == ["10", "20", "3"] and "0" not in plain
 
 
 def test_edges_behind_a_plate_are_hidden() -> None:
@@ -122,6 +173,17 @@ def test_edges_behind_a_plate_are_hidden() -> None:
         each.attrib["d"] for each in root.iter(f"{SVG}path") if each.attrib["class"] == "hidden"
     ]
     assert len(hidden) == 2
+
+
+def test_the_view_at_the_right_is_from_the_right() -> None:
+    """The notch at the right of a plate is seen there, and one at the left is hidden."""
+    for notch, expected in ((18, "edge"), (0, "hidden")):
+        outline = shapely.box(0, 0, 20, 20).difference(shapely.box(notch, 5, notch + 2, 15))
+        root = ElementTree.fromstring(drawing(extruded(outline), "it"))
+        lines = [each.attrib for each in root.iter(f"{SVG}path") if "Z" not in each.attrib["d"]]
+        found = {each["class"] for each in lines if each["class"] in ("edge", "hidden")
+                 and each["d"].split()[2] == each["d"].split()[5]}  # fmt: skip
+        assert found == {expected}
 
 
 def test_which_parts_are_plates() -> None:
