@@ -18,7 +18,7 @@ from optisense.text import to_html
 from optisense.workshop._dxf import Pair, arc, circle, dxf, line
 from optisense.workshop._plates import Circle, Plate
 from optisense.workshop._profiles import OutlinePiece, centre_of
-from optisense.workshop._sheet import STYLE, TEXT, Sheet, number
+from optisense.workshop._sheet import LETTER, STYLE, TEXT, Sheet, number
 
 GAP = 16.0
 """Distance between two views, mm: room for a dimension and its number."""
@@ -35,9 +35,6 @@ STEPS_OF_CURVE = 4
 
 SHARP = 20.0
 """Angle from which on a corner counts as an edge that is visible from the side, degrees."""
-
-LEAST_TITLE = 90.0
-"""Smallest width of the sheet, mm, which the lines of the title need."""
 
 LEADER = 8.0
 """Length of the line from an arc to its radius, mm."""
@@ -108,7 +105,8 @@ def drawing(plate: Plate, title: str) -> str:
     front = bottom + OFF
     plan = front + thick + GAP
     side = left + width + GAP
-    whole = max(side + thick + OFF + BORDER + 2.0 * TEXT, LEAST_TITLE), plan + depth + BORDER + OFF
+    widest = 2.0 * BORDER + LETTER * max(len(line) for line in words)
+    whole = max(side + thick + OFF + BORDER + 2.0 * TEXT, widest), plan + depth + BORDER + OFF
     sheet = Sheet(whole[1])
     corner = np.array([left, plan])
     for outline in plate.outlines:

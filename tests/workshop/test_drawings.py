@@ -163,6 +163,12 @@ def test_steps_have_their_distances_from_the_corner() -> None:
     assert sorted(plain[:3]) == ["10", "20", "3"] and "0" not in plain
 
 
+def test_a_sheet_is_as_wide_as_its_longest_line() -> None:
+    svg = drawing(extruded(shapely.box(0, 0, 20, 10), name="w" * 64), "a design")
+    wide = float(ElementTree.fromstring(svg).attrib["viewBox"].split()[2])
+    assert max(box.bounds[2] for box in boxes_of_texts(svg)) < wide
+
+
 def test_edges_behind_a_plate_are_hidden() -> None:
     """A trapezium whose long side is in front: its corners behind are dashed in that view."""
     outline = [(0.0, 0.0), (30.0, 0.0), (20.0, 10.0), (5.0, 10.0)]
