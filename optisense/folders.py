@@ -306,7 +306,7 @@ def holder_of(folder: Path) -> Holder | None:
         os.close(file)
 
 
-def refuse_to_replace(folder: str | Path, files: Iterable[str], mark: tuple[str, str]) -> None:
+def refuse_to_replace(folder: str | Path, files: Iterable[str], mark: tuple[str, str]) -> bool:
     """Refuse to write results into the folder of a design, or over files of the user.
 
     Args:
@@ -314,6 +314,9 @@ def refuse_to_replace(folder: str | Path, files: Iterable[str], mark: tuple[str,
         files: files that will be written, relative to the folder.
         mark: one of the files and a text in it, by which a folder of earlier results of the same
             kind is recognised; there, files may be replaced.
+
+    Returns:
+        Whether the folder holds earlier results.
 
     Raises:
         OutputError: the folder holds a design, or one of the files exists and is not of such
@@ -327,7 +330,7 @@ def refuse_to_replace(folder: str | Path, files: Iterable[str], mark: tuple[str,
     file, text = mark
     with contextlib.suppress(OSError), (place / file).open("rb") as opened:
         if text.encode() in opened.read(MOST_OF_MARK):
-            return
+            return True
     for name in files:
         if os.path.lexists(place / name):
             raise OutputError(
@@ -335,6 +338,7 @@ def refuse_to_replace(folder: str | Path, files: Iterable[str], mark: tuple[str,
                 where=str(place / name),
                 hint="Name another folder after --out, or remove the file",
             )
+    return False
 
 
 def remove_temporary_files(folder: Path, subfolders: Iterable[str]) -> None:

@@ -13,6 +13,7 @@ from optisense.registry import Registry, must_be
 from optisense.robots._body import SensorBody, sensor_body
 from optisense.robots._mjcf import mjcf
 from optisense.robots._urdf import urdf, without_friction
+from optisense.workshop.export import notes_on_others
 from optisense.workshop.mesh_formats import stl_bytes_of
 from optisense.writing import inside, written_together
 
@@ -97,7 +98,7 @@ def export_robot(
         f"{MESHES}/{each.name}.stl": stl_bytes_of(f"{each.name}, metres", each.mesh)
         for each in meshes
     }
-    refuse_to_replace(
+    again = refuse_to_replace(
         folder, files, (f"{MESHES}/{meshes[0].name}.stl", f"{meshes[0].name}, metres")
     )
     finals = [inside(Path(folder), name) for name in files]
@@ -107,6 +108,7 @@ def export_robot(
     if notes is not None:
         notes += body.notes
         notes += [kind.note(body) for kind in kinds if kind.note is not None]
+        notes += notes_on_others(Path(folder), finals) if again else []
     return finals
 
 

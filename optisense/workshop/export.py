@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -25,6 +26,9 @@ BILL_FILES = ("bill-of-materials.csv", "bill-of-materials.md")
 
 MARK = (BILL_FILES[1], "# Bill of materials: ")
 """File of each export, and a text in it, by which the folder of an earlier one is recognised."""
+
+MOST_NAMED = 10
+"""Largest number of files that a note names: those of several parts in a few formats."""
 
 Writer = Callable[[Path], object]
 
@@ -163,10 +167,36 @@ def _write_all(folder: Path, writers: dict[str, Writer], notes: list[str]) -> li
     """Write each file under a temporary name, and rename them when all are complete; a list that a
     writer returns is added to the notes.
     """
-    refuse_to_replace(folder, writers, MARK)
+    again = refuse_to_replace(folder, writers, MARK)
     finals = [folder / file for file in writers]
     with written_together("the workshop's files") as stage:
         for final, write in zip(finals, writers.values(), strict=True):
             found = write(stage(final))
             notes += found if isinstance(found, list) else []
+    if again:
+        notes += notes_on_others(folder, finals)
     return finals
+
+
+def notes_on_others(folder: Path, written: Sequence[Path]) -> list[str]:
+    """Return a note that names the files beside those of an export, which an earlier one may have
+    written; none if there are no others.
+
+    Args:
+        folder: folder of the export.
+        written: files of the export, in the folder and in its subfolders.
+    """
+    found: list[str] = []
+    for place in dict.fromkeys(path.parent for path in written):
+        with contextlib.suppress(OSError):  # a folder that can be written but not read
+            beside = (path for path in place.iterdir() if path.is_file() and path not in written)
+            found += [path.relative_to(folder).as_posix() for path in beside]
+    found = sorted(name for name in found if not Path(name).name.startswith("."))
+    if not found:
+        return []
+    names = ", ".join(found[:MOST_NAMED])
+    more = f" and {len(found) - MOST_NAMED} more" if len(found) > MOST_NAMED else ""
+    return [
+        "the folder also contains files that this export has not written, such as those of an "
+        f"earlier one: {names}{more}"
+    ]

@@ -9,6 +9,7 @@ import pytest
 from optisense.design import Part, Role, SensorDesign
 from optisense.errors import DesignError, OutputError
 from optisense.geometry import TriangleMesh
+from optisense.robots import export_robot
 from optisense.workshop import FORMATS, ShapeFormat, export
 
 
@@ -54,6 +55,25 @@ def test_a_long_name_keeps_the_file_of_the_moulds_apart(flat: SensorDesign, tmp_
     design = flat.model_copy(update={"name": "n" * 64})
     names = {file.name for file in export(design, tmp_path, "3mf", with_moulds=True)}
     assert {f"{design.name}.3mf", f"{design.name}-moulds.3mf"} <= names
+
+
+def test_files_of_an_earlier_export_are_named(flat: SensorDesign, tmp_path: Path) -> None:
+    """They stay, as the user may need them; and nothing is said of a folder of other files."""
+    notes: list[str] = []
+    (tmp_path / "mine.txt").write_text("")
+    export(flat, tmp_path, "stl", notes)
+    assert not notes
+    renamed = flat.model_copy(deep=True)
+    renamed.parts["holder"] = renamed.parts.pop("guide")
+    renamed.meshes["holder"] = renamed.meshes.pop("guide")
+    export(renamed, tmp_path, "stl", notes)
+    assert len(notes) == 1
+    assert notes[0].endswith("one: guide-cut.dxf, guide-drawing.svg, guide.stl, mine.txt")
+    assert (tmp_path / "guide.stl").exists()
+    told: list[str] = []
+    export_robot(flat, tmp_path / "robot", notes=told)
+    export_robot(renamed, tmp_path / "robot", notes=told)
+    assert told[-1].endswith("one: meshes/guide-hull.stl, meshes/guide.stl")
 
 
 @pytest.mark.parametrize("holds_all", [False, True])
