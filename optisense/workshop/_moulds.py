@@ -175,7 +175,8 @@ def mould_of(gel: Shape, pull: FloatArray) -> Mould:
     low, high = np.array([left, near]) - WALL, np.array([right, far]) + WALL
     front = _box(low, high, parting, top + WALL) - solid
     back = _box(low, high, bottom - WALL, parting) - solid
-    for x, y in ((low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])):
+    # One corner has no pin, so that the halves do not fit if one is turned.
+    for x, y in ((low[0], low[1]), (high[0], low[1]), (low[0], high[1])):
         at = np.array([x, y]) + 0.5 * WALL * np.sign([left + right - 2 * x, near + far - 2 * y])
         back += _rod(at, parting - 1.0, parting + PIN_HEIGHT, PIN)
         hole = PIN + 2.0 * CLEARANCE
