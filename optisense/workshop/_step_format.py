@@ -64,7 +64,7 @@ def write_step(path: Path, shapes: Sequence[Shape], title: str = "sensor") -> li
         if body is None and len(shape.mesh.faces) >= WORTH_IT:
             notes.append(
                 f"{shape.name} is written as {len(shape.mesh.faces):,} triangles, since its exact "
-                "shape is not known: use the CAD model that it is from, where there is one"
+                "shape is not known; a CAD model from which it comes, if any, is exact"
             )
         label = tool.AddShape(_boundary(shape) if body is None else body, False)
         _name(label, shape.name)
