@@ -1,4 +1,6 @@
-"""Checks of the arrangement: solids that overlap, and the picture along straight rays."""
+"""Checks of the arrangement: solids that overlap or leave a film of air, and the picture along
+straight rays.
+"""
 
 from __future__ import annotations
 
@@ -13,13 +15,28 @@ from optisense.design.problems import Diagnostic
 from optisense.design.projection import directions, picture_places, within_view
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
+from optisense.geometry.coincidence import sample_seam
 from optisense.geometry.common_space import common_space
+from optisense.geometry.containment import inside
 from optisense.geometry.rays import ray_hits
 
 EQUAL_INDEX = 1e-6
 """Largest difference of refractive indices for which solids count as one medium; it covers rounding
 of numbers in files.
 """
+
+COINCIDENCE_TOLERANCE = 0.002
+"""Distance (mm) below which faces touch, and thickness below which an overlap is a contact: a tenth
+of the thinnest film that a design holds (0.02 mm). An intended gap (a film of air) must be wider.
+"""
+
+WIDEST_FILM = 0.05
+"""Thickness (mm) up to which a gap beside a contact is taken as unintended: two tessellations of a
+curved face of 10 mm radius with facets of 2 mm are as far apart."""
+
+FILM_SHARE = 0.01
+"""Share of the common face of two solids up to which a film of air is not reported, as pictures
+change by about as much."""
 
 SAMPLES = (8, 6)
 """Number of points across and down the picture at which the sensing surface is looked for."""
@@ -66,6 +83,35 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
                     design.where("parts", other, "priority"),
                     "Move them apart, or give the part that fills the common space the larger "
                     "priority",
+                )
+            )
+    return problems
+
+
+def films(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
+    """Return warnings about solids that touch over a part of a common face and leave a film of air
+    over the rest, as two tessellations of one curved face do.
+
+    Args:
+        meshes: deformed meshes, mm, by part.
+    """
+    problems = []
+    solids = {n: mesh for n, mesh in meshes.items() if design.parts[n].role in TRANSPARENT_SOLIDS}
+    for name, other in combinations(solids, 2):
+        seam = sample_seam(solids[name], solids[other], WIDEST_FILM)
+        gap = seam.heights > COINCIDENCE_TOLERANCE
+        for between, mesh in solids.items():
+            if gap.any() and between not in (name, other):
+                gap[gap] = ~inside(seam.middles[gap], mesh)
+        if FILM_SHARE * len(gap) < gap.sum() < (1.0 - FILM_SHARE) * len(gap):
+            problems.append(
+                Diagnostic(
+                    f"parts '{name}' and '{other}' touch, but leave a film of air of up to "
+                    f"{seam.heights[gap].max():.2g} mm over {gap.sum() * seam.area:.2g} mm²",
+                    design.where("parts", other, "mesh"),
+                    "Give both the same triangles there, or let one reach into the other and "
+                    "give it the larger priority",
+                    severity="warning",
                 )
             )
     return problems

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from optisense.design._focus_checks import focus_problems
 from optisense.design.addressing import get_value
-from optisense.design.arrangement import overlaps
+from optisense.design.arrangement import films, overlaps
 from optisense.design.cage_checks import cage_problems, half_caged, left_lights
 from optisense.design.camera_checks import (
     lens_problems,
@@ -97,6 +97,7 @@ def check_design(
             problems += left_lights(design, meshes)
             if not any(problem.severity == "error" for problem in bent):
                 problems += overlaps(design, meshes)
+                problems += films(design, meshes)
     problems += _check_provenance(design)
     return problems
 

@@ -208,6 +208,20 @@ class TestOverlaps:
         assert check_design(with_plate(design, -3.0, gel, 1.49)) == []
         assert check_design(with_plate(design, -2.999, gel, 1.49)) == []
 
+    def test_a_film_of_air_beside_a_contact(self, design: SensorDesign) -> None:
+        """A vertex of a common face is off it; a gap all over is intended."""
+        apart = with_plate(design, -3.02, 0, 1.49)
+        assert check_design(apart) == []
+        for drop, films in ((0.02, 1), (0.001, 0)):
+            sunk = with_plate(design, -3.0, 0, 1.49)
+            vertices = sunk.meshes["plate"].vertices.copy()
+            inner = np.argmin(np.linalg.norm(vertices - (1.3, 1.0, -2.0), axis=1))
+            vertices[inner, 2] -= drop
+            sunk.meshes["plate"] = sunk.meshes["plate"].with_vertices(vertices)
+            found = [problem.message for problem in check_design(sunk)]
+            assert len(found) == films
+            assert all("'gel' and 'plate' touch, but leave a film of air" in f for f in found)
+
     def test_a_solid_wholly_inside_another(self, design: SensorDesign) -> None:
         gel = design.parts["gel"].priority
         assert "overlap" in only(check_design(with_plate(design, -1.5, gel, 1.49))).message

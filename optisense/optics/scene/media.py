@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.arrangement import EQUAL_INDEX
+from optisense.design.arrangement import COINCIDENCE_TOLERANCE, EQUAL_INDEX
 from optisense.errors import DesignError, MeshError
 from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
@@ -31,11 +31,6 @@ from optisense.geometry.common_space import as_manifold, of_manifold, thick_plac
 from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import TriangleMesh
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
-
-COINCIDENCE_TOLERANCE = 0.002
-"""Distance (mm) below which faces touch, and thickness below which an overlap is a contact: a tenth
-of the thinnest film that a design holds (0.02 mm). An intended gap (a film of air) must be wider.
-"""
 
 CUT_CLEARANCE = 2e-5
 """Clearance (mm) with which a solid is cut out of another: more than the rounding of coordinates in
