@@ -15,12 +15,13 @@ REST = 0.3
 """Time without a change after which a cage is checked, s: drafts of moved objects come first."""
 
 _request = LatestRequest(REST)
-_found: dict[str, list[dict[str, Any]]] = {}
+_found: dict[tuple[int, str], list[dict[str, Any]]] = {}
+"""Warnings by the session id of the scene and the name of the cage."""
 
 
-def warnings_of(key: str) -> list[dict[str, Any]]:
+def warnings_of(scene: bpy.types.Scene, key: str) -> list[dict[str, Any]]:
     """Return the engine's warnings about a cage, each with `severity`, `message` and `hint`."""
-    return _found.get(key, [])
+    return _found.get((scene.session_uid, key), [])
 
 
 def _look() -> None:
@@ -38,7 +39,7 @@ def _take(result: dict[str, Any], scene: bpy.types.Scene) -> None:
     for problem in result["problems"]:
         about = re.match(r"cages\.([^.\[]+)", problem["path"] or "")
         if about:
-            _found.setdefault(about[1], []).append(problem)
+            _found.setdefault((scene.session_uid, about[1]), []).append(problem)
     session.redraw()
 
 

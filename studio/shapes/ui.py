@@ -69,7 +69,7 @@ def _cage(
     along = " x ".join(str(count) for count in values["resolution"])
     text = f"{cage.optisense.key}: {along}, bends {', '.join(values['parts'])}"
     paragraph(layout, text, boxed=True)
-    problems = warnings_of(cage.optisense.key)
+    problems = warnings_of(scene, cage.optisense.key)
     for problem in [*ignored_edits(scene, cage), *problems]:
         message = problem["message"]
         hint = f" {problem['hint']}." if problem["hint"] else ""

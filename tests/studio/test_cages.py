@@ -183,7 +183,8 @@ def test_a_cage_that_would_tear_skin_and_gel_apart_is_told_in_the_panel(
     assert bpy.ops.optisense.new_cage() == {"FINISHED"}
     text = told(lambda text: "tears" in text)
     assert "Put 'gel' into the cage too" in text and "select all of them" in text
-    assert warnings_of("skin")[0]["severity"] == "warning"
+    assert warnings_of(mini, "skin")[0]["severity"] == "warning"
+    assert not warnings_of(bpy.data.scenes.new("Other"), "skin"), "it has a cage of its own"
 
     bpy.ops.optisense.edit_shape()
     lift(objects_of(mini, "CAGE")[0], 2.0)

@@ -51,7 +51,7 @@ def test_a_cage_around_the_skin_alone_is_told(bench: Bench) -> None:
     bench.until("not kinds('CAGE')")
     bench.press("optisense.new_cage")
     bench.until("len(kinds('CAGE')) == 1")
-    (told,) = bench.until("part('shapes.cage_warnings').warnings_of('skin')")
+    (told,) = bench.until("part('shapes.cage_warnings').warnings_of(scene(), 'skin')")
     assert "'gel'" in told["message"] and told["hint"] == "Put 'gel' into the cage too"
     bench.bring("optisense.remove_cage", 0.7, across=LAST)
     bench.photograph("cage-of-skin-alone")
@@ -67,7 +67,7 @@ def test_a_cage_is_made_around_two_parts(bench: Bench) -> None:
     bench.until("len(kinds('CAGE')) == 1")
     assert sorted(bench.see(f"{CAGE}['parts']")) == ["gel", "skin"]
     assert bench.see(f"{CAGE}['resolution']") == [3, 3, 3]
-    bench.until("not part('shapes.cage_warnings').warnings_of('skin')")
+    bench.until("not part('shapes.cage_warnings').warnings_of(scene(), 'skin')")
 
 
 def test_parts_follow_a_point_while_it_moves(bench: Bench) -> None:
