@@ -74,9 +74,9 @@ def shadow(evaluation: Evaluation) -> tuple[float, dict[str, Any], dict[str, Any
 
 
 def _image(evaluation: Evaluation, contacts: Sequence[Contact]) -> TactileImage:
-    """Return a small image under the lights of the evaluated design."""
+    """Return a small image of the sensor under contacts."""
     settings = evaluation.settings
-    image = evaluation.model.render(
+    return evaluation.model.render(
         contacts,
         resolution=evaluation.design.camera.size_at(ACROSS),
         photons=SCORE_PHOTONS if settings.photons is None else settings.photons,
@@ -84,5 +84,3 @@ def _image(evaluation: Evaluation, contacts: Sequence[Contact]) -> TactileImage:
         partial=False,
         skin=settings.skin,
     )
-    lights = evaluation.design.lights
-    return image.relight({name: group.channel_flux() for name, group in lights.items()})

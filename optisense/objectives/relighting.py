@@ -263,10 +263,10 @@ class _Relit(Evaluation):
     """An evaluation whose images are sums of layers."""
 
     def __init__(self, relighting: Relighting, design: SensorDesign, whole: bool) -> None:
-        super().__init__(relighting.model, relighting.settings)
+        self._flux = relighting.flux_of(design)
+        super().__init__(relighting.model.relit(design), relighting.settings)
         self._relighting = relighting
         self._lit = design
-        self._flux = relighting.flux_of(design)
         self._whole = whole
 
     @property

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, field
+from typing import Self
 
 import drjit as dr
 import numpy as np
@@ -134,6 +136,14 @@ class OpticalModel(RayModel):
             elif scenes is not self.scenes:
                 self._caches = self._caches.coated(LitScene.of(scenes, not self.is_draft))
         super()._set(design, scenes, view)
+
+    def relit(self, design: SensorDesign) -> Self:
+        """Return the model of a design that differs from this one's only in the colours and powers
+        of its lights and must not be modified. It shares this one's scenes and radiance caches.
+        """
+        other = copy(self)
+        other._design, other._caches = design, self._store
+        return other
 
     def forget_light(self, guide: bool = False) -> None:
         """Drop the radiance caches (hundreds of MB); the next image traces its light again.

@@ -53,6 +53,16 @@ def test_presses_are_those_of_a_rendering_under_these_lights(relighting: Relight
         assert same_light(one.response, other.response)
 
 
+def test_an_objective_may_render_further_images_with_the_model(relighting: Relighting) -> None:
+    design = recoloured(4)
+    small = {"resolution": (40, 30), "photons": 20_000}
+    usual = relighting.model.render(**small).radiance
+    relit = relighting.relit(design).model
+    assert relit.design == design
+    assert same_light(relit.render(**small).radiance, OpticalModel(design).render(**small).radiance)
+    assert same_light(relighting.model.render(**small).radiance, usual)
+
+
 def test_presses_are_those_of_a_rendering_through_all_that_a_camera_does() -> None:
     """Shading and noise belong to places of the picture, and blur reaches into what is cut."""
     design = library.with_imaging(ots.load("gelsight-mini-ideal"), "pi-v2", focus_distance=24.0)
