@@ -72,9 +72,10 @@ def check_design(
         problems += _check_mesh(design, name, meshes)
     problems += unit_slips(design, meshes)
     problems += lens_problems(design.camera, design.where("camera", "fov"))
-    problems += uniqueness_problems(design)
     of_kinds = _check_kinds(design)
-    problems += [] if of_kinds else index_problems(design)  # which calls methods of kinds
+    if not of_kinds:  # these call methods of kinds
+        problems += uniqueness_problems(design)
+        problems += index_problems(design)
     problems += _check_finishes(design, meshes)
     problems += _check_lights(design, light_names)
     problems += of_kinds

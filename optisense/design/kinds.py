@@ -6,7 +6,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, PrivateAttr
@@ -18,6 +18,30 @@ from optisense.own_code import error_of_own_code
 from optisense.registry import Registry, must_derive
 from optisense.text import brief
 from optisense.untrusted_files import MOST_DATA, inside, read_bytes
+
+OWN_PACKAGE = __name__.partition(".")[0]
+"""Name of the package whose kinds return what the limits of their fields allow."""
+
+ROUNDING = 1e-6
+"""Largest excess of a level over 1 that is rounding; single precision has steps of 6e-8 there."""
+
+
+class Limits(NamedTuple):
+    """Limits of a value; see `are_numbers`.
+
+    Attributes:
+        words: the limits as text.
+    """
+
+    words: str
+    shape: tuple[int, ...] = ()
+    low: float = -math.inf
+    high: float = math.inf
+    above: float = -math.inf
+
+    def allow(self, value: object) -> bool:
+        """Return whether a value is within the limits."""
+        return are_numbers(value, self.shape, self.low, self.high, above=self.above)
 
 
 class KindModel(Model):
@@ -117,6 +141,32 @@ class KindModel(Model):
             OptiSenseError: a result can't be used.
         """
 
+    def _check_own_kind(self) -> None:
+        """Check what the methods of a kind of another package return, where those of this package
+        need no check; interfaces override it.
+
+        Raises:
+            OptiSenseError: a result can't be used.
+        """
+
+    def _require(self, method: str, result: object, limits: Limits) -> None:
+        """Raise LibraryError unless a method has returned numbers within limits.
+
+        Arrays must be NumPy's.
+        """
+        if limits.allow(result) and (isinstance(result, np.ndarray) or not limits.shape):
+            return
+        found = brief(repr(result))
+        if isinstance(result, np.ndarray) and result.dtype.kind in "iuf" and result.size:
+            span = f"from {result.min():g} to {result.max():g}"
+            numbers = span if np.isfinite(result).all() else "that are not finite"
+            found = f"an array of shape {result.shape} with numbers {numbers}"
+        raise LibraryError(
+            f"{method}() of the {self.kinds.noun} '{self.kind}' returned {found}",
+            hint=f"It must return {limits.words}: change the numbers of the kind, or repair its "
+            "class",
+        )
+
     def verify(self) -> None:
         """Check whether it can be used: by `check`, and by what its methods return.
 
@@ -126,6 +176,8 @@ class KindModel(Model):
         try:
             self.check()
             self._check_results()
+            if type(self).__module__.partition(".")[0] != OWN_PACKAGE:
+                self._check_own_kind()
         except OptiSenseError:
             raise
         except Exception as error:
@@ -190,6 +242,16 @@ class KindModel(Model):
         for field, file in self.files().items():
             setattr(self, field, name(file))
         return self.located(folder)
+
+
+def fills(value: object, shape: tuple[int, ...]) -> bool:
+    """Return whether a value is an array that NumPy can broadcast to a shape."""
+    if not isinstance(value, np.ndarray):
+        return False
+    try:
+        return np.broadcast_shapes(value.shape, shape) == shape
+    except ValueError:
+        return False
 
 
 def are_numbers(

@@ -17,15 +17,25 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import Field
 
+from optisense.array_types import FloatArray
 from optisense.design.fields import Number
-from optisense.design.kinds import KindModel
-from optisense.errors import DesignError
+from optisense.design.kinds import KindModel, Limits
+from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
 
 NEWTON_STEPS = 16
 """Number of Newton steps in `undistort`, with those that are halved. Of 4,000 random lenses that do
 not fold up to the picture's corners, all are inverted to 1e-9 with 16, and 2 are not with 12.
 """
+
+TRIED_WITHIN = 0.3
+"""Largest coordinate of the points at which own kinds are tried: some 17 degrees off the axis."""
+
+STEP = 1e-5
+"""Difference of coordinates by which derivatives are tried; their error is near 1e-10."""
+
+SAME_SLOPE = 1e-4
+"""Largest difference of derivatives, relative to the largest of them, that counts as rounding."""
 
 Share = Annotated[Number, Field(ge=0.0, le=1.0)]
 
@@ -59,6 +69,36 @@ class LensDistortion(KindModel):
         description="point where the lens's axis meets the picture, in shares of its width and "
         "height from the top left",
     )
+
+    def _check_own_kind(self) -> None:
+        """Check its coefficients, and its derivatives against difference quotients near the axis.
+
+        Raises:
+            LibraryError: a number is not finite, or the derivatives are not those of `distort`.
+        """
+        numbers = self.coefficients()
+        kept = np.asarray(numbers)
+        self._require("coefficients", kept, Limits("a tuple of finite numbers", (kept.size,)))
+        x, y = np.meshgrid(*(np.linspace(-TRIED_WITHIN, TRIED_WITHIN, count) for count in (5, 4)))
+        shape = (2, *x.shape)
+        words = "arrays of finite numbers in the shape of x and y"
+
+        def shown(off_x: float, off_y: float) -> FloatArray:
+            found = np.array(self.distort(x + off_x, y + off_y, numbers))
+            self._require("distort", found, Limits(f"two {words}", shape))
+            return found
+
+        across = (shown(STEP, 0.0) - shown(-STEP, 0.0)) / (2.0 * STEP)
+        down = (shown(0.0, STEP) - shown(0.0, -STEP)) / (2.0 * STEP)
+        slopes = [across[0], down[0], across[1], down[1]]
+        told = np.array(np.broadcast_arrays(x, *self.jacobian(x, y, numbers))[1:])
+        self._require("jacobian", told, Limits(f"four {words}", (4, *x.shape)))
+        if np.abs(told - slopes).max() > SAME_SLOPE * max(1.0, np.abs(slopes).max()):
+            raise LibraryError(
+                f"jacobian() of the {self.kinds.noun} '{self.kind}' does not return the "
+                "derivatives of distort()",
+                hint="Repair its class: return dx/dx, dx/dy, dy/dx and dy/dy",
+            )
 
     @abstractmethod
     def coefficients(self) -> tuple[float, ...]:

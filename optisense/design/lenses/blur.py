@@ -7,12 +7,12 @@ width, so that it does not depend on the resolution of a render.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from optisense.array_types import FloatingArray
-from optisense.design.kinds import KindModel
+from optisense.design.kinds import KindModel, Limits, fills
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
@@ -44,6 +44,13 @@ class LensView(Protocol):
         """Scale in the middle of the picture, in widths of the picture per radian."""
 
 
+class _SomeView(NamedTuple):
+    """Camera by which own kinds are tried."""
+
+    resolution: tuple[int, int] = (640, 480)
+    angle_scale: float = 1.0
+
+
 class LensBlur(KindModel):
     """The point spread function of a lens; each kind is a subclass."""
 
@@ -59,6 +66,19 @@ class LensBlur(KindModel):
 
     by_depth: ClassVar[bool] = False
     """Whether it depends on the distance of the scene."""
+
+    def _check_own_kind(self) -> None:
+        """Check the deviation from afar up to 10 mm.
+
+        Raises:
+            LibraryError: it is not finite, is negative, or has another shape.
+        """
+        vergence = np.linspace(0.0, 0.1, 20).reshape(4, 5) if self.by_depth else np.zeros((1, 1))
+        found = np.asarray(self.deviation(_SomeView(), vergence))
+        if fills(found, vergence.shape):
+            found = np.broadcast_to(found, vergence.shape)
+        words = "an array in the shape of the vergence, finite and not negative"
+        self._require("deviation", found, Limits(words, vergence.shape, low=0.0))
 
     @abstractmethod
     def deviation(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:

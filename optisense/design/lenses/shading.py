@@ -14,10 +14,13 @@ from pydantic import Field
 
 from optisense.array_types import FloatingArray
 from optisense.design.fields import Fraction
-from optisense.design.kinds import KindModel
-from optisense.design.lenses.film import FilmPlaces
+from optisense.design.kinds import KindModel, Limits
+from optisense.design.lenses.film import FilmPlaces, film_places
 from optisense.errors import DesignError
 from optisense.registry import Registry
+
+ABOVE_0 = Limits("an array (h, w, 3) of finite numbers above 0", (4, 5, 3), above=0.0)
+"""Limits of transmission and gain in the small picture by which own kinds are tried."""
 
 
 class LensShading(KindModel):
@@ -37,6 +40,16 @@ class LensShading(KindModel):
     corrected: Fraction = Field(
         default=0.0, description="share of the dimming that the camera's processor undoes"
     )
+
+    def _check_own_kind(self) -> None:
+        """Check the transmission over a small picture, and its correction.
+
+        Raises:
+            LibraryError: a number is not above 0, or the result is of another shape.
+        """
+        found = self.transmission(film_places(*ABOVE_0.shape[:2]))
+        self._require("transmission", found, ABOVE_0)
+        self._require("correction", self.correction(found), ABOVE_0)
 
     @abstractmethod
     def transmission(self, places: FilmPlaces) -> FloatingArray:

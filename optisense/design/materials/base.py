@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.fields import Name
-from optisense.design.kinds import KindModel, are_numbers
+from optisense.design.kinds import KindModel, Limits
 from optisense.design.parts import Role
 from optisense.design.reflectance import fresnel_metal
 from optisense.errors import DesignError, LibraryError
@@ -91,20 +90,6 @@ class Reflection:
         return np.asarray((1.0 - self.specularity) * diffuse + self.specularity * metal)
 
 
-class Limits(NamedTuple):
-    """Limits of a value; see `are_numbers`.
-
-    Attributes:
-        words: the limits as text.
-    """
-
-    words: str
-    shape: tuple[int, ...] = ()
-    low: float = -math.inf
-    high: float = math.inf
-    above: float = -math.inf
-
-
 SHARE = Limits("a number within 0..1", low=0.0, high=1.0)
 """Limits of a share or a GGX roughness."""
 
@@ -143,7 +128,7 @@ def _check_result(owner: KindModel, method: str, result: object, expected: type)
     for name, limits in LIMITS[expected].items():
         value = getattr(result, name)
         optional = name == "indices" and value is None
-        if not (optional or are_numbers(value, *limits[1:4], above=limits.above)):
+        if not (optional or limits.allow(value)):
             raise LibraryError(
                 f"{returned} a {expected.__name__} whose {name} is {brief(repr(value))}",
                 hint=f"Its {name} must be {limits.words}: change the numbers of the kind, or "

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatingArray
 from optisense.design.kinds import KindModel
+from optisense.design.responses.base import LEVELS, ramp
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
@@ -27,6 +28,14 @@ class ToneCurve(KindModel):
             "points": "optisense.design.responses._points_curve:PointsCurve",
         },
     )
+
+    def _check_own_kind(self) -> None:
+        """Check the stored levels of a ramp.
+
+        Raises:
+            LibraryError: a level is not within 0 to 1, or they are of another shape.
+        """
+        self._require("curve", self.curve(ramp(1.0)), LEVELS)
 
     @abstractmethod
     def curve(self, linear: FloatingArray) -> NDArray[np.float64]:

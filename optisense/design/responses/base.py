@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from typing import Any, ClassVar
 
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatingArray
 from optisense.design.colour import srgb_curve
-from optisense.design.kinds import KindModel
+from optisense.design.kinds import ROUNDING, KindModel, Limits
 from optisense.errors import DesignError
 from optisense.registry import Registry
 
@@ -18,6 +19,15 @@ EXPOSURE_TARGET = 0.55
 """Level (of 1, before the transfer curve) to which automatic exposure maps the 95th percentile of
 the brightest channel; it leaves room for highlights.
 """
+
+RAMP = (4, 5, 3)
+"""Shape of the small picture by which own kinds are tried."""
+
+FROM_0 = Limits("an array in the shape of the levels, finite and not negative", RAMP, low=0.0)
+"""Limits of levels that fill pixels."""
+
+LEVELS = Limits("an array in the shape of the levels, 0 to 1", RAMP, 0.0, 1.0 + ROUNDING)
+"""Limits of a sensor's reading and of stored levels."""
 
 _READINGS = {"respond", "filled"}
 """Methods that turn exposed levels into those of the sensor; a kind may override either or both."""
@@ -37,6 +47,20 @@ class CameraResponse(KindModel):
         DesignError,
         {"full-well": "optisense.design.responses.full_well:FullWellResponse"},
     )
+
+    def _check_own_kind(self) -> None:
+        """Check what it makes of a ramp from the dark to twice a full pixel.
+
+        Raises:
+            LibraryError: a level is beyond its limits, or the result is of another shape.
+        """
+        exposed = ramp(2.0)
+        reading = self.respond(exposed, RAMP[1])
+        self._require("respond", reading, LEVELS)
+        self._require("filled", self.light_in_pixels(exposed, RAMP[1]), FROM_0)
+        self._require("curve", self.curve(reading), LEVELS)
+        self._require("full_level", self.full_level(), Limits("a number above 0", above=0.0))
+        self._require("reach", self.reach(RAMP[1]), Limits("a number from 0 up", low=0.0))
 
     @abstractmethod
     def respond(self, exposed: FloatingArray, width: int | None = None) -> NDArray[np.float32]:
@@ -107,6 +131,11 @@ class CameraResponse(KindModel):
         seen = light[light > 0]
         level = float(np.percentile(seen, 95)) if seen.size else 0.0
         return EXPOSURE_TARGET * self.full_level() / level if level > 0 else 1.0
+
+
+def ramp(top: float) -> NDArray[np.float32]:
+    """Return levels (`RAMP`) from 0 to `top`."""
+    return np.linspace(0.0, top, math.prod(RAMP), dtype=np.float32).reshape(RAMP)
 
 
 def brightest(image: FloatingArray) -> FloatingArray:
