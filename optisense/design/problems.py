@@ -23,6 +23,9 @@ MAX_EXAMINED = 100
 of thousands.
 """
 
+NOT_INSTALLED = "It may be a kind of a package that is not installed here"
+"""Last sentence of the hint about an unknown kind."""
+
 Path = tuple[str | int, ...]
 Lines = dict[Path, int]
 
@@ -149,6 +152,8 @@ def _problems(
                 f"'{dotted(path)}' is missing"
             )  # fmt: skip
             hint = suggestion(tag, known) if known[0] else None
+            if tag and not (hint or "").endswith("?"):
+                hint = ". ".join(filter(None, (hint, NOT_INSTALLED)))
             found.append(Diagnostic(message, _place(path, where, lines), hint))
             continue
         cause = context.get("error")

@@ -19,7 +19,7 @@ from optisense.design.emitters import SpotEmitter, Window
 from optisense.design.fields import Positive
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import Role
-from optisense.errors import DesignError
+from optisense.errors import DesignError, LibraryError
 
 COSINE_POWER = '''"""A lamp of another package."""
 
@@ -251,6 +251,30 @@ def test_a_lamp_that_returns_what_cannot_be_simulated_is_refused(
     ((message, where, _),) = problems(emitter=Flawed(**fields))
     assert words in message and "test-flawed" in message
     assert where.startswith("lights.") and where.endswith(".emitter")
+
+
+@pytest.mark.parametrize("result", [1.0, [1.0, 0.5], np.ones(3), None])
+def test_an_intensity_that_is_no_array_over_the_angles_is_refused(
+    result: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Flawed, "relative_intensity", lambda *given: result)
+    with pytest.raises(LibraryError, match="the intensity of an emitter") as found:
+        Flawed().verify()
+    assert found.value.hint == "Return an array in the shape of the angles"
+
+
+def test_reflections_and_media_of_arrays_are_those_of_tuples() -> None:
+    half = Reflection(np.full(3, 0.5), eta=[1.5, 1.5, 1.5])  # type: ignore[arg-type]
+    assert half == Reflection((0.5, 0.5, 0.5), eta=(1.5, 1.5, 1.5)) and hash(half)
+    absorbing = Medium(1.4, absorption=np.full(3, 0.1))  # type: ignore[arg-type]
+    assert absorbing == Medium(1.4, absorption=(0.1, 0.1, 0.1))
+
+
+def test_an_unknown_kind_may_be_of_a_package_that_is_not_installed() -> None:
+    with pytest.raises(DesignError, match="unknown kind 'powder' at 'coating") as found:
+        sensors.load("builtin:gelsight-mini-ideal").coating = {"kind": "powder"}  # type: ignore[assignment]
+    hint = str(found.value.hint)
+    assert hint.startswith("Known: flake, ") and hint.endswith("package that is not installed here")
 
 
 def test_a_lamp_that_returns_what_can_be_simulated_is_not_refused() -> None:

@@ -13,7 +13,7 @@ from pydantic import Field
 from optisense.array_types import FloatArray
 from optisense.design.emitters._intensity import Intensity
 from optisense.design.fields import DEGREES, Number
-from optisense.design.kinds import KindModel, are_numbers
+from optisense.design.kinds import KindModel, are_numbers, fills
 from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
 from optisense.text import brief
@@ -164,6 +164,11 @@ class LightModel(KindModel):
         azimuth = np.linspace(0.0, 360.0, AZIMUTHS)
         polar = np.arange(0.0, 180.0 + COARSE_POLAR, COARSE_POLAR)
         around = self.relative_intensity(polar[:, None], azimuth[None, :])
+        if not fills(around, np.broadcast_shapes(polar[:, None].shape, azimuth[None, :].shape)):
+            raise LibraryError(
+                f"the intensity of an emitter of kind '{self.kind}' is {brief(repr(around))}",
+                hint="Return an array in the shape of the angles",
+            )
         values = np.concatenate([np.ravel(around), np.ravel(self.intensity().values)])
         if not are_numbers(values, values.shape, low=0.0) or values.max() <= 0.0:
             raise LibraryError(

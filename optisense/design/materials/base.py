@@ -41,6 +41,9 @@ class Medium:
     absorption: RGB = (0.0, 0.0, 0.0)
     indices: RGB | None = None
 
+    def __post_init__(self) -> None:
+        _make_tuples(self)
+
 
 @dataclass(frozen=True)
 class Reflection:
@@ -60,6 +63,9 @@ class Reflection:
     roughness: float = 1.0
     eta: RGB = (1.0, 1.0, 1.0)
     k: RGB = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _make_tuples(self)
 
     @property
     def is_black(self) -> bool:
@@ -88,6 +94,13 @@ class Reflection:
         metal = fresnel_metal(1.0, self.eta, self.k)
         diffuse = np.array(self.reflectance)
         return np.asarray((1.0 - self.specularity) * diffuse + self.specularity * metal)
+
+
+def _make_tuples(result: Medium | Reflection) -> None:
+    """Replace arrays and lists in it, which can't be compared and hashed, by tuples."""
+    for name, value in vars(result).items():
+        if isinstance(value, np.ndarray | list):
+            object.__setattr__(result, name, tuple(np.asarray(value).tolist()))
 
 
 SHARE = Limits("a number within 0..1", low=0.0, high=1.0)
