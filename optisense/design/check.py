@@ -21,9 +21,9 @@ from optisense.design.limits import placed_things, unit_slips
 from optisense.design.material_checks import absorption_problems, index_problems
 from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.problems import Diagnostic, invalid_values
+from optisense.design.problems import Diagnostic, invalid_values, kind_problems
 from optisense.design.sensor_design import SensorDesign
-from optisense.errors import DesignError, MeshError, OptiSenseError
+from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.near import suggestion
@@ -72,7 +72,7 @@ def check_design(
         problems += _check_mesh(design, name, meshes)
     problems += unit_slips(design, meshes)
     problems += lens_problems(design.camera, design.where("camera", "fov"))
-    of_kinds = _check_kinds(design)
+    of_kinds = kind_problems(design)
     if not of_kinds:  # these call methods of kinds
         problems += uniqueness_problems(design)
         problems += index_problems(design)
@@ -161,18 +161,6 @@ def _check_lights(design: SensorDesign, light_names: Collection[str] | None) -> 
                     unknown_light_hint(group.model, light_names),
                 )
             )
-    return problems
-
-
-def _check_kinds(design: SensorDesign) -> list[Diagnostic]:
-    """Return the problems of emitters, materials and others, and those that their classes have."""
-    problems: list[Diagnostic] = []
-    for path, value in design.values_of_kinds().items():
-        try:
-            value.verify()
-        except OptiSenseError as error:
-            place = error.where or design.where(*path)
-            problems.append(Diagnostic(error.message, place, error.hint))
     return problems
 
 

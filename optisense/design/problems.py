@@ -11,7 +11,7 @@ from pydantic import BaseModel, ValidationError
 from optisense.design.fields import InconsistentValueError, Model
 from optisense.design.kinds import KindModel
 from optisense.design.sensor_design import SensorDesign, dotted
-from optisense.errors import DesignError
+from optisense.errors import DesignError, OptiSenseError
 from optisense.near import near_match, suggestion
 from optisense.text import brief
 
@@ -112,6 +112,25 @@ def invalid_values(design: SensorDesign) -> list[Diagnostic]:
         where = "" if design._source is None else str(design._source)
         return _problems(error, data, where, design._lines, type(design))
     return []
+
+
+def kind_problems(design: SensorDesign, before: SensorDesign | None = None) -> list[Diagnostic]:
+    """Return the problems of emitters, materials and others, and those that their classes have.
+
+    Args:
+        before: a design whose values have none; equal values are not checked again.
+    """
+    known = {} if before is None else before.values_of_kinds()
+    problems: list[Diagnostic] = []
+    for path, value in design.values_of_kinds().items():
+        if known.get(path) == value:
+            continue
+        try:
+            value.verify()
+        except OptiSenseError as error:
+            place = error.where or design.where(*path)
+            problems.append(Diagnostic(error.message, place, error.hint))
+    return problems
 
 
 def _problems(

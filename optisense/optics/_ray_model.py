@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from optisense.design import SensorDesign, set_value
+from optisense.design.problems import kind_problems, raise_problems
 from optisense.design.responses import PictureChain
 from optisense.design.sensor_design import refuse_no_design
 from optisense.geometry import Contact, Indenter, SensingSurface, TriangleMesh
@@ -72,6 +73,7 @@ class RayModel:
         self.variant = use_variant(variant)
         keep_freed_memory()
         self._design = design.copy()
+        _refuse_impossible_kinds(self._design, None if before is None else before._design)
         known = None if before is None else before.scenes
         assembly = self._assembled(None if known is None else known.assembly)
         self.scenes: SensorScenes = SensorScenes(assembly, self._design.coating, known)
@@ -143,6 +145,7 @@ class RayModel:
         """
         refuse_no_design(design)
         new, old = design.copy(), self._design
+        _refuse_impossible_kinds(new, old)
         if _shapes(old) != _shapes(new) or old.meshes != new.meshes:
             assembly = assemble(new, self.scenes.assembly, self.bends_media)
             scenes = SensorScenes(assembly, new.coating, self.scenes)
@@ -294,6 +297,15 @@ class RayModel:
         """Return the scenes of one image on an elastic skin."""
         pressed = self.pressed(contacts)
         return self.scenes.deformed(self._view.gel.mesh(contacts), pressed)
+
+
+def _refuse_impossible_kinds(design: SensorDesign, before: SensorDesign | None) -> None:
+    """Raise DesignError if an emitter, material or another kind can't be simulated.
+
+    Args:
+        before: a design whose values can be; only those that differ are checked.
+    """
+    raise_problems(kind_problems(design, before), f"design '{design.name}'")
 
 
 def _shapes(design: SensorDesign) -> tuple[Any, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache, partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -12,6 +12,7 @@ from comparing import ROUNDING, SCORE_ROUNDING, TURNED_BESIDE_CONTACT, same_ligh
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
+from optisense.design.materials import CoatingModel, Reflection
 from optisense.errors import ContactError, DesignError, LibraryError, RenderError
 from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
@@ -210,6 +211,27 @@ def test_a_design_that_cannot_be_built_leaves_the_model_as_it_was() -> None:
         used.update("lights.red.model", "no-such-led")
     assert used.design.lights["red"].model == design().lights["red"].model
     assert np.array_equal(used.chief_rays(PIXELS).points, before)
+
+
+class Bright(CoatingModel):
+    """A coating whose class allows any reflectance."""
+
+    kind: Literal["test-bright"] = "test-bright"
+    white: float
+
+    def reflection(self) -> Reflection:
+        return Reflection((self.white, self.white, self.white))
+
+
+def test_a_coating_that_returns_more_light_than_it_gets_is_not_rendered() -> None:
+    possible = set_value(design(), "coating", Bright(white=0.5))
+    impossible = set_value(possible, "coating.white", 1.5)
+    used = OpticalModel(possible, "llvm")
+    with pytest.raises(DesignError, match=r"reflectance is \(1\.5"):
+        used.set_design(impossible)
+    assert used.design == possible
+    with pytest.raises(DesignError, match=r"reflectance is \(1\.5"):
+        OpticalModel(impossible, "llvm")
 
 
 def test_a_contact_leaves_no_trace_in_the_next_image() -> None:
