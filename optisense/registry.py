@@ -94,9 +94,9 @@ class Registry(Generic[T]):
             module, _, attribute = self._homes[key].partition(":")
             found: T = getattr(import_module(module), attribute)
             return self._registered.get(key, found)  # the import may have registered it
-        for point in entry_points(group=self.group):
-            if point.name == key:
-                return self._loaded(point)
+        offered = self._offered().get(key)
+        if offered is not None:
+            return self._loaded(key, offered)
         raise self._error(
             f"there is no {self.noun} '{name}'",
             hint=suggestion(key, self.names(), limit=MOST_SUGGESTED),
@@ -107,12 +107,19 @@ class Registry(Generic[T]):
         if not isinstance(name, str):  # a value from an untrusted file
             return False
         known = name in self._registered or name in self._homes
-        return known or any(point.name == name for point in entry_points(group=self.group))
+        return known or name.strip().lower() in self._offered()
 
     def names(self) -> list[str]:
         """Return all names: the built-in ones in their order, then all others by the alphabet."""
-        offered = {point.name for point in entry_points(group=self.group)}
-        return [*self.built_in, *sorted((offered | set(self._registered)) - set(self.built_in))]
+        further = set(self._offered()) | set(self._registered)
+        return [*self.built_in, *sorted(further - set(self.built_in))]
+
+    def _offered(self) -> dict[str, list[EntryPoint]]:
+        """Return the entry points of the group by their names in lower case."""
+        found: dict[str, list[EntryPoint]] = {}
+        for point in entry_points(group=self.group):
+            found.setdefault(point.name.strip().lower(), []).append(point)
+        return found
 
     def loadable(
         self, failures: dict[str, OptiSenseError] | None = None
@@ -120,8 +127,14 @@ class Registry(Generic[T]):
         """Yield name and object of all that can be loaded, in the order of `names`.
 
         Args:
-            failures: dictionary that receives the error of each other object, by its name.
+            failures: dictionary that receives the error of each other object, by its name, and
+                those of packages that use the name of a built-in object.
         """
+        if failures is not None:
+            offered = self._offered()
+            failures |= {
+                name: self._taken(name, offered[name]) for name in self.built_in if name in offered
+            }
         for name in self.names():
             try:
                 yield name, self.find(name)
@@ -148,19 +161,44 @@ class Registry(Generic[T]):
                 del self._registered[name]
             self._registered.update(before)
 
-    def _loaded(self, point: EntryPoint) -> T:
+    def _loaded(self, name: str, points: list[EntryPoint]) -> T:
+        """Return the object of the only entry point of a name, and register it."""
+        if len({(point.value, _package(point)) for point in points}) > 1:
+            raise self._taken(name, points)
+        point = points[0]
+        where = f"{point.value}, of {_package(point)}"
+        if point.name != name:
+            raise self._error(
+                f"'{point.name}' can't be the name of {with_article(self.noun)}",
+                where=where,
+                hint="The package must give its entry point a name in lower case",
+            )
         try:
             thing = point.load()
         except Exception as error:
-            package = point.dist.name if point.dist else "an installed package"
             raise self._error(
-                f"the {self.noun} '{point.name}' can't be loaded: {type(error).__name__}: {error}",
-                where=f"{point.value}, of {package}",
+                f"the {self.noun} '{name}' can't be loaded: {type(error).__name__}: {error}",
+                where=where,
                 hint="Repair or remove the package that contains it",
             ) from error
-        if point.name in self._registered:  # the import of its module has registered it
-            return self._registered[point.name]
-        return self.register(point.name, self._adapt(point.name, thing))
+        if name in self._registered:  # the import of its module has registered it
+            return self._registered[name]
+        return self.register(name, self._adapt(name, thing))
+
+    def _taken(self, name: str, points: list[EntryPoint]) -> OptiSenseError:
+        """Return the error about several packages, this one included, with one name."""
+        ours = ["OptiSense Studio"] if name in self._homes else []
+        packages = sorted({_package(point) for point in points})
+        return self._error(
+            f"the {self.noun} '{name}' is in several packages: {', '.join([*ours, *packages])}",
+            where=", ".join(sorted(point.value for point in points)),
+            hint="Remove a package, or give its entry point another name",
+        )
+
+
+def _package(point: EntryPoint) -> str:
+    """Return the name of the package of an entry point."""
+    return point.dist.name if point.dist else "an installed package"
 
 
 def _home(thing: object) -> str:

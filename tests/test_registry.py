@@ -183,6 +183,45 @@ def test_a_package_that_cannot_be_loaded_leaves_the_others_in_all_lists(tmp_path
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 
+def installed(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, points: Mapping[str, str]
+) -> Registry[object]:
+    """A registry of `things` with packages that add one thing each: entry points by package."""
+    for package, point in points.items():
+        info = folder / f"{package.replace('-', '_')}-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+        (info / "entry_points.txt").write_text(f"[optisense.no-such-group]\n{point}\n")
+    monkeypatch.syspath_prepend(folder)
+    return things()
+
+
+def test_a_name_of_two_packages_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    points = {"lab-a": "line = os:getcwd", "lab-b": "line = os:getpid"}
+    registry = installed(tmp_path, monkeypatch, points)
+    with pytest.raises(SearchError, match="the thing 'line' is in several packages: lab-a, lab-b"):
+        registry.find("line")
+
+
+def test_a_package_with_a_built_in_name_is_in_the_list_of_what_is_not_available(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry = installed(tmp_path, monkeypatch, {"lab-a": "home = os:getcwd"})
+    assert registry.find("home") is Path
+    rows, unavailable = listed(registry, lambda name, thing: {"name": name})
+    assert rows == [{"name": "home"}]
+    assert "several packages: OptiSense Studio, lab-a" in unavailable[0]["message"]
+
+
+def test_a_package_with_a_name_in_upper_case_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    registry = installed(tmp_path, monkeypatch, {"lab-a": "Fancy = os:getcwd"})
+    with pytest.raises(SearchError, match="'Fancy' can't be the name of a thing") as found:
+        registry.find("Fancy")
+    assert found.value.where == "os:getcwd, of lab-a"
+
+
 def test_what_cannot_be_described_is_unavailable_unless_it_is_built_in() -> None:
     registry = things()
     registry.register("line", run)
