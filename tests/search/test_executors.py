@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -24,6 +25,7 @@ from optisense.search import SearchProgress, search
 from optisense.search.evaluation.evaluator import DesignEvaluator
 from optisense.search.evaluation.outcome import Outcome
 from optisense.search.executors import ExecutorRunner, ProcessPool, _remote
+from optisense.search.executors._remote_worker import score_trial
 from optisense.search.space.search_space import BoundSpace, SearchSpace
 
 LINE = {"coating.specularity": (0.0, 1.0, 11)}
@@ -151,6 +153,14 @@ def test_any_executor_will_do(two_numbers: BoundSpace, goals: ModuleType) -> Non
 needs_dask = pytest.mark.skipif(
     importlib.util.find_spec("distributed") is None, reason="the extra 'dask' is not installed"
 )
+
+
+def test_a_remote_worker_without_a_package_of_the_search_names_itself_and_the_package() -> None:
+    evaluator = b"cno_such_package\nObjective\n."  # a pickle that names a class of a module
+    with pytest.raises(SetupError, match="No module named 'no_such_package'") as found:
+        score_trial("a search", evaluator, np.zeros(1), 0)
+    assert socket.gethostname() in found.value.message
+    assert "Install the same packages" in str(found.value.hint)
 
 
 def test_without_dask_the_extra_is_named(

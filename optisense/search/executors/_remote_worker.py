@@ -10,7 +10,7 @@ import threading
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.errors import SetupError
+from optisense.errors import OptiSenseError, SetupError
 from optisense.search.evaluation.evaluator import Evaluator
 from optisense.search.evaluation.outcome import Outcome
 
@@ -30,6 +30,9 @@ def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed:
     Args:
         blob: the pickled evaluator, or None if it was sent before by `store_evaluator`.
         vector, seed: point of the trial, (n,), and its seed.
+
+    Raises:
+        SetupError: the evaluator is not known or can't be unpacked here.
     """
     with _one_at_a_time:
         if key not in _evaluators:
@@ -38,7 +41,7 @@ def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed:
                 raise SetupError(
                     "a worker has no evaluator: the study has ended, or the worker has restarted"
                 )
-            evaluator = pickle.loads(known)
+            evaluator = _unpacked(known)
             if getattr(evaluator, "renders", True):
                 from optisense.optics.backend.threads import use_threads
 
@@ -48,6 +51,20 @@ def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed:
         outcome = _evaluators[key](vector, seed)
     object.__setattr__(outcome, "worker", _own_name())
     return outcome
+
+
+def _unpacked(blob: bytes) -> Evaluator:
+    try:
+        evaluator: Evaluator = pickle.loads(blob)
+    except OptiSenseError:
+        raise
+    except Exception as error:
+        raise SetupError(
+            f"the worker {_own_name()} can't read the search: {type(error).__name__}: {error}",
+            hint="Install the same packages on the machines of all workers, with those of own "
+            "kinds and objectives",
+        ) from error
+    return evaluator
 
 
 def store_evaluator(key: str, blob: bytes) -> None:
