@@ -236,12 +236,15 @@ class SensorDesign(Model):
     def values_of_kinds(self) -> dict[tuple[str | int, ...], KindModel]:
         """Return all components that come in kinds and may name files, by path: coating, materials,
         emitters, and the effects of the camera's lens and sensor.
+
+        Dicts in place of objects are left out; see `without_dicts`.
         """
         found: dict[tuple[str | int, ...], KindModel] = {("coating",): self.coating}
         for name, material in self.materials.items():
-            found["materials", name] = material
+            if isinstance(material, KindModel):
+                found["materials", name] = material
         for name, group in self.lights.items():
-            if group.emitter is not None:
+            if isinstance(group, LightGroup) and group.emitter is not None:
                 found["lights", name, "emitter"] = group.emitter
         for name, value in self.camera.kinds_of_imaging().items():
             found["camera", name] = value
@@ -359,6 +362,18 @@ class SensorDesign(Model):
             if path in before:
                 value.located(before[path].folder)
         return design
+
+
+def without_dicts(design: SensorDesign) -> SensorDesign:
+    """Return the design, or a copy if dicts were put in place of materials, parts, light groups or
+    cages, which a copy turns into objects.
+
+    Raises:
+        DesignError: such a dict does not describe one.
+    """
+    groups = (design.materials, design.parts, design.lights, design.cages)
+    given = [each for group in groups for each in group.values()]
+    return design.copy() if any(isinstance(each, Mapping) for each in given) else design
 
 
 def same_mesh(one: TriangleMesh | None, other: TriangleMesh | None) -> bool:

@@ -17,7 +17,7 @@ from optisense.array_types import FloatArray
 from optisense.design import LightGroup, LightModel, check_design, load_design, save_design
 from optisense.design.emitters import SpotEmitter, Window
 from optisense.design.fields import Positive
-from optisense.design.materials import CoatingModel, Material, Medium, Reflection
+from optisense.design.materials import CoatingModel, Dielectric, Material, Medium, Reflection
 from optisense.design.parts import Role
 from optisense.errors import DesignError, LibraryError
 
@@ -268,6 +268,18 @@ def test_reflections_and_media_of_arrays_are_those_of_tuples() -> None:
     assert half == Reflection((0.5, 0.5, 0.5), eta=(1.5, 1.5, 1.5)) and hash(half)
     absorbing = Medium(1.4, absorption=np.full(3, 0.1))  # type: ignore[arg-type]
     assert absorbing == Medium(1.4, absorption=(0.1, 0.1, 0.1))
+
+
+def test_a_dict_in_place_of_a_material_or_a_light_is_what_it_says() -> None:
+    design = sensors.load("builtin:gelsight-mini-ideal")
+    gel = str(design.parts["gel"].material)
+    design.materials[gel] = {"kind": "dielectric", "ior": 1.4}  # type: ignore[assignment]
+    design.lights["red"] = design.lights["red"].model_dump()  # type: ignore[assignment]
+    sensors.check(design)
+    assert design.copy().materials[gel] == Dielectric(ior=1.4)
+    design.materials[gel] = {"kind": "dielectric", "ior": -1.0}  # type: ignore[assignment]
+    with pytest.raises(DesignError, match=r"materials\..*\.ior"):
+        sensors.check(design)
 
 
 def test_an_unknown_kind_may_be_of_a_package_that_is_not_installed() -> None:
