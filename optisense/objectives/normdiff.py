@@ -64,6 +64,14 @@ MOST_WEIGHT = 100.0
 MOST_LEAST_PIXELS = 1_000_000
 """Largest number of pixels that a press may be asked to have; no press has as many."""
 
+LEAST_SHARE = 0.5
+"""Least share of a ball's steepest tilt that the camera must see towards every direction. A press
+that the view's edge cuts half-way between its middle and its rim has this share, and four fifths of
+its tilts; without the others, confusion would be lower. On the built-in sensors, contacts on
+distant walls have the lowest share, 0.79."""
+
+DIRECTIONS = 8
+"""Number of directions in which the tilts are checked, those of RGB2Normal."""
 
 SAMPLE_SHARE = 0.75
 """Share of the camera samples of a pixel that is read together with many others. With all samples,
@@ -207,9 +215,33 @@ def _indentation(
 
     def indentation() -> tuple[NDArray[np.bool_], FloatArray, FloatArray]:
         indented = indented_pixels(press, least_pixels)
-        return indented, *azimuths(press, press.normals[indented])
+        theta, phi = azimuths(press, press.normals[indented])
+        _refuse_cut(press, theta, phi)
+        return indented, theta, phi
 
     return press.derived(("indentation", least_pixels), indentation)
+
+
+def _refuse_cut(press: Press, theta: FloatArray, phi: FloatArray) -> None:
+    """Refuse a press of which the camera sees only a part.
+
+    Args:
+        press: the press.
+        theta, phi: (n,) polar angles and azimuths of its indented pixels, degrees.
+
+    Raises:
+        ObjectiveError: the tilts towards a direction are below `LEAST_SHARE` of the steepest one.
+    """
+    angles = np.arange(DIRECTIONS) * 360.0 / DIRECTIONS
+    towards = [float((theta * np.cos(np.radians(phi - angle))).max()) for angle in angles]
+    least = int(np.argmin(towards))
+    if towards[least] < LEAST_SHARE * press.steepest:
+        raise ObjectiveError(
+            f"the camera sees only a part of {press.name}: tilts of up to "
+            f"{max(towards[least], 0.0):.0f} of {press.steepest:.0f} degrees towards "
+            f"{angles[least]:g} degrees",
+            hint="Move the place so that the camera sees the whole contact",
+        )
 
 
 def confusion(

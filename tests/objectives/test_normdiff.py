@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -131,6 +132,22 @@ def test_the_flat_part_of_a_press_is_not_indented(
     _, parts, _ = normdiff(evaluation_of(press))
     tilt = np.degrees(np.arccos(np.clip(press.normals[press.mask][:, 2], -1, 1)))
     assert parts["places"][0]["pixels"] == (tilt > 1.0).sum() < press.mask.sum()
+
+
+@pytest.mark.parametrize(("edge", "whole"), [(0.7, True), (0.3, False), (-0.5, False)])
+def test_a_press_that_the_view_cuts_has_no_score(
+    edge: float, whole: bool, make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
+) -> None:
+    """The edge is that of the view, in contact radii to the right of the middle."""
+    press = make_press(lambda n: n, pixels=101)
+    assert press.steepest == pytest.approx(np.degrees(np.arccos(0.8)))
+    reach = 1.5 * np.sin(np.radians(press.steepest))
+    cut = replace(press, mask=press.mask & (press.points[..., 0] < edge * reach))
+    if whole:
+        assert normdiff(evaluation_of(cut))[0] < 0.0
+        return
+    with pytest.raises(ObjectiveError, match=r"sees only a part of place 1 .* towards 0 degrees"):
+        normdiff(evaluation_of(cut))
 
 
 def test_too_few_pixels_say_where(
