@@ -188,6 +188,9 @@ def _short_line(
 ) -> ObjectiveError:
     """Return the error about the shortest line of presses, with a resolution that suffices for it:
     lines are one pixel wide, so that their pixels grow in number with the image's width.
+
+    If a line has no pixels and the contact has, the camera sees a part of the contact beside its
+    middle, which all lines cross.
     """
     angles = np.arange(directions if half_lines else directions // 2) * 360.0 / directions
     count, number, angle = min(
@@ -195,11 +198,17 @@ def _short_line(
         for number, press in enumerate(presses)
         for angle in angles.tolist()
     )
-    height, width = presses[number].mask.shape
+    press = presses[number]
+    if count == 0 and np.count_nonzero(press.mask) >= least_pixels:
+        return ObjectiveError(
+            f"the middle of {press.name} is outside the camera's view or at its edge",
+            hint="Move the place so that the camera sees the whole contact",
+        )
+    height, width = press.mask.shape
     needed = width * (least_pixels + 1) / max(count, 1)  # a pixel more or less is chance
     finer = WIDTH_STEP * math.ceil(needed / WIDTH_STEP)
     return ObjectiveError(
-        f"{presses[number].name} has {count} of the {least_pixels} pixels that the line at "
+        f"{press.name} has {count} of the {least_pixels} pixels that the line at "
         f"{angle:g} degrees needs",
         hint=f"Use a higher resolution, such as {finer}x{round(finer * height / width)}",
     )

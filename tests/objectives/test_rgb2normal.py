@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -234,6 +235,15 @@ def test_too_few_pixels_say_where(
     width, height = (int(each) for each in str(told.value.hint).split()[-1].split("x"))
     assert width == height == 40 * (width // 40)
     assert rgb2normal(evaluation_of(make_press(lambda n: n, DEPTH, pixels=width + 1)))[0] > 0.8
+
+
+def test_a_press_whose_middle_is_not_seen_needs_another_place(
+    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
+) -> None:
+    press = make_press(lambda n: n, DEPTH, pixels=101)
+    cut = replace(press, mask=press.mask & (press.points[..., 0] < -0.3))
+    with pytest.raises(ObjectiveError, match=r"middle of place 1 .* Move the place"):
+        rgb2normal(evaluation_of(cut))
 
 
 def test_an_odd_number_of_directions_needs_half_lines(
