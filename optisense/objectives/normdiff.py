@@ -28,8 +28,10 @@ COLOURS = "response"
 proportional to the sensor's response."""
 
 LEAST_NOISE = 1.0 / 255.0
-"""Noise of dark channels, as a share of a full well: one grey level. Relative noise alone would
-distinguish black from nearly black; a real GelSight Mini has noise of 1 to 2 levels everywhere."""
+"""Least noise of a channel, as a share of a full well. Relative noise alone would distinguish black
+from nearly black; a real GelSight Mini has noise of 1 to 2 levels of 255 in the picture everywhere.
+Of a linear camera, this is one of 255 levels; of a picture with the sRGB curve, it is 13 levels
+near black and one at a linear value of 0.24. It exceeds `NOISE` below 0.013."""
 
 THETA_WEIGHT = 1.0
 """Weight of the range of tilts, without a unit; equal to `PHI_WEIGHT`."""
