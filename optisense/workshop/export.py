@@ -144,8 +144,9 @@ def _add(writers: dict[str, Writer], file: str, write: Writer, part: str | None 
             f"formats '{formats[0]}' and '{formats[1]}' would both write {file}",
             hint="Export them into two folders",
         )
+    case = "" if file in writers else " but for upper and lower case"
     raise DesignError(
-        f"two files would have the name '{file}'",
+        f"two files would have the name '{file}'{case}",
         where="parts" if part is None else f"parts.{part}",
         hint="Rename the part: their files would overwrite each other",
     )
