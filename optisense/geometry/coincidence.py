@@ -16,6 +16,16 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.geometry._box_pairs import overlapping_boxes
+from optisense.geometry._flat_polygons import (
+    THINNEST,
+    area_and_length,
+    common,
+    contains,
+    heights_over,
+    interpolated,
+    is_shape,
+    lie_apart,
+)
 from optisense.geometry.mesh import TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))
@@ -25,9 +35,6 @@ of one curved surface differ by a few degrees at most."""
 _GRID = 1e-7
 """Side (mm) of the grid to which cut polygons are rounded, so that neighbouring cuts close: far
 below any dimension of a part, and far above the rounding of double precision."""
-_THINNEST = 1e-4
-"""Thickness (mm) below which the remainder of a face counts as rounding: a thousand cells of the
-grid, and a twentieth of the distance below which faces touch."""
 
 SEAM_SAMPLES = 1000
 """Number of points on the faces of a solid near another one at which their distance is measured: a
@@ -77,16 +84,18 @@ def find_coincident(
     corners = frames.flat(second.triangles[pairs[:, 1]])
     height = corners[:, :, 2]
     near = (height.min(axis=1) <= tolerance) & (height.max(axis=1) >= -tolerance)
-    near &= ~_apart(frames.corners, corners[:, :, :2]) & ~_apart(corners[:, :, :2], frames.corners)
+    near &= ~lie_apart(frames.corners, corners[:, :, :2]) & ~lie_apart(
+        corners[:, :, :2], frames.corners
+    )
     pairs, frames, corners = pairs[near], frames.take(near), corners[near]
-    inside = _contains(corners[:, :, :2], frames.corners, tolerance=_THINNEST)
-    whole = inside & (np.abs(_heights(frames.corners, corners)).max(axis=1, initial=0) <= tolerance)
+    inside = contains(corners[:, :, :2], frames.corners, tolerance=THINNEST)
+    whole = inside & (
+        np.abs(heights_over(frames.corners, corners)).max(axis=1, initial=0) <= tolerance
+    )
     others = np.flatnonzero(~whole)
-    patches = _common(frames.corners[others], corners[others, :, :2])
-    points, patch = shapely.get_coordinates(patches, return_index=True)
-    apart = np.zeros(len(others))
-    np.maximum.at(apart, patch, np.abs(_heights(points[:, None], corners[others[patch]])[:, 0]))
-    whole[others] = _is_shape(patches) & (apart <= tolerance)
+    patches = common(frames.corners[others], corners[others, :, :2])
+    apart = np.abs(heights_over(patches, corners[others])).max(axis=1, initial=0)
+    whole[others] = is_shape(*area_and_length(patches)) & (apart <= tolerance)
     return Overlay(first, second, pairs[whole])
 
 
@@ -129,27 +138,14 @@ def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
     point, face, frames = point[opposite], face[opposite], frames.take(opposite)
     corners = frames.flat(facing.triangles[face])
     places = frames.flat(points[point, None])[:, :, :2]
-    met = _contains(corners[:, :, :2], places, _THINNEST)
-    point, height = point[met], _heights(places[met], corners[met])[:, 0]
+    met = contains(corners[:, :, :2], places, THINNEST)
+    point, height = point[met], heights_over(places[met], corners[met])[:, 0]
     order = np.lexsort([np.abs(height), point])
     first = order[np.unique(point[order], return_index=True)[1]]
     first = first[np.abs(height[first]) <= reach]
     middles = points[point[first]]
     middles += 0.5 * height[first, None] * near.face_normals[own[point[first]]]
     return Seam(height[first], middles, float(sums[-1]) / SEAM_SAMPLES)
-
-
-def _common(triangles: FloatArray, others: FloatArray) -> Any:
-    """Return the intersections (k,) of triangles (k, 3, 2), pair by pair.
-
-    Edges that coincide up to rounding can make an exact overlay lose the polygon. Where the result
-    is empty, the overlay is repeated on a grid, which is slower and reliable.
-    """
-    one, other = shapely.polygons(triangles), shapely.polygons(others)
-    patches = shapely.intersection(one, other)
-    lost = np.flatnonzero(shapely.area(patches) == 0.0)
-    patches[lost] = shapely.intersection(one[lost], other[lost], grid_size=_GRID)
-    return patches
 
 
 def boxes_overlap(first: TriangleMesh, second: TriangleMesh, depth: float) -> bool:
@@ -196,7 +192,7 @@ class _Remainder:
         pairs = pairs[self.whole[pairs[:, 0]] | np.isin(pairs[:, 0], list(self.partial))]
         frames = _Frames.of(self.mesh, pairs[:, 0])
         corners = frames.flat(overlay.second.triangles[pairs[:, 1]])[:, :, :2]
-        full = np.unique(pairs[_contains(corners, frames.corners, _THINNEST), 0])
+        full = np.unique(pairs[contains(corners, frames.corners, THINNEST), 0])
         taken_whole = [face for face in full.tolist() if self.whole[face]]
         taken: dict[int, Any] = {
             face: self.partial.pop(face) for face in full.tolist() if face in self.partial
@@ -297,30 +293,6 @@ def _near_pairs(
     return np.column_stack([kept_1[one], kept_2[other]])
 
 
-def _contains(triangles: FloatArray, points: FloatArray, tolerance: float) -> NDArray[np.bool_]:
-    """Return a mask (k,) of triangles (k, 3, 2), of either winding, that contain their points."""
-    inside: NDArray[np.bool_] = np.all(_inward(triangles, points) >= -tolerance, axis=(1, 2))
-    return inside
-
-
-def _apart(triangles: FloatArray, points: FloatArray) -> NDArray[np.bool_]:
-    """Return a mask (k,) of triangles (k, 3, 2) with an edge beyond which all their points lie."""
-    beyond = _inward(triangles, points) <= _THINNEST
-    apart: NDArray[np.bool_] = np.any(np.all(beyond, axis=2), axis=1)
-    return apart
-
-
-def _inward(triangles: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the distance (k, 3, c) of points (k, c, 2) from each edge line, positive inside."""
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    length = np.maximum(np.linalg.norm(edges, axis=2), 1e-300)
-    turn = np.sign(edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0])
-    across = np.stack([-edges[..., 1], edges[..., 0]], axis=2) * (turn[:, None] / length)[..., None]
-    offset = np.einsum("kei,kei->ke", across, triangles)
-    result: FloatArray = across @ points.transpose(0, 2, 1) - offset[:, :, None]
-    return result
-
-
 def _united(
     faces: NDArray[np.int32], corners: FloatArray, group: NDArray[np.int64]
 ) -> NDArray[np.object_]:
@@ -347,25 +319,10 @@ def _united(
     return united
 
 
-def _heights(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Return the height (k, c), over points (k, c, 2), of triangles' planes (k, 3, 3)."""
-    a = triangles[:, 0]
-    normal = np.cross(triangles[:, 1] - a, triangles[:, 2] - a)
-    slope = -normal[:, :2] / np.where(normal[:, 2:] == 0.0, 1e-300, normal[:, 2:])
-    heights: FloatArray = a[:, None, 2] + np.einsum("ki,kci->kc", slope, points - a[:, None, :2])
-    return heights
-
-
-def _is_shape(polygons: Any) -> NDArray[np.bool_]:
-    """Return a mask of the polygons that are larger than rounding."""
-    shape: NDArray[np.bool_] = 2.0 * shapely.area(polygons) > _THINNEST * shapely.length(polygons)
-    return shape
-
-
 def _without_slivers(shapes: NDArray[np.object_]) -> NDArray[np.object_]:
     """Return the parts of each of some shapes (k,) that are polygons larger than rounding."""
     parts, shape = shapely.get_parts(shapes, return_index=True)
-    kept = _is_shape(parts)
+    kept = is_shape(shapely.area(parts), shapely.length(parts))
     found = np.full(len(shapes), shapely.MultiPolygon(), dtype=object)
     shapely.multipolygons(parts[kept], indices=shape[kept], out=found)
     return found
@@ -375,33 +332,30 @@ def _assembled(
     mesh: TriangleMesh, whole: NDArray[np.int64], patches: dict[int, Any]
 ) -> TriangleMesh:
     """Return a mesh of whole faces, and patches of other faces (given in the faces' frames)."""
-    kept = TriangleMesh(mesh.vertices, mesh.faces[np.sort(whole)], mesh.normals)
-    pieces = [kept.compacted()]
+    kept = TriangleMesh(mesh.vertices, mesh.faces[np.sort(whole)], mesh.normals).compacted()
     faces = np.array(list(patches), dtype=np.int64)
-    frames = _Frames.of(mesh, faces)
-    shapes = _without_slivers(np.array(list(patches.values()), dtype=object))
-    for k, face in enumerate(faces.tolist()):
-        for polygon in shapely.get_parts(shapes[k]):
-            rings = [polygon.exterior, *polygon.interiors]
-            signs = [1] + [-1] * len(polygon.interiors)
-            flat = [
-                shapely.get_coordinates(ring)[:-1][:: sign if ring.is_ccw else -sign]
-                for ring, sign in zip(rings, signs, strict=True)
-            ]
-            points = np.concatenate(flat)
-            vertices = frames.origin[k] + points @ frames.axes[k, :2]
-            triangles = np.asarray(manifold3d.triangulate(flat))
-            normals = None
-            if mesh.normals is not None:
-                normals = _interpolated(mesh.normals[mesh.faces[face]], frames.corners[k], points)
-            pieces.append(TriangleMesh(vertices, triangles, normals))
-    return TriangleMesh.joined(pieces)
-
-
-def _interpolated(values: FloatArray, corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Interpolate unit vectors at points (n, 2) from a triangle's `values` (3, 3) at `corners`."""
-    edges = (corners[1:] - corners[0]).T
-    bary = np.linalg.solve(edges, (points - corners[0]).T).T
-    mixed = values[0] + bary @ (values[1:] - values[0])
-    unit: FloatArray = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
-    return unit
+    polygons, owner = shapely.get_parts(
+        _without_slivers(np.array(list(patches.values()), dtype=object)), return_index=True
+    )
+    if len(polygons) == 0:
+        return kept
+    rings, polygon = shapely.get_rings(polygons, return_index=True)
+    outer = np.diff(polygon, prepend=-1) > 0
+    rings = np.where(shapely.is_ccw(rings) == outer, rings, shapely.reverse(rings))
+    points, ring = shapely.get_coordinates(rings, return_index=True)
+    own = np.diff(ring, append=-1) == 0  # without the last point of a ring, which is its first
+    points, ring = points[own], ring[own]
+    outlines = np.split(points, np.flatnonzero(np.diff(ring)) + 1)
+    first_ring = np.append(np.flatnonzero(outer), len(rings))
+    first_point = np.searchsorted(ring, first_ring)
+    triangles = [
+        np.asarray(manifold3d.triangulate(outlines[start:end])) + point
+        for start, end, point in zip(first_ring, first_ring[1:], first_point, strict=False)
+    ]
+    frames = _Frames.of(mesh, faces).take(owner[polygon[ring]])
+    vertices = frames.origin + np.einsum("pi,pij->pj", points, frames.axes[:, :2])
+    normals = None
+    if mesh.normals is not None:
+        at_corners = mesh.normals[mesh.faces[faces]][owner[polygon[ring]]]
+        normals = interpolated(at_corners, frames.corners, points)
+    return TriangleMesh.joined([kept, TriangleMesh(vertices, np.concatenate(triangles), normals)])

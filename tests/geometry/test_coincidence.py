@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 
 from optisense.geometry import TriangleMesh
+from optisense.geometry._flat_polygons import area_and_length, common
 from optisense.geometry.coincidence import cut, find_coincident
 
 SIDES = 96
@@ -36,3 +38,16 @@ def test_fans_whose_spokes_lie_on_one_another(inches: bool, first_corner: int) -
         covered, rest = cut(one, [find_coincident(one, other, 0.002, facing=True)])
         assert covered.area == pytest.approx(exact * 9.0**2, rel=1e-6)
         assert rest.area == pytest.approx(one.area - covered.area, abs=1e-4)
+
+
+def test_triangles_are_clipped_by_one_another() -> None:
+    rng = np.random.default_rng(0)
+    one, other = rng.random((2, 500, 3, 2))
+    other[:50] = one[:50]  # the same
+    other[50:100, :2] = one[50:100, 1::-1]  # with a common edge
+    area, length = area_and_length(common(one, other))
+    known = shapely.intersection(shapely.polygons(one), shapely.polygons(other), grid_size=1e-12)
+    assert area == pytest.approx(shapely.area(known), abs=1e-9)
+    solid = area > 1e-6
+    assert solid.sum() > 200
+    assert length[solid] == pytest.approx(shapely.length(known)[solid], abs=1e-6)
