@@ -15,7 +15,7 @@ from optisense.json_values import json_ready
 from optisense.objectives.evaluation import Evaluation
 from optisense.objectives.registry import Objective
 from optisense.objectives.score import Score
-from optisense.own_code import place_of
+from optisense.own_code import error_of_own_code, place_of
 
 RETURNS = "a number, a number and a dict of its parts, or a Score"
 
@@ -93,9 +93,12 @@ def score_of(
 
 
 def _place(error: Exception, objective: Objective) -> str | None:
-    """Return the ``file:line`` of an error: the deepest one in the file of the objective's
-    function.
+    """Return the ``file:line`` of an error: the deepest one in a user's code, such as that of a
+    kind, or else in the file of the objective's function.
     """
+    own = error_of_own_code(error)
+    if own is not None:
+        return own.where
     code = getattr(inspect.unwrap(objective.function), "__code__", None)
     return place_of(error, getattr(code, "co_filename", None))
 

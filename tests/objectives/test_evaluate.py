@@ -23,6 +23,7 @@ from optisense.objectives.normdiff import SAMPLE_SHARE, indented_pixels
 from optisense.objectives.registry import find, pixels_read
 from optisense.objectives.rgb2normal import lines_of
 from optisense.objectives.run import IMAGES_SHARE, Scoring
+from optisense.objectives.scoring import score_of
 from optisense.optics.radiance_cache import store
 from optisense.optics.radiance_cache.tracing_limits import MAX_SINGLE_PASS
 from optisense.optics.transport.photons import trace_photons
@@ -202,6 +203,13 @@ def raises_in_numpy(evaluation: Evaluation) -> float:
 
 def raises(evaluation: Evaluation) -> float:
     raise KeyError("gel")
+
+
+def test_a_built_in_objective_names_the_line_of_the_users_code_that_failed() -> None:
+    """Such as that of a kind of camera whose methods the objective calls."""
+    failure = score_of(find("aoap"), lambda: 1 / 0).failure
+    assert failure is not None
+    assert re.search(r"ZeroDivisionError: .*test_evaluate.py:\d+", failure)
 
 
 @pytest.mark.parametrize(
