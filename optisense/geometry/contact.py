@@ -243,7 +243,9 @@ def _axes(
     if np.linalg.norm(x) < 1e-6:  # the surface has turned by 90 degrees since the origin
         x = np.cross(surface.v_axis, z)
     x = x / np.linalg.norm(x)
-    y = np.cross(z, x)  # opposite to v: these axes are right-handed seen from outside, u and v not
+    # Opposite to v unless a mirror turns the picture over: these axes are right-handed seen from
+    # outside, u and v of a direct view are not.
+    y = np.cross(z, x)
     a = math.radians(contact.rotation)
     return np.column_stack(
         [math.cos(a) * x + math.sin(a) * y, math.cos(a) * y - math.sin(a) * x, z]

@@ -69,7 +69,7 @@ class SensingSurface:
         """
         mesh.validate("sensing surface", closed=False)
         self.mesh = mesh.welded()
-        self._origin_face, self.origin = self._closest(origin)
+        self._origin_face, self.origin = closest_place(self.mesh, origin)
         self._inward = normal = self.mesh.face_normals[self._origin_face]
         self.u_axis = _in_plane(np.asarray(u_axis, dtype=np.float64), [normal], "u")
         self.v_axis = _in_plane(np.asarray(v_axis, dtype=np.float64), [normal, self.u_axis], "v")
@@ -151,27 +151,12 @@ class SensingSurface:
 
     def nearest(self, point: ArrayLike) -> SurfacePoint:
         """Return the place nearest to `point` (3,), mm."""
-        return self._surface_point(*self._closest(point))
+        return self._surface_point(*closest_place(self.mesh, point))
 
     def height_above(self, place: SurfacePoint) -> float:
         """Return the largest height (mm) of the surface, outward, over its tangent plane."""
         outward = (self.mesh.vertices - place.point) @ -place.inward
         return max(0.0, float(outward.max()))
-
-    def _closest(self, point: ArrayLike) -> tuple[int, FloatArray]:
-        where = np.asarray(point, dtype=np.float64).reshape(3)
-        if not np.isfinite(where).all():
-            raise ContactError(
-                "a coordinate of a contact point is not a finite number",
-                hint="Give x, y, z in mm",
-            )
-        middle, square = self.mesh.face_spheres
-        away, radius = np.linalg.norm(middle - where, axis=1), np.sqrt(square)
-        near = np.flatnonzero(away - radius <= (away + radius).min())
-        on_faces = closest_points(TriangleMesh(self.mesh.vertices, self.mesh.faces[near]), where)
-        distance = np.linalg.norm(on_faces - where, axis=1)
-        face = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
-        return int(near[face]), np.asarray(on_faces[face], dtype=np.float64)
 
     def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
         """Return the place with the smooth normal, which is nearly that of neighbouring places."""
@@ -241,6 +226,30 @@ class SensingSurface:
         return turned
 
 
+def closest_place(mesh: TriangleMesh, point: ArrayLike) -> tuple[int, FloatArray]:
+    """Return the place of a mesh that is nearest to a point: the face, and its point (3,), mm.
+
+    Args:
+        point: (3,) the point, mm.
+
+    Raises:
+        ContactError: a coordinate is not a finite number.
+    """
+    where = np.asarray(point, dtype=np.float64).reshape(3)
+    if not np.isfinite(where).all():
+        raise ContactError(
+            "a coordinate of a contact point is not a finite number",
+            hint="Give x, y, z in mm",
+        )
+    middle, square = mesh.face_spheres
+    away, radius = np.linalg.norm(middle - where, axis=1), np.sqrt(square)
+    near = np.flatnonzero(away - radius <= (away + radius).min())
+    on_faces = closest_points(TriangleMesh(mesh.vertices, mesh.faces[near]), where)
+    distance = np.linalg.norm(on_faces - where, axis=1)
+    face = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
+    return int(near[face]), np.asarray(on_faces[face], dtype=np.float64)
+
+
 def closest_points(mesh: TriangleMesh, point: FloatArray) -> FloatArray:
     """Return the point (m, 3), mm, of each face that is nearest to `point` (3,), mm."""
     corners = mesh.triangles
@@ -283,6 +292,6 @@ def _in_plane(axis: FloatArray, square_to: list[FloatArray], name: str) -> Float
     if not rest > 1e-6 * length:
         raise ContactError(
             f"the {name} axis does not lie along the sensing surface",
-            hint="Check the camera's `up` and `direction`: they must not be parallel",
+            hint="Give two directions that are neither perpendicular to the surface nor parallel",
         )
     return axis / rest

@@ -16,11 +16,13 @@ from optisense.errors import RenderError
 from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh, nine_places
 from optisense.geometry.contact import place
 from optisense.geometry.indenter_kinds import FACET_ERROR
+from optisense.geometry.surface import closest_place
 from optisense.mechanics import Gel, elasticity_of, refuse_loose_gel
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.transport.chief_rays import (
     ChiefRays,
+    picture_directions,
     pixel_areas,
     sees_nothing,
     trace_chief_rays,
@@ -35,7 +37,19 @@ Their end points on built-in sensors are less than 1 mm apart, half of the radia
 `VIEW_MARGIN`."""
 
 MIDDLE_ACROSS = 64
-"""Number of chief rays across the picture whose median end point is the middle of what is seen."""
+"""Number of chief rays across the picture whose median end point is the middle of what is seen, and
+whose end points show the directions of the picture on the surface."""
+
+GRAZING = 5.0
+"""Angle (degrees) between the camera's axis and the tangent plane at the origin from which on the
+camera's axes are directions on the surface. Below it, both project nearly onto one line, and a tilt
+of a fraction of a degree turns v around; the mirrors that show a surface to such a camera may turn
+the picture in any way. The axes of the built-in sensors meet the surface at 78 degrees or more."""
+
+UPWARD = 0.01
+"""Distance (mm) by which the middle of what such a camera sees is moved up, as in the picture. On a
+skin around the camera's axis, whose places are all as near to that middle, (0, 0) is then above the
+middle of the picture. It is far above rounding, and nothing to a contact."""
 
 
 def is_size(value: object) -> TypeGuard[tuple[float, float]]:
@@ -107,10 +121,14 @@ class SkinView:
         """The sensing surface with coordinates in mm; (0, 0) is where the camera's axis meets it,
         or the middle of what is seen.
 
+        There, u and v are the directions of the camera's right and up on the surface. If the
+        camera's axis lies within `GRAZING` of the surface, they are the directions in which the
+        seen place moves over the surface as one goes right and up in the picture.
+
         Raises:
-            RenderError: the camera sees nothing of the sensing surface.
+            RenderError: the camera sees nothing of the sensing surface, or only a few pixels along
+                its own axis.
         """
-        axes = self._design.camera.axes()
         # The lens has no distortion here, as distortion may move the axis off the picture's middle.
         straight = replace(ray_camera(self._design, (3, 3)), distortion=None)
         rays = trace_chief_rays(self._scenes.fine.scene, straight)
@@ -121,7 +139,17 @@ class SkinView:
             if not fine.hit.any():
                 raise sees_nothing(fine, self._scenes.fine.scene)
             origin = np.median(fine.points[fine.hit].astype(float), axis=0)
-        return SensingSurface(self._scenes.assembly.sensing, origin, axes[0], axes[1])
+        mesh = self._scenes.assembly.sensing
+        right, up, forward = self._design.camera.axes()
+        face, place = closest_place(mesh, origin)
+        if abs(mesh.face_normals[face] @ forward) < np.sin(np.radians(GRAZING)):
+            if not rays.hit[1, 1]:
+                origin += UPWARD * up
+                _, place = closest_place(mesh, origin)
+            # Odd numbers of pixels have one in the middle.
+            width, height = (n | 1 for n in self._design.camera.size_at(MIDDLE_ACROSS))
+            right, up = picture_directions(self.chief_rays((width, height)), place)
+        return SensingSurface(mesh, origin, right, up)
 
     @cached_property
     def gel(self) -> Gel:

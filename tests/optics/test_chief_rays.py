@@ -13,6 +13,7 @@ from optisense.optics.scene.surfaces import Surface, SurfaceKind
 from optisense.optics.transport.chief_rays import (
     ChiefRays,
     RayOutcome,
+    picture_directions,
     pixel_stretching,
     sees_nothing,
     trace_chief_rays,
@@ -83,6 +84,10 @@ def test_a_mirror_at_45_degrees_swaps_two_axes() -> None:
     expected = np.stack([np.full_like(x, 12.0), t * up + travel * up, t - 10 + travel * x], axis=-1)
     assert rays.hit.all()
     assert np.abs(rays.points - expected).max() < PLACE
+    # To the right on this picture is down on the wall, as a picture shows it in the mirror.
+    right, up = picture_directions(rays, np.array([12.0, 0.0, 5.0]))
+    assert right / np.linalg.norm(right) == pytest.approx([0.0, 0.0, -1.0], abs=0.05)
+    assert up / np.linalg.norm(up) == pytest.approx([0.0, 1.0, 0.0], abs=0.05)
 
 
 def test_a_ray_that_meets_nothing_escapes() -> None:

@@ -268,6 +268,27 @@ def test_only_contacts_lights_what_the_whole_image_shows_there_and_nothing_else(
     assert same_light(only.radiance[mask], whole.radiance[mask])
 
 
+@pytest.mark.parametrize("tilt", [-0.002, 0.0, 0.002])
+@pytest.mark.parametrize(
+    ("up", "u", "v"),
+    [((0.0, 1.0, 0.0), (-1, 0, 0), (0, 1, 0)), ((0.0, 0.0, 1.0), (0, -1, 0), (-1, 0, 0))],
+)
+def test_axes_are_those_of_the_picture_for_a_camera_along_the_surface(
+    plain_mini: OpticalModel,
+    tilt: float,
+    up: tuple[float, ...],
+    u: tuple[int, ...],
+    v: tuple[int, ...],
+) -> None:
+    placed = {"position": (-20.0, 0.0, -15.0), "direction": (1.0, 0.0, tilt), "up": up}
+    beside = set_value(plain_mini.design, "camera.fov", 100.0)
+    for name, value in placed.items():
+        beside = set_value(beside, f"camera.{name}", value)
+    surface = OpticalModel(beside).surface
+    assert surface.u_axis == pytest.approx(np.array(u), abs=1e-3)
+    assert surface.v_axis == pytest.approx(np.array(v), abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("skin", "square_of_radius"),
     # The elastic radius is that of ContactMechanics for the layer (tests/mechanics).

@@ -220,6 +220,38 @@ def pixel_areas(rays: ChiefRays) -> NDArray[np.float64]:
     return np.where(whole, area, 0.0)
 
 
+def picture_directions(
+    rays: ChiefRays, place: NDArray[np.floating]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the ways over the surface (3,), mm, to the pixels on the right and above at a place.
+
+    They are taken at the pixel that shows the place, and if several do, as with mirrors, at the one
+    that shows it largest.
+
+    Args:
+        place: (3,) a point of the sensing surface, mm.
+
+    Raises:
+        RenderError: no pixel sees the surface together with its four neighbours.
+    """
+    area = pixel_areas(rays)[1:-1, 1:-1]
+    codes, middle = rays.reflections, rays.reflections[1:-1, 1:-1]
+    for neighbour in (codes[1:-1, 2:], codes[1:-1, :-2], codes[2:, 1:-1], codes[:-2, 1:-1]):
+        area = np.where(neighbour == middle, area, 0.0)
+    if not area.any():
+        raise RenderError(
+            "the camera sees too little of the sensing surface for directions on it",
+            hint="Check the camera's position, direction and field of view",
+        )
+    p = rays.points.astype(np.float64)
+    distance = np.linalg.norm(p[1:-1, 1:-1] - place, axis=2)
+    away = np.where(area > 0.0, distance**2 + area, np.inf)
+    row, column = np.unravel_index(np.argmin(away), away.shape)
+    right = (p[row + 1, column + 2] - p[row + 1, column]) / 2
+    up = (p[row, column + 1] - p[row + 2, column + 1]) / 2
+    return right, up
+
+
 def pixel_stretching(rays: ChiefRays) -> NDArray[np.float64]:
     """Return the ratio of length to width of a pixel's footprint on the sensing surface.
 
