@@ -106,7 +106,7 @@ def _reduced(
     solids.sort(key=lambda each: each[0])
     crossings = [[0.0, float(end)] for end in length]
     for _, _, mesh in solids:
-        hits = ray_hits(mesh, origin + 0 * rays, rays)
+        hits = ray_hits(mesh, origin, rays)
         for ray, at in zip(hits.ray.tolist(), hits.distance.tolist(), strict=True):
             if at < length[ray]:
                 crossings[ray].append(at)

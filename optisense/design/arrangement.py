@@ -38,8 +38,11 @@ FILM_SHARE = 0.01
 """Share of the common face of two solids up to which a film of air is not reported, as pictures
 change by about as much."""
 
-SAMPLES = (8, 6)
-"""Number of points across and down the picture at which the sensing surface is looked for."""
+SAMPLES, SAMPLES_TURN = 89, 55
+"""Number of points of the picture at which the sensing surface is looked for, and the step by which
+they go round it downwards. They are two Fibonacci numbers, so that the points are a lattice whose
+rows are not parallel to the edges of the picture: shares are right to 0.02. With 8 by 6 points, a
+whole row is counted or not, which is 0.17."""
 
 
 def one_medium(design: SensorDesign, name: str, other: str) -> bool:
@@ -130,10 +133,11 @@ def in_picture(camera: Camera, points: NDArray[np.float64]) -> NDArray[np.bool_]
 
 
 def straight_rays(camera: Camera) -> NDArray[np.float64]:
-    """Return unit vectors (k, 3) of rays through those of a grid of `SAMPLES` points of the picture
-    that show something.
+    """Return unit vectors (k, 3) of rays through those of `SAMPLES` points of the picture that show
+    something; each point stands for an equal share of the picture.
     """
-    across, down = np.meshgrid(np.linspace(0.0, 1.0, SAMPLES[0]), np.linspace(0.0, 1.0, SAMPLES[1]))
+    number = np.arange(SAMPLES)
+    across, down = (number + 0.5) / SAMPLES, (number * SAMPLES_TURN % SAMPLES + 0.5) / SAMPLES
     return directions(camera, across, down)[within_view(camera, across, down)]
 
 
@@ -147,6 +151,6 @@ def skin_distances(
     for role, nearest in ((Role.SENSING_SURFACE, skin), (Role.BLOCKER, blocker)):
         for name in design.parts_of(role):
             if name in meshes:
-                hits = ray_hits(meshes[name], np.array(design.camera.position) + 0 * rays, rays)
+                hits = ray_hits(meshes[name], design.camera.position, rays)
                 np.minimum.at(nearest, hits.ray, hits.distance)
     return np.where(skin < blocker, skin, np.inf)

@@ -6,7 +6,6 @@ assumed.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -254,13 +253,13 @@ def view_shares(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> ViewSh
     nearest, hider = np.ones(len(some)), np.full(len(some), -1)
     blockers = [name for name in design.parts_of(Role.BLOCKER) if name in meshes]
     for number, name in enumerate(blockers):
-        hits = ray_hits(meshes[name], position + 0 * some, some - position)
+        hits = ray_hits(meshes[name], position, some - position)
         closest = np.ones(len(some))
         np.minimum.at(closest, hits.ray, hits.distance)
         closer = closest < nearest - BEFORE
         nearest[closer], hider[closer] = closest[closer], number
     shown = np.isfinite(skin_distances(design, meshes, straight_rays(camera)))
-    picture = np.count_nonzero(shown) / math.prod(SAMPLES)
+    picture = np.count_nonzero(shown) / SAMPLES
     counts = np.bincount(hider + 1, minlength=len(blockers) + 1) / max(1, len(some))
     counts *= len(inside) / len(points)
     hidden = {name: float(n) for name, n in zip(blockers, counts[1:], strict=True) if n > 0.0}

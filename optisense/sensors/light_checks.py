@@ -331,7 +331,7 @@ def _arrives(
         role = design.parts[name].role
         if role is Role.INDENTER:
             continue
-        hits = ray_hits(mesh, place + 0 * rays, rays)
+        hits = ray_hits(mesh, place, rays)
         stops = np.full(len(hits.ray), _is_dark(design, name))
         if role is Role.SENSING_SURFACE:
             stops = np.einsum("ki,ki->k", mesh.face_normals[hits.face], rays[hits.ray]) > 0.0

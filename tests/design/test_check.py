@@ -302,7 +302,7 @@ class TestView:
     def test_a_fisheye_sees_what_is_beside_it(self, plain: SensorDesign) -> None:
         wide = set_value(plain, "camera.projection", "equidistant")
         wide = set_value(set_value(wide, "camera.fov", 240.0), "camera.direction", [1, 0, 0])
-        assert "fills 0 % of the picture" in only(check_design(wide), "warning").message
+        assert "fills 2 % of the picture" in only(check_design(wide), "warning").message
         narrow = set_value(wide, "camera.fov", 100.0)
         assert "not in the camera" in only(check_design(narrow), "warning").message
 
@@ -310,6 +310,20 @@ class TestView:
         far = set_value(plain, "camera.position", [0, 0, -300])
         problem = only(check_design(far), "warning")
         assert "fills 0 % of the picture" in problem.message
+
+    @pytest.mark.parametrize("distance", [9.0, 15.0, 19.0])
+    def test_the_share_of_the_picture_that_a_rectangle_fills(
+        self, plain: SensorDesign, distance: float
+    ) -> None:
+        plain.meshes["skin"] = TriangleMesh.grid((6, 5), (1, 1)).flipped()
+        design = set_value(plain, "camera.position", [0, 0, -distance])
+        shares = view_shares(design, design.meshes)
+        width = 2.0 * distance * np.tan(np.radians(design.camera.fov / 2.0))
+        height = width * design.camera.resolution[1] / design.camera.resolution[0]
+        assert shares is not None
+        assert shares.picture == pytest.approx(
+            min(6.0 / width, 1.0) * min(5.0 / height, 1.0), abs=0.02
+        )
 
     def test_a_spot_of_the_surface(self, plain: SensorDesign) -> None:
         plain.meshes["skin"] = TriangleMesh.grid((10, 8), (100, 80)).flipped()

@@ -98,7 +98,7 @@ def lights_and_camera(
     spokes[:, (axis + 1) % 3], spokes[:, (axis + 2) % 3] = np.cos(angles), np.sin(angles)
     nearest = np.full(SPOKES, np.inf)
     for mesh in meshes.values():
-        hits = ray_hits(mesh, np.tile(centre, (SPOKES, 1)), spokes)
+        hits = ray_hits(mesh, centre, spokes)
         np.minimum.at(nearest, hits.ray, hits.distance)
     radius = round(float(nearest.min()) - RING_CLEARANCE, 2)
     if not np.isfinite(radius) or radius < LEAST_RING:
