@@ -311,9 +311,11 @@ class SensorDesign(Model):
         from optisense.design.section_drawing import section_svg
 
         try:
-            drawing = section_svg(self)
-        except (DesignError, KeyError, ValueError):  # incomplete: parts without meshes
-            drawing = to_html(", ".join(f"{n} ({p.role.value})" for n, p in self.parts.items()))
+            drawing = section_svg(without_dicts(self))
+        except (DesignError, KeyError, ValueError):  # dicts that do not fit, parts without meshes
+            parts = self.parts.items()
+            named = (f"{n} ({p.role.value})" if isinstance(p, Part) else str(n) for n, p in parts)
+            drawing = to_html(", ".join(named))
         return f"<div><b>{to_html(self.name)}</b><br>{drawing}</div>"
 
     def where(self, *path: str | int) -> str:

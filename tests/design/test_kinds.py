@@ -276,10 +276,13 @@ def test_a_dict_in_place_of_a_material_or_a_light_is_what_it_says() -> None:
     design.materials[gel] = {"kind": "dielectric", "ior": 1.4}  # type: ignore[assignment]
     design.lights["red"] = design.lights["red"].model_dump()  # type: ignore[assignment]
     sensors.check(design)
+    assert "red lights" in design._repr_html_()
     assert design.copy().materials[gel] == Dielectric(ior=1.4)
     design.materials[gel] = {"kind": "dielectric", "ior": -1.0}  # type: ignore[assignment]
     with pytest.raises(DesignError, match=r"materials\..*\.ior"):
         sensors.check(design)
+    design.parts["gel"] = design.parts["gel"].model_dump()  # type: ignore[assignment]
+    assert "gel, tray (" in design._repr_html_()
 
 
 def test_an_unknown_kind_may_be_of_a_package_that_is_not_installed() -> None:
