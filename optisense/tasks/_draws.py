@@ -133,7 +133,7 @@ class ContactDraw:
     """Ranges that random contacts are drawn from; each quantity is uniform.
 
     Attributes:
-        indenters: texts of `parse_indenter`, drawn with equal probability.
+        indenters: texts of `parse_indenter`, each given once, drawn with equal probability.
         depth: smallest and largest depth, mm.
         rotation: smallest and largest rotation (degrees) about the outward normal.
         tilt: largest rotation (degrees) about each of two axes in the surface, of either sign.
@@ -150,6 +150,12 @@ class ContactDraw:
     def __post_init__(self) -> None:
         if not self.indenters:
             raise TaskError("no indenter is given", hint=INDENTER_FORM)
+        for text in self.indenters:
+            if self.indenters.count(text) > 1:
+                raise TaskError(
+                    f"the indenter '{text}' is given twice",
+                    hint="All are equally likely: name it once",
+                )
         for name, (low, high) in (("depth", self.depth), ("rotation", self.rotation)):
             if not (np.isfinite([low, high]).all() and low <= high):
                 raise TaskError(f"the {name} goes from {low:g} to {high:g}", hint="Give LOW:HIGH")

@@ -95,7 +95,13 @@ def test_turns_are_about_x_then_y() -> None:
 
 @pytest.mark.parametrize(
     "settings",
-    [{"indenters": ()}, {"depth": (0.0, 1.0)}, {"depth": (1.0, 0.5)}, {"tilt": 90.0}],
+    [
+        {"indenters": ()},
+        {"indenters": ("plane", "sphere:1", "plane")},
+        {"depth": (0.0, 1.0)},
+        {"depth": (1.0, 0.5)},
+        {"tilt": 90.0},
+    ],
     ids=str,
 )
 def test_senseless_ranges_are_refused(settings: dict) -> None:
