@@ -161,7 +161,9 @@ def snr(
     as_json: JsonOption = False,
     variant: VariantOption = "auto",
 ) -> None:
-    """Compute the signal-to-noise ratio of the samples of angle and radius, without a model."""
+    """Run misalignment and cylinder-radius: the signal-to-noise ratio, which needs no model, and
+    the error of each.
+    """
     both: dict[str, Callable[[], PerceptionTask]] = {
         "misalignment": lambda: tasks.Misalignment(),
         "cylinder-radius": lambda: tasks.CylinderRadius(),
