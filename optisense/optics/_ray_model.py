@@ -15,7 +15,7 @@ from optisense.mechanics import ELASTIC, PressedSkin
 from optisense.optics._skin_view import SkinView, ray_camera
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import keep_freed_memory
-from optisense.optics.camera.projection import RayCamera
+from optisense.optics.camera.projection import RayCamera, refuse_numpy
 from optisense.optics.scene.assembly import Assembly, assemble
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.ray_scene import RayScene
@@ -300,12 +300,15 @@ class RayModel:
 
 
 def _refuse_impossible_kinds(design: SensorDesign, before: SensorDesign | None) -> None:
-    """Raise DesignError if an emitter, material or another kind can't be simulated.
+    """Raise DesignError or LibraryError if an emitter, material or another kind can't be simulated.
 
     Args:
         before: a design whose values can be; only those that differ are checked.
     """
     raise_problems(kind_problems(design, before), f"design '{design.name}'")
+    lens = design.camera.distortion
+    if lens is not None and (before is None or before.camera.distortion != lens):
+        refuse_numpy(lens)
 
 
 def _shapes(design: SensorDesign) -> tuple[Any, ...]:

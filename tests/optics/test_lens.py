@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import drjit as dr
 import mitsuba as mi
@@ -12,9 +12,10 @@ import pytest
 
 import optisense as ots
 from optisense.design import SensorDesign
+from optisense.design.lenses import LensDistortion
 from optisense.design.projection import directions, ideal_places, image_edges
 from optisense.design.responses import PictureChain
-from optisense.errors import DesignError
+from optisense.errors import DesignError, LibraryError
 from optisense.optics import OpticalModel
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import Pose, RayCamera
@@ -56,6 +57,32 @@ def test_rays_are_those_of_the_design(changes: dict[str, Any]) -> None:
     x, y = (each.ravel() for each in np.meshgrid(np.arange(64) + 0.5, np.arange(48) + 0.5))
     exact = directions(design.camera, x / 64, y / 48)
     assert np.abs(rays_of(camera, x, y) - exact).max() < 1e-6
+
+
+class Swelling(LensDistortion):
+    """A distortion that returns what a function of NumPy does."""
+
+    kind: Literal["test-swelling"] = "test-swelling"
+
+    def coefficients(self) -> tuple[float, ...]:
+        return (0.2,)
+
+    @staticmethod
+    def distort(x: Any, y: Any, numbers: tuple[Any, ...]) -> Any:
+        return np.tan(numbers[0] * x) / numbers[0], y + 0.0
+
+    @staticmethod
+    def jacobian(x: Any, y: Any, numbers: tuple[Any, ...]) -> Any:
+        return 1.0 + np.tan(numbers[0] * x) ** 2, 0.0, 0.0, 1.0
+
+
+def test_a_distortion_that_calls_numpy_is_refused_with_its_file() -> None:
+    design = mini()
+    design.camera.distortion = Swelling()
+    ots.check(design)
+    with pytest.raises(LibraryError, match=r"distort\(\) .*arrays of the renderer") as found:
+        OpticalModel(design)
+    assert f"{__file__}: Swelling.distort" == found.value.where
 
 
 def test_a_picture_of_another_shape_is_cut_out_of_the_distorted_camera() -> None:

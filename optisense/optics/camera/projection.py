@@ -10,6 +10,9 @@ import mitsuba as mi
 import numpy as np
 
 from optisense.design.lenses import LensDistortion
+from optisense.errors import LibraryError
+from optisense.own_code import error_of_own_code
+from optisense.registry import place_of_definition
 
 OUT_OF_SIGHT = 1e4
 """Distance (mm) from the camera at which rays start that see nothing, and lead away from it: more
@@ -153,3 +156,28 @@ class RayCamera:
         ideal_x = ideal_x - (d * off_x - b * off_y) * inverse
         ideal_y = ideal_y - (a * off_y - c * off_x) * inverse
         return ideal_x / edge, -ideal_y / edge
+
+
+def refuse_numpy(distortion: LensDistortion) -> None:
+    """Raise LibraryError if a distortion can't be computed for arrays of the renderer, as if a
+    method of its class calls functions of NumPy, which return arrays of NumPy.
+    """
+    x, y = mi.Float(0.1, 0.2), mi.Float(0.2, 0.1)
+    numbers = tuple(map(mi.Float, distortion.coefficients()))
+    for method in (distortion.distort, distortion.jacobian):
+        where: str | None = place_of_definition(method)
+        try:
+            if not any(isinstance(each, np.ndarray) for each in method(x, y, numbers)):
+                continue
+            found = "returns arrays of NumPy"
+        except Exception as error:
+            own = error_of_own_code(error)
+            where = where if own is None else own.where
+            found = f"fails with {type(error).__name__}: {error},"
+        raise LibraryError(
+            f"{method.__name__}() of the {distortion.kinds.noun} '{distortion.kind}' {found} for "
+            "arrays of the renderer",
+            where=where,
+            hint="Use only + - * / on x, y and the coefficients there: functions of NumPy and math "
+            "do not work on arrays of the renderer",
+        )
