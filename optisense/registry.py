@@ -65,7 +65,7 @@ class Registry(Generic[T]):
         Raises:
             OptiSenseError: the name is malformed or taken, or the object does not fit.
         """
-        if name != name.strip().lower() or not name or set(name) & set(":,@/"):
+        if name != _key(name) or not name or set(name) & set(":,@/"):
             raise self._error(
                 f"'{name}' can't be the name of {with_article(self.noun)}",
                 hint="Use lower case, without spaces at the ends and without : , @ /",
@@ -87,7 +87,7 @@ class Registry(Generic[T]):
         Raises:
             OptiSenseError: there is none (a similar name is suggested), or it can't be loaded.
         """
-        key = name.strip().lower()
+        key = _key(name)
         if key in self._registered:
             return self._registered[key]
         if key in self._homes:
@@ -103,11 +103,14 @@ class Registry(Generic[T]):
         )
 
     def __contains__(self, name: object) -> bool:
-        """Return whether there is an object of this name; installed packages are searched last."""
+        """Return whether `names` has a name, in lower or upper case.
+
+        Installed packages are searched last. `find` may still raise an error for their objects.
+        """
         if not isinstance(name, str):  # a value from an untrusted file
             return False
-        known = name in self._registered or name in self._homes
-        return known or name.strip().lower() in self._offered()
+        key = _key(name)
+        return key in self._registered or key in self._homes or key in self._offered()
 
     def names(self) -> list[str]:
         """Return all names: the built-in ones in their order, then all others by the alphabet."""
@@ -118,7 +121,7 @@ class Registry(Generic[T]):
         """Return the entry points of the group by their names in lower case."""
         found: dict[str, list[EntryPoint]] = {}
         for point in entry_points(group=self.group):
-            found.setdefault(point.name.strip().lower(), []).append(point)
+            found.setdefault(_key(point.name), []).append(point)
         return found
 
     def loadable(
@@ -194,6 +197,11 @@ class Registry(Generic[T]):
             where=", ".join(sorted(point.value for point in points)),
             hint="Remove a package, or give its entry point another name",
         )
+
+
+def _key(name: str) -> str:
+    """Return a name as registries hold it: in lower case, without spaces at the ends."""
+    return name.strip().lower()
 
 
 def _package(point: EntryPoint) -> str:

@@ -222,6 +222,15 @@ def test_a_package_with_a_name_in_upper_case_is_named(
     assert found.value.where == "os:getcwd, of lab-a"
 
 
+def test_a_name_in_upper_case_is_in_a_registry_as_it_is_found() -> None:
+    registry = things()
+    registry.register("line", run)
+    for name in ("HOME", " Line "):
+        assert registry.find(name)
+        assert name in registry
+    assert "moon" not in registry and 3 not in registry
+
+
 def test_what_cannot_be_described_is_unavailable_unless_it_is_built_in() -> None:
     registry = things()
     registry.register("line", run)
