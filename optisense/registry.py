@@ -131,12 +131,12 @@ class Registry(Generic[T]):
 
         Args:
             failures: dictionary that receives the error of each other object, by its name, and
-                those of packages that use the name of a built-in object.
+                those of packages whose object is not used, as a built-in one has its name.
         """
         if failures is not None:
             offered = self._offered()
             failures |= {
-                name: self._taken(name, offered[name]) for name in self.built_in if name in offered
+                name: self._unused(name, offered[name]) for name in self.built_in if name in offered
             }
         for name in self.names():
             try:
@@ -189,13 +189,19 @@ class Registry(Generic[T]):
         return self.register(name, self._adapt(name, thing))
 
     def _taken(self, name: str, points: list[EntryPoint]) -> OptiSenseError:
-        """Return the error about several packages, this one included, with one name."""
-        ours = ["OptiSense Studio"] if name in self._homes else []
-        packages = sorted({_package(point) for point in points})
+        """Return the error about several packages with one name."""
         return self._error(
-            f"the {self.noun} '{name}' is in several packages: {', '.join([*ours, *packages])}",
-            where=", ".join(sorted(point.value for point in points)),
+            f"the {self.noun} '{name}' is in several packages: {_packages(points)}",
+            where=_places(points),
             hint="Remove a package, or give its entry point another name",
+        )
+
+    def _unused(self, name: str, points: list[EntryPoint]) -> OptiSenseError:
+        """Return the error about packages that use the name of a built-in object."""
+        return self._error(
+            f"the built-in {self.noun} '{name}' is used, and not that of {_packages(points)}",
+            where=_places(points),
+            hint="Give the entry point of the package another name",
         )
 
 
@@ -207,6 +213,16 @@ def _key(name: str) -> str:
 def _package(point: EntryPoint) -> str:
     """Return the name of the package of an entry point."""
     return point.dist.name if point.dist else "an installed package"
+
+
+def _packages(points: list[EntryPoint]) -> str:
+    """Return the names of the packages of entry points, for messages."""
+    return ", ".join(sorted({_package(point) for point in points}))
+
+
+def _places(points: list[EntryPoint]) -> str:
+    """Return the objects that entry points name, for messages."""
+    return ", ".join(sorted(point.value for point in points))
 
 
 def _home(thing: object) -> str:
