@@ -14,7 +14,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -165,16 +165,12 @@ def bodies_of(path: Path) -> list[StepBody]:
             hint="In the CAD tool: export it again as STEP AP214 or AP242",
         )
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    bodies: list[StepBody] = []
-    count: dict[str, int] = {}
-    for name, shape in _products(tool.Label()):
-        for solid, body in _bodies(shape):
-            mesh = triangles(body)
-            if len(mesh.faces) == 0:
-                continue
-            count[name] = count.get(name, 0) + 1
-            label = name if count[name] == 1 else f"{name}-{count[name]}"
-            bodies.append(StepBody(label, mesh, solid))
+    bodies = [
+        StepBody(name, mesh, solid)
+        for name, shape in _products(tool.Label())
+        for solid, body in _bodies(shape)
+        if len((mesh := triangles(body)).faces)
+    ]
     if not bodies:
         raise MeshError(
             "the STEP file holds no faces",
@@ -182,7 +178,25 @@ def bodies_of(path: Path) -> list[StepBody]:
             hint="In the CAD tool: show the solid bodies and export them; sketches, points and "
             "hidden bodies have no faces",
         )
-    return bodies
+    labels = _unique([body.name for body in bodies])
+    return [replace(body, name=label) for body, label in zip(bodies, labels, strict=True)]
+
+
+def _unique(names: list[str]) -> list[str]:
+    """Return the names with numbers at the second and further ones of a kind, in their order.
+
+    A number that makes another of the names is skipped.
+    """
+    taken, count, labels = set(names), dict[str, int](), list[str]()
+    for name in names:
+        label = name
+        while name in count and label in taken:
+            count[name] += 1
+            label = f"{name}-{count[name]}"
+        count.setdefault(name, 1)
+        taken.add(label)
+        labels.append(label)
+    return labels
 
 
 def quiet() -> None:

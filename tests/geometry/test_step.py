@@ -108,6 +108,22 @@ def test_parts_used_twice_get_numbers(tmp_path: Path) -> None:
 
 
 @needs_step
+def test_numbered_names_are_not_those_of_other_products(tmp_path: Path) -> None:
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+
+    file = tmp_path / "windows.step"
+    sizes = {"window": 1.0, "Window": 1.5, "Window-2": 2.0}
+    parts = {
+        name: (BRepPrimAPI_MakeBox(1.0, 1.0, size).Shape(), 3.0 * size)
+        for name, size in sizes.items()
+    }
+    write_step(file, parts)
+    file.write_text(file.read_text().replace("'window'", "'Window'"))
+    found = {body.name: body.mesh.bounds[1, 2] for body in bodies_of(file)}
+    assert found == pytest.approx({"Window": 1.0, "Window-3": 1.5, "Window-2": 2.0})
+
+
+@needs_step
 def test_what_is_no_step_file_is_told(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "bad.step"
     file.write_text("solid ascii\nendsolid\n")
