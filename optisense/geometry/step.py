@@ -41,6 +41,10 @@ _WELD = 1e-5
 """Distance (mm) within which vertices of neighbouring faces are merged: the accuracy with which
 Open CASCADE's triangles of neighbouring faces meet."""
 
+NAMELESS = "Open CASCADE STEP translator"
+"""Beginning of the names that Open CASCADE, and tools that write with it, give to products without
+a name."""
+
 BODIES_FILE, ERROR_FILE = "bodies.npz", "wrong.json"
 """Files that the process writes into its folder: the bodies found, or the error."""
 
@@ -53,7 +57,8 @@ class StepBody:
     """A solid, or a surface that is part of none.
 
     Attributes:
-        name: name of its product in the file, numbered if several bodies share it.
+        name: name of its product in the file, or its own one if the product has several bodies;
+            numbered if several bodies share it.
         mesh: the mesh in the frame of the whole file, mm.
         solid: whether it is a solid.
     """
@@ -165,12 +170,16 @@ def bodies_of(path: Path) -> list[StepBody]:
             hint="In the CAD tool: export it again as STEP AP214 or AP242",
         )
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    bodies = [
-        StepBody(name, mesh, solid)
-        for name, shape in _products(tool.Label())
-        for solid, body in _bodies(shape)
-        if len((mesh := triangles(body)).faces)
-    ]
+    transfers = reader.Reader().WS().TransferReader()
+    bodies = []
+    for product, shape, place in _products(tool.Label()):
+        within = list(_bodies(shape))
+        by_bodies = len(within) > 1 or product.startswith(NAMELESS)
+        for solid, body in within:
+            mesh = triangles(body.Moved(place, False))
+            if len(mesh.faces):
+                name = by_bodies and _name_of_body(transfers, body)
+                bodies.append(StepBody(name or product, mesh, solid))
     if not bodies:
         raise MeshError(
             "the STEP file holds no faces",
@@ -208,8 +217,8 @@ def quiet() -> None:
         messenger.RemovePrinter(printer)
 
 
-def _products(root: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the name and the placed shape of each leaf of the tree of assemblies."""
+def _products(root: Any) -> Iterator[tuple[str, Any, Any]]:
+    """Yield the name, the shape and the place of each leaf of the tree of assemblies."""
     from OCP.TDF import TDF_ChildIterator, TDF_Label
     from OCP.TopLoc import TopLoc_Location
     from OCP.XCAFDoc import XCAFDoc_ShapeTool
@@ -221,7 +230,7 @@ def _products(root: Any) -> Iterator[tuple[str, Any]]:
             children.Next()
         return found
 
-    def walk(label: Any, place: Any, name: str) -> Iterator[tuple[str, Any]]:
+    def walk(label: Any, place: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
         if XCAFDoc_ShapeTool.IsReference_s(label):
             product = TDF_Label()
             XCAFDoc_ShapeTool.GetReferredShape_s(label, product)
@@ -232,7 +241,7 @@ def _products(root: Any) -> Iterator[tuple[str, Any]]:
                 if XCAFDoc_ShapeTool.IsComponent_s(child):
                     yield from walk(child, place, name)
         else:
-            yield name, XCAFDoc_ShapeTool.GetShape_s(label).Moved(place, False)
+            yield name, XCAFDoc_ShapeTool.GetShape_s(label), place
 
     free = [
         label
@@ -248,6 +257,17 @@ def _name(label: Any) -> str:
 
     name = TDataStd_Name()
     return str(name.Get().ToExtString()) if label.FindAttribute(name.GetID_s(), name) else ""
+
+
+def _name_of_body(transfers: Any, body: Any) -> str:
+    """Return the name of the entity from which a body without a place was made; empty if none."""
+    from OCP.TCollection import TCollection_ExtendedString
+
+    entity = transfers.EntityFromShapeResult(body, 1)
+    name = entity.Name() if hasattr(entity, "Name") else None
+    if name is None:
+        return ""
+    return str(TCollection_ExtendedString(name.String(), True).ToExtString())
 
 
 def _bodies(shape: Any) -> Iterator[tuple[bool, Any]]:

@@ -11,41 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from step_extra import needs_step
+from step_extra import needs_step, write_step
 
 from optisense.errors import MeshError, SetupError
-from optisense.geometry.step import bodies_of, no_step, read_step
-
-
-def write_step(path: Path, parts: dict[str, tuple[Any, float]], unit: str = "MM") -> Path:
-    """An assembly of named shapes, each moved along x by some mm."""
-    from OCP.gp import gp_Trsf, gp_Vec
-    from OCP.Interface import Interface_Static
-    from OCP.STEPCAFControl import STEPCAFControl_Writer
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDataStd import TDataStd_Name
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.TopLoc import TopLoc_Location
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
-
-    document = TDocStd_Document(TCollection_ExtendedString("XmlOcaf"))
-    tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    assembly = tool.NewShape()
-    TDataStd_Name.Set_s(assembly, TCollection_ExtendedString("sensor"))
-    for name, (shape, shift) in parts.items():
-        label = tool.AddShape(shape, False)
-        TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
-        move = gp_Trsf()
-        move.SetTranslation(gp_Vec(shift, 0, 0))
-        tool.AddComponent(assembly, label, TopLoc_Location(move))
-    tool.UpdateAssemblies()
-    writer = STEPCAFControl_Writer()
-    Interface_Static.SetCVal_s("write.step.unit", unit)
-    writer.SetNameMode(True)
-    writer.Transfer(document)
-    writer.Write(str(path))
-    Interface_Static.SetCVal_s("write.step.unit", "MM")
-    return path
+from optisense.geometry.step import NAMELESS, bodies_of, no_step, read_step
 
 
 def box_and_ball() -> dict[str, tuple[Any, float]]:
@@ -55,6 +24,19 @@ def box_and_ball() -> dict[str, tuple[Any, float]]:
         "gel": (BRepPrimAPI_MakeBox(10.0, 8.0, 4.0).Shape(), 1.0),
         "ball": (BRepPrimAPI_MakeSphere(3.0).Shape(), 20.0),
     }
+
+
+def two_boxes() -> Any:
+    """One shape of two solids."""
+    from OCP.BRep import BRep_Builder
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+    from OCP.TopoDS import TopoDS_Compound
+
+    compound, builder = TopoDS_Compound(), BRep_Builder()
+    builder.MakeCompound(compound)
+    for _ in range(2):
+        builder.Add(compound, BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape())
+    return compound
 
 
 @needs_step
@@ -93,17 +75,9 @@ def test_parts_used_twice_get_numbers(tmp_path: Path) -> None:
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
 
     led = BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape()
-    other = BRepPrimAPI_MakeBox(1.0, 1.0, 1.0).Shape()
     bodies = bodies_of(write_step(tmp_path / "a.step", {"led": (led, 0.0)}))
     assert [body.name for body in bodies] == ["led"]
-    from OCP.BRep import BRep_Builder
-    from OCP.TopoDS import TopoDS_Compound
-
-    compound, builder = TopoDS_Compound(), BRep_Builder()
-    builder.MakeCompound(compound)
-    builder.Add(compound, led)
-    builder.Add(compound, other)
-    bodies = bodies_of(write_step(tmp_path / "b.step", {"led": (compound, 0.0)}))
+    bodies = bodies_of(write_step(tmp_path / "b.step", {"led": (two_boxes(), 0.0)}))
     assert [body.name for body in bodies] == ["led", "led-2"]
 
 
@@ -121,6 +95,28 @@ def test_numbered_names_are_not_those_of_other_products(tmp_path: Path) -> None:
     file.write_text(file.read_text().replace("'window'", "'Window'"))
     found = {body.name: body.mesh.bounds[1, 2] for body in bodies_of(file)}
     assert found == pytest.approx({"Window": 1.0, "Window-3": 1.5, "Window-2": 2.0})
+
+
+@needs_step
+@pytest.mark.parametrize("product", ["Studio", f"{NAMELESS} 8.0 1"])
+def test_bodies_of_one_product_have_their_own_names(tmp_path: Path, product: str) -> None:
+    file = write_step(tmp_path / "a.step", {product: (two_boxes(), 5.0)})
+    text = file.read_text()
+    for name in (r"Gel-K\X2\00F6\X0\rper", ""):
+        text = text.replace("MANIFOLD_SOLID_BREP('',", f"MANIFOLD_SOLID_BREP ('{name}',", 1)
+    file.write_text(text)
+    assert [body.name for body in bodies_of(file)] == ["Gel-Körper", product]
+
+
+@needs_step
+def test_a_product_without_a_name_has_that_of_its_body(tmp_path: Path) -> None:
+    shape = box_and_ball()["gel"]
+    for product, expected in ((f"{NAMELESS} 8.0 1", "Gel"), ("Part", "Part")):
+        file = write_step(tmp_path / "a.step", {product: shape})
+        file.write_text(file.read_text().replace("SOLID_BREP('',", "SOLID_BREP('Gel',"))
+        (body,) = bodies_of(file)
+        assert body.name == expected
+        assert body.mesh.bounds[0] == pytest.approx([1, 0, 0], abs=1e-5)
 
 
 @needs_step

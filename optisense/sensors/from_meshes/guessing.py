@@ -238,11 +238,10 @@ def recipe_of(
     )  # fmt: skip
     if carrier is None:
         raise MeshError(
-            "no file is recognised as the gel or the sensing surface: "
+            "no body is recognised as the gel or the sensing surface: "
             + ", ".join(f"{each.name}: {each.use}" for each in found),
             where=str(source),
-            hint="Name the files after their roles (gel.stl, window.stl, housing.stl, ...), or "
-            "give the role of each file in a recipe",
+            hint=_naming_hint(found) + ", or give the role of each body in a recipe",
         )
     outward = guess_outward(meshes, carrier)
     dome = is_round(meshes[carrier], outward)
@@ -265,6 +264,16 @@ def recipe_of(
         camera=camera,
     )
     return recipe.relative_to(folder)
+
+
+def _naming_hint(found: Iterable[CadBody]) -> str:
+    """Return how to name bodies so that their roles are recognised."""
+    if any(each.body.own_units for each in found):
+        return (
+            "In the CAD tool: name the bodies or components after their roles (gel, window, "
+            "housing, ...)"
+        )
+    return "Name the files after their roles (gel.stl, window.stl, housing.stl, ...)"
 
 
 def usual_name(source: Path) -> str:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from step_extra import needs_step, write_step
 
 from optisense.errors import DesignError, LibraryError, MeshError, OptiSenseError
 from optisense.sensors.from_meshes import design_from_meshes, guess_recipe
@@ -122,8 +124,18 @@ class TestFiles:
     def test_names_that_say_nothing(self, cad: Any) -> None:
         cad.folder.mkdir()
         cad.shapes()["gel"].export(cad.folder / "thing.stl")
-        with pytest.raises(MeshError, match="thing: blocker"):
+        with pytest.raises(MeshError, match="thing: blocker") as caught:
             guess_recipe(cad.folder)
+        assert "gel.stl" in str(caught.value.hint)
+
+    @needs_step
+    def test_bodies_of_a_step_file_whose_names_say_nothing(self, tmp_path: Path) -> None:
+        from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+
+        shape = BRepPrimAPI_MakeBox(20.0, 16.0, 4.0).Shape()
+        with pytest.raises(MeshError, match="Body1: blocker") as caught:
+            guess_recipe(write_step(tmp_path / "sensor.step", {"Body1": (shape, 0.0)}))
+        assert "name the bodies or components" in str(caught.value.hint)
 
 
 class TestRecipes:
