@@ -42,15 +42,20 @@ def ask(question: str, read: Callable[[str], T], default: str | None = None) -> 
 
 
 def ask_word(question: str, words: Iterable[str], default: str) -> str:
-    """Ask for one of several words; the beginning of a word suffices if it is unique."""
+    """Ask for one of several words; the beginning of a word suffices if it is unique, and upper and
+    lower case are alike.
+    """
     known = list(words)
 
     def read(answer: str) -> str:
         if answer in known:
             return answer
-        begun = [word for word in known if answer and word.startswith(answer.lower())]
-        if len(begun) == 1:
-            return begun[0]
+        given = answer.casefold()
+        begun = [word for word in known if given and word.casefold().startswith(given)]
+        same = [word for word in begun if word.casefold() == given]
+        for fitting in (same, begun):
+            if len(fitting) == 1:
+                return fitting[0]
         raise ValueError("the answer must be one of: " + ", ".join(begun or known))
 
     return ask(question, read, default)
