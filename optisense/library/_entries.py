@@ -53,13 +53,13 @@ class Entry(Model, Generic[Value]):
         description: description in one line.
         maker: maker or vendor.
         value: material, coating, light or camera.
-        sources: source of each field with a number.
+        sources: source of each field with a number; fields without one are `unsourced`.
     """
 
     description: Text
     maker: Text | None = None
     value: Value
-    sources: Annotated[dict[str, Source], Field(min_length=1)]
+    sources: dict[str, Source] = Field(default_factory=dict)
 
     def numbers(self) -> list[str]:
         """Return the fields that need a source."""

@@ -78,6 +78,11 @@ class TestAdding:
         assert not library.is_own("material", "acrylic")
         assert added.entry.unsourced() == ["dispersion", "roughness"]
 
+    def test_without_sources_all_numbers_are_unsourced(self, own: Path, tmp_path: Path) -> None:
+        text = GEL[: GEL.index("sources:")]
+        added = library.add_file(write(tmp_path, "our-gel.yaml", text))
+        assert added.entry.unsourced() == added.entry.numbers() != []
+
     @pytest.mark.parametrize(
         ("kind", "name"),
         [
