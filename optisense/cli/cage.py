@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, cast
 
@@ -100,11 +101,9 @@ def add(
 ) -> None:
     """Put a cage around parts. Their shapes do not change until you move its points."""
     from optisense.design.cage_edit import add_cage
-    from optisense.sensors import load
 
     points = _resolution(resolution)
-    sensor = load(design)
-    _write(design, add_cage(sensor, cage, part, points, margin), cage, out)
+    _edit(design, lambda sensor: add_cage(sensor, cage, part, points, margin), cage, out)
 
 
 @cage_app.command("remove")
@@ -112,9 +111,8 @@ def add(
 def remove(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
     """Remove a cage. Its parts get their undeformed shapes back."""
     from optisense.design.cage_edit import remove_cage
-    from optisense.sensors import load
 
-    _write(design, remove_cage(load(design), cage), None, out)
+    _edit(design, lambda sensor: remove_cage(sensor, cage), None, out)
 
 
 @cage_app.command("refine")
@@ -129,10 +127,9 @@ def refine(
 ) -> None:
     """Give a cage more control points; the shape stays exactly the same."""
     from optisense.design.cage_edit import refine_cage
-    from optisense.sensors import load
 
     points = _resolution(resolution)
-    _write(design, refine_cage(load(design), cage, points), cage, out)
+    _edit(design, lambda sensor: refine_cage(sensor, cage, points), cage, out)
 
 
 @cage_app.command("move")
@@ -152,15 +149,17 @@ def move(
 ) -> None:
     """Move control points. A shape that folds or cuts into other parts is not written."""
     from optisense.design.cage_edit import Shape, move_points
-    from optisense.sensors import load
 
     if of not in ("points", "c_min", "c_max"):
         raise typer.BadParameter(f"'{of}' is none of points, c_min, c_max", param_hint="--of")
     moves = _moves(point, "--point")
-    sensor = load(design)
-    for which, way in moves:
-        sensor = move_points(sensor, cage, {which: way}, cast(Shape, of))
-    _write(design, sensor, cage, out)
+
+    def moved(sensor: SensorDesign) -> SensorDesign:
+        for which, way in moves:
+            sensor = move_points(sensor, cage, {which: way}, cast(Shape, of))
+        return sensor
+
+    _edit(design, moved, cage, out)
 
 
 @cage_app.command("range")
@@ -198,17 +197,20 @@ def set_range(
 ) -> None:
     """Give a cage two end shapes, c_min and c_max, between which a search may vary it."""
     from optisense.design import cage_edit
-    from optisense.sensors import load
 
     moves = {"c_min": _moves(low or [], "--min"), "c_max": _moves(high or [], "--max")}
-    sensor = cage_edit.set_range(load(design), cage, blend=blend)
-    for end, steps in moves.items():
-        for which, way in steps:
-            sensor = cage_edit.move_points(
-                sensor, cage, {which: way}, cast(Literal["c_min", "c_max"], end)
-            )
-    _check_ends(sensor, cage)
-    _write(design, sensor, cage, out)
+
+    def ranged(sensor: SensorDesign) -> SensorDesign:
+        sensor = cage_edit.set_range(sensor, cage, blend=blend)
+        for end, steps in moves.items():
+            for which, way in steps:
+                sensor = cage_edit.move_points(
+                    sensor, cage, {which: way}, cast(Literal["c_min", "c_max"], end)
+                )
+        _check_ends(sensor, cage)
+        return sensor
+
+    _edit(design, ranged, cage, out)
 
 
 @cage_app.command("blend")
@@ -223,20 +225,20 @@ def blend(
 ) -> None:
     """Set the shape between c_min and c_max, with the same share for all control points."""
     from optisense.design import get_value
-    from optisense.design.cage_edit import set_range
-    from optisense.sensors import load
-
-    sensor = load(design)
-    entry = get_value(sensor, f"cages.{cage}")
-    if entry.c_min is None or entry.c_max is None:
-        raise DesignError(
-            f"cage '{cage}' has no c_min and c_max",
-            hint=f"Set them with: optisense cage range {argument(design)} {cage} ...",
-        )
     from optisense.design.cage import as_array
+    from optisense.design.cage_edit import set_range
 
-    ends = as_array(entry.c_min), as_array(entry.c_max)
-    _write(design, set_range(sensor, cage, *ends, blend=share), cage, out)
+    def blended(sensor: SensorDesign) -> SensorDesign:
+        entry = get_value(sensor, f"cages.{cage}")
+        if entry.c_min is None or entry.c_max is None:
+            raise DesignError(
+                f"cage '{cage}' has no c_min and c_max",
+                hint=f"Set them with: optisense cage range {argument(design)} {cage} ...",
+            )
+        ends = as_array(entry.c_min), as_array(entry.c_max)
+        return set_range(sensor, cage, *ends, blend=share)
+
+    _edit(design, blended, cage, out)
 
 
 @cage_app.command("settle")
@@ -244,9 +246,8 @@ def blend(
 def settle(design: DesignArgument, cage: CageArgument, out: OutOption) -> None:
     """Turn a blend of c_min and c_max into control points that can be moved; the range stays."""
     from optisense.design.cage_edit import settle_cage
-    from optisense.sensors import load
 
-    _write(design, settle_cage(load(design), cage), cage, out)
+    _edit(design, lambda sensor: settle_cage(sensor, cage), cage, out)
 
 
 def _resolution(text: str) -> tuple[int, int, int]:
@@ -325,20 +326,25 @@ def _check_ends(design: SensorDesign, name: str) -> None:
             messages.print(f"warning, at {end}: {problem}", style="yellow")
 
 
-def _write(source: str, design: SensorDesign, cage: str | None, out: Path) -> None:
-    """Check the shapes and write the design."""
+def _edit(
+    source: str, change: Callable[[SensorDesign], SensorDesign], cage: str | None, out: Path
+) -> None:
+    """Read a design, change it, check the shapes and write it, to its own folder or a new one."""
     from optisense.design.cage_checks import cage_problems
     from optisense.design.problems import raise_problems
-    from optisense.sensors import save_design
+    from optisense.design.storage import digest_of
+    from optisense.sensors import load, save_design
 
     own = Path(source)
     own = own.parent if own.is_file() else own
     is_own = own.is_dir() and out.is_dir() and out.samefile(own)
+    digest = digest_of(own) if is_own else None  # before the files are read
+    design = change(load(source))
     problems = cage_problems(design)
     raise_problems(problems, f"design '{design.name}'")
     for problem in problems:
         messages.print(f"warning: {problem}", style="yellow")
-    save_design(design, out, new=not is_own)
+    save_design(design, out, new=not is_own, digest=digest)
     if cage is not None:
         output.print(f"cage {cage}: {_shape(design, cage)}")
     output.print(f"{out / 'design.yaml'}")

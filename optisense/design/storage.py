@@ -16,7 +16,7 @@ from optisense.design.problems import design_error, raise_problems
 from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign, dotted
 from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.design.yaml_writer import to_yaml
-from optisense.errors import DesignError, MeshError
+from optisense.errors import DesignError, MeshError, OutputError
 from optisense.folders import begun, held
 from optisense.geometry import TriangleMesh
 from optisense.near import near_match
@@ -76,7 +76,9 @@ def load_design(path: str | Path) -> SensorDesign:
     return design
 
 
-def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) -> None:
+def save_design(
+    design: SensorDesign, folder: str | Path, *, new: bool = False, digest: str | None = None
+) -> None:
     """Write a design folder: design.yaml with a comment on each unit, meshes as OBJ.
 
     Each file is written whole under a temporary name; only when all exist are they renamed,
@@ -87,13 +89,16 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
         folder: folder, created if needed.
         new: whether the folder must be empty or absent; if the design can't be written, the folder
             is left empty, and files that a killed process has left are removed first.
+        digest: `digest_of` the folder before the design was read from it, if this changes a design
+            in place: a change by another program since then is not overwritten.
 
     Raises:
         DesignError: a value does not fit, a part has no mesh, or two parts with different meshes
             (or two lamps or materials with different files) share a file.
         MeshError: a mesh could not be loaded again; see `SensorDesign.valid_mesh`.
         FolderInUseError: another process is writing to the folder.
-        OutputError: the folder can't be written, or is not empty though it must be.
+        OutputError: the folder can't be written, is not empty though it must be, or does not have
+            the digest.
     """
     folder = Path(folder)
     if new:
@@ -106,6 +111,12 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
     for name, file in meshes.items():
         saved.parts[name].mesh = file
     with held(folder), written_together("the design") as stage:
+        if digest is not None and digest_of(folder) not in ("", digest):
+            raise OutputError(
+                "the design was changed on disk since it was opened here",
+                where=str(folder),
+                hint="Repeat the command; in the studio, open the design again or use Save As",
+            )
         for file, name in {file: name for name, file in meshes.items()}.items():
             design.meshes[name].save_obj(stage(inside(folder, file)))
         for file, data in _named_files(design).items():

@@ -30,7 +30,7 @@ from optisense.engine.protocol import Fields
 from optisense.engine.rendering import DesignFields, blender_pixels, design_of
 from optisense.engine.requests import Lane, handles
 from optisense.engine.session import Session
-from optisense.errors import DesignError, MeshError, OutputError
+from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh, cage_weights
 from optisense.library import with_own_lights
 from optisense.near import suggestion
@@ -140,13 +140,7 @@ def save(session: Session, fields: Save, job: Job) -> dict[str, Any]:
     source = digest_of(named) if named is not None and Path(named).is_absolute() else None
     design = design_of(session, fields, job)
     design.deformed_meshes()  # raises for a part outside its cage
-    if fields.digest is not None and digest_of(folder) not in ("", fields.digest):
-        raise OutputError(
-            "the design was changed on disk since it was opened here",
-            where=str(folder),
-            hint="Open it again, or use Save As to write this one to another folder",
-        )
-    save_design(with_own_lights(design), folder, new=fields.only_new)
+    save_design(with_own_lights(design), folder, new=fields.only_new, digest=fields.digest)
     return {"folder": str(folder), "digest": digest_of(folder), "source_digest": source}
 
 

@@ -109,7 +109,9 @@ def load(name_or_folder: str | Path) -> SensorDesign:
     return load_design(path)
 
 
-def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) -> None:
+def save_design(
+    design: SensorDesign, folder: str | Path, *, new: bool = False, digest: str | None = None
+) -> None:
     """Write a design folder that opens on any machine; see `optisense.design.save_design`.
 
     Lights that are the user's own parts are described in the design itself, since other machines
@@ -119,7 +121,7 @@ def save_design(design: SensorDesign, folder: str | Path, *, new: bool = False) 
         OptiSenseError: the design can't be saved, or an own part can't be read.
     """
     refuse_no_design(design)
-    storage.save_design(library.with_own_lights(design), folder, new=new)
+    storage.save_design(library.with_own_lights(design), folder, new=new, digest=digest)
 
 
 def check(design: SensorDesign) -> list[Diagnostic]:

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import optisense
 from optisense import sensors
 from optisense.cli.app import app
+from optisense.design import SensorDesign
 
 runner = CliRunner()
 
@@ -61,6 +62,22 @@ def test_another_folder_that_is_in_use_is_refused(mini: Path, tmp_path: Path) ->
     code, text = run("move", mini, "skin", "--point", "13=0,0,0.1", "--out", other)
     assert code == 1 and "not empty" in text
     assert [path.name for path in other.iterdir()] == ["notes.txt"]
+
+
+def test_a_change_made_while_the_command_runs_is_not_lost(
+    mini: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = mini / "design.yaml"
+
+    def read_and_edit(name: str) -> SensorDesign:
+        design = optisense.load(name)
+        file.write_text(file.read_text() + "dispersion: false\n")
+        return design
+
+    monkeypatch.setattr(sensors, "load", read_and_edit)
+    code, text = run("move", mini, "skin", "--point", "13=0,0,0.1", "--out", mini)
+    assert code == 1 and "changed on disk" in text and "Repeat the command" in text
+    assert optisense.load(mini).dispersion is False
 
 
 @pytest.mark.parametrize("point", ["x=1", "1,1,1", "1,1,1=2", "=1,2,3,4"])
