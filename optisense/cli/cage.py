@@ -30,7 +30,7 @@ OutOption = Annotated[
     Path,
     out_option(
         "Where to write the changed design: a new folder, or the design's own (its "
-        "design.yaml is written anew, with its own comments)."
+        "design.yaml is written anew; your comments in it stay)."
     ),
 ]
 MoveOption = Annotated[

@@ -14,6 +14,7 @@ from optisense.design.limits import unit_slips
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error, raise_problems
 from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign, dotted
+from optisense.design.yaml_comments import with_comments
 from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.design.yaml_writer import to_yaml
 from optisense.errors import DesignError, MeshError, OutputError
@@ -21,7 +22,14 @@ from optisense.folders import begun, held
 from optisense.geometry import TriangleMesh
 from optisense.near import near_match
 from optisense.text import brief
-from optisense.untrusted_files import MOST_MESH, MOST_TEXT, is_file, is_folder, read_bytes
+from optisense.untrusted_files import (
+    MOST_MESH,
+    MOST_TEXT,
+    is_file,
+    is_folder,
+    read_bytes,
+    read_text,
+)
 from optisense.untrusted_files import inside as inside_folder
 from optisense.writing import inside, written_together
 
@@ -82,7 +90,8 @@ def save_design(
     """Write a design folder: design.yaml with a comment on each unit, meshes as OBJ.
 
     Each file is written whole under a temporary name; only when all exist are they renamed,
-    design.yaml last. Other files in the folder are not touched.
+    design.yaml last. Other files in the folder are not touched. If the design was read from this
+    folder, comments that the user has written into its design.yaml are kept.
 
     Args:
         design: design to write.
@@ -121,7 +130,10 @@ def save_design(
             design.meshes[name].save_obj(stage(inside(folder, file)))
         for file, data in _named_files(design).items():
             stage(inside(folder, file)).write_bytes(data)
-        stage(inside(folder, DESIGN_FILE)).write_text(to_yaml(saved, HEAD), encoding="utf-8")
+        place, text = inside(folder, DESIGN_FILE), to_yaml(saved, HEAD)
+        if digest is not None or _is_read_from(saved, place):
+            text = _with_comments(text, place)
+        stage(place).write_text(text, encoding="utf-8")
 
 
 def digest_of(folder: str | Path) -> str:
@@ -145,6 +157,23 @@ def digest_of(folder: str | Path) -> str:
             if path is not None and is_file(path):
                 found.update(read_bytes(path, MOST_MESH, DesignError))
     return found.hexdigest()
+
+
+def _is_read_from(design: SensorDesign, file: Path) -> bool:
+    source = design._source
+    return source is not None and os.path.realpath(source) == os.path.realpath(file)
+
+
+def _with_comments(text: str, file: Path) -> str:
+    """Return the text of a design with the user's comments from the file that it replaces, if that
+    can be read.
+    """
+    with contextlib.suppress(DesignError, ValidationError):
+        before = read_text(file, MOST_TEXT, DesignError)
+        return with_comments(
+            text, before, lambda data: to_yaml(SensorDesign.model_validate(data), HEAD)
+        )
+    return text
 
 
 def files_of(design: SensorDesign) -> list[str]:

@@ -25,7 +25,9 @@ MAX_VALUES = 300_000
 """Largest number of values in a YAML file, which take two seconds to read; a design with cages of
 20 x 20 x 20 control points and their limits has 100,000."""
 
-_LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+LOADER: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""Loader of whose events and tokens alone YAML is read: the one in C, if PyYAML has it."""
+
 _INTEGER = re.compile(r"[-+]?\d{1,300}$")
 _FLOAT = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?$")
 _INFINITY = re.compile(r"[-+]?\.(?:inf|Inf|INF)$")
@@ -76,7 +78,7 @@ class _Reader:
     """Parser of one YAML text, which builds plain values from its events."""
 
     def __init__(self, text: str, source: str, error: type[OptiSenseError]) -> None:
-        self._events: Iterator[Any] = yaml.parse(text, Loader=_LOADER)
+        self._events: Iterator[Any] = yaml.parse(text, Loader=LOADER)
         self._source = source
         self._error = error
         self._lines: Lines = {}

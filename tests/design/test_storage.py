@@ -116,6 +116,39 @@ class TestRoundTrip:
         for pattern in (r"flux: 12\.5 +# mW", r"fov: 150\.0 +# degrees", r"box: .* # mm"):
             assert re.search(pattern, text), pattern
 
+    def test_comments_of_the_user_stay_at_their_values(self, folder: Path, tmp_path: Path) -> None:
+        edit(folder, "schema_version: 1", "# NOTE: top\nschema_version: 1")
+        edit(folder, "fov: 150.0  # ", '# NOTE: by "é" # 2\n  fov: 150.0  # NOTE: a lens, ')
+        edit(folder, "flux: 12.5  # mW", "flux: 12.5  # NOTE: measured")
+        edit(folder, "cages:", "  # NOTE: no light\ncages:  # NOTE: bent,")
+        edit(folder, "    resolution: [2, 2", "    # NOTE: gone\n    resolution: [2, 2")
+        file = folder / "design.yaml"
+        file.write_text(file.read_text() + "# NOTE: end")
+        design = load_design(folder)
+        design.camera.fov = 100.0
+        del design.cages[next(iter(design.cages))]
+        save_design(design, folder)
+        save_design(design, tmp_path / "new")
+        lines = file.read_text().splitlines()
+        plain = (tmp_path / "new" / "design.yaml").read_text().splitlines()
+        assert [line for line in lines if "NOTE" not in line] == plain
+        below = {
+            line.strip().split(",")[0]: next(n for n in lines[k:] if "NOTE" not in n).split()[0]
+            for k, line in enumerate(lines)
+            if "NOTE" in line and line != lines[-1]
+        }
+        assert lines[-1] == "# NOTE: end" and below == {
+            "# NOTE: top": "schema_version:",
+            '# NOTE: by "é" # 2': "fov:",
+            "# NOTE: a lens": "fov:",
+            "# NOTE: measured": "flux:",
+            "# NOTE: no light": "cages:",
+            "# NOTE: bent": "cages:",
+            "# NOTE: gone": "cages:",
+        }
+        save_design(load_design(folder), folder)
+        assert file.read_text().splitlines() == lines
+
     def test_a_design_saved_by_version_1_still_loads(self) -> None:
         design = load_design(ASSET)
         assert design.lights["red"].lights[0].position == (6.0, 0.1, -4.0)
