@@ -44,6 +44,9 @@ CARRY_TOLERANCE = 2.0
 with it. In a contact on a GelSight Mini bent by 2 mm, the error against the full picture is then
 7.6 %, and 7.3 % if the contact is pressed anew."""
 
+NOT_SHOWN = frozenset({"schema_version", "name", "description", "provenance"})
+"""Fields of a design that no picture depends on."""
+
 PLACED_CONTACTS = 64
 """Number of contacts whose placed meshes a draft keeps: more than the presses of any objective, and
 about 10 MB of meshes."""
@@ -289,10 +292,12 @@ class DraftModel(OpticalModel):
 
 
 def _all_but_lights_same(one: SensorDesign, other: SensorDesign) -> bool:
-    """Return whether designs without cages have the same shapes, materials and camera."""
-    return (
-        one.meshes == other.meshes  # the same objects
-        and (one.parts, one.materials, one.camera) == (other.parts, other.materials, other.camera)
+    """Return whether designs have the same meshes (the same objects) and values, except for lights
+    and what no picture shows.
+    """
+    return one.meshes == other.meshes and all(
+        getattr(one, field) == getattr(other, field)
+        for field in SensorDesign.model_fields.keys() - NOT_SHOWN - {"lights"}
     )
 
 
@@ -305,11 +310,7 @@ def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
     """Return the numbers of the light groups that differ in more than flux and colour; None if
     anything other than lights differs.
     """
-    if (
-        list(one.lights) != list(other.lights)
-        or one.coating != other.coating
-        or not _all_but_lights_same(one, other)
-    ):
+    if list(one.lights) != list(other.lights) or not _all_but_lights_same(one, other):
         return None
     pairs = zip(one.lights.values(), other.lights.values(), strict=True)
     return frozenset(

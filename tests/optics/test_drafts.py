@@ -9,7 +9,7 @@ import pytest
 import optisense as ots
 from optisense.design import SensorDesign
 from optisense.optics import OpticalModel
-from optisense.optics.drafts import DraftModel
+from optisense.optics.drafts import DraftModel, _moved
 
 SIZE = (64, 48)
 PHOTONS = 150_000
@@ -163,6 +163,24 @@ def test_a_light_that_is_dragged_far_looks_as_in_a_draft_of_its_own(
     own = DraftModel(moved).render(PRESS, SIZE, photons=PHOTONS)
     a, b = blocks(dragged.radiance), blocks(own.radiance)
     np.testing.assert_allclose(a, b, atol=SAME * b.mean(axis=0).max())
+
+
+@pytest.mark.parametrize("field", sorted(SensorDesign.model_fields.keys() - {"lights"}))
+def test_a_draft_is_made_anew_for_every_field_that_a_picture_may_show(
+    mini: SensorDesign, field: str
+) -> None:
+    other = mini.model_copy(update={field: object()})
+    kept = _moved(mini, other) is not None
+    assert kept == (field in {"schema_version", "name", "description", "provenance"})
+
+
+def test_markers_that_are_added_are_in_the_next_draft(
+    draft: DraftModel, mini: SensorDesign
+) -> None:
+    plain = draft.render((), SIZE, photons=20_000)
+    draft.set_design(ots.set_value(mini, "markers", {"places": [(0, 0)], "radius": 2.0}))
+    dark = draft.render((), SIZE, photons=20_000).radiance / plain.radiance
+    assert dark[SIZE[1] // 2, SIZE[0] // 2].max() < 0.5 < dark[5, 5].min()
 
 
 def test_other_fluxes_only_scale_a_draft(draft: DraftModel, mini: SensorDesign) -> None:
