@@ -6,11 +6,15 @@ by an entry point of its group, so that a user only has to install them.
 
 from __future__ import annotations
 
+import hashlib
+import re
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, Generic, TypeVar
+from pathlib import Path
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from optisense.errors import OptiSenseError
 from optisense.near import suggestion
@@ -19,6 +23,19 @@ T = TypeVar("T")
 
 MOST_SUGGESTED = 20
 """Number of names that an error lists if none is similar: about two lines of a terminal."""
+
+
+class Origin(NamedTuple):
+    """Installed package that an object comes from.
+
+    Attributes:
+        package, version: name and version of the package.
+        sha256: SHA-256 of the file of the module that defines the object; empty without a file.
+    """
+
+    package: str
+    version: str
+    sha256: str
 
 
 class Registry(Generic[T]):
@@ -101,6 +118,31 @@ class Registry(Generic[T]):
             f"there is no {self.noun} '{name}'",
             hint=suggestion(key, self.names(), limit=MOST_SUGGESTED),
         )
+
+    def origin(self, name: str) -> Origin | None:
+        """Return the installed package of an object that comes from an entry point.
+
+        Returns:
+            The package; None for objects of this package, of a user's program or file, and for
+            those defined outside of the package of their entry point.
+
+        Raises:
+            OptiSenseError: the object can't be loaded.
+        """
+        key = name.strip().lower()
+        points = [] if key in self._homes else self._offered().get(key, [])
+        if not points:
+            return None
+        module = _home(self.find(key)).partition(":")[0]
+        if module.partition(".")[0] != re.split("[.:]", points[0].value)[0].strip():
+            return None
+        file = getattr(sys.modules.get(module), "__file__", None)
+        try:
+            digest = hashlib.sha256(Path(file).read_bytes()).hexdigest() if file else ""
+        except OSError:  # such as a module in an archive
+            digest = ""
+        version = points[0].dist.version if points[0].dist else ""
+        return Origin(_package(points[0]), version, digest)
 
     def __contains__(self, name: object) -> bool:
         """Return whether `names` has a name, in lower or upper case.

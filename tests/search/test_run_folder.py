@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -13,13 +14,51 @@ import pytest
 
 from optisense.cli.search_result import _end
 from optisense.design import SensorDesign
+from optisense.design.materials import CoatingModel
 from optisense.errors import FolderInUseError, OutputError, SearchError
-from optisense.search import Study, search
+from optisense.objectives.registry import OBJECTIVES
+from optisense.search import Choice, Study, search
 from optisense.search._run_search import run_study
+from optisense.search.methods import METHODS
 from optisense.search.study._definitions import SCORING
 from optisense.search.study.store import START, STORE_VERSION
 
 SPACE = {"coating.specularity": (0.0, 1.0, 5), "camera.position.x": (-1.0, 3.0, 3)}
+
+PACKAGE = """
+from typing import Literal
+
+from optisense.design.materials import CoatingModel, Reflection
+from optisense.search.methods import Method
+
+
+def width(design):
+    return design.camera.fov
+
+
+class Chalk(CoatingModel):
+    kind: Literal["lab-chalk"] = "lab-chalk"
+    white: float
+
+    def reflection(self):
+        return Reflection((self.white,) * 3)
+
+
+class Corners(Method):
+    name, summary = "lab-method", "corners of the space"
+
+    def ask(self):
+        return self.space.from_unit([[0.0, 0.0], [1.0, 0.0], [0.5, 0.0], [0.2, 0.0], [0.3, 0.0]])
+
+    def tell(self, vectors, outcomes):
+        pass
+"""
+
+POINTS = (
+    "objectives]\nlab-width = lab_parts:width",
+    "methods]\nlab-method = lab_parts:Corners",
+    "coatings]\nlab-chalk = lab_parts:Chalk",
+)
 
 
 def vectors(study: Study) -> np.ndarray:
@@ -120,6 +159,43 @@ class TestFolder:
         assert "new study with another --out" in str(told.value.hint)
         assert (len(study.trials), study.budget) == (6, 5)
         assert len(run_study(Study.open(folder, goals=[goals.nearness]), limit=10).trials) == 11
+
+    def test_scores_of_other_releases_of_a_package_are_not_mixed(
+        self, mini: SensorDesign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        module = tmp_path / "lab_parts.py"
+        module.write_text(PACKAGE)
+        info = tmp_path / "lab_parts-1.0.dist-info"
+        info.mkdir()
+        (info / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-parts\nVersion: 1.0\n")
+        points = "".join(f"[optisense.{each}\n" for each in POINTS)
+        (info / "entry_points.txt").write_text(points)
+        monkeypatch.syspath_prepend(tmp_path)
+        chalks = [{"kind": "lab-chalk", "white": white} for white in (0.4, 0.8)]
+        space = {"camera.fov": (40.0, 60.0), "coating": Choice(chalks)}
+        with OBJECTIVES.forgetting(), METHODS.forgetting(), CoatingModel.kinds.forgetting():
+            folder = tmp_path / "study"
+            found = search(
+                mini, space, "2*'lab-width'", method="lab-method", budget=2, out=folder
+            ).study.settings.packages
+            assert sorted(found) == [
+                "kind of coating 'lab-chalk'",
+                "objective 'lab-width'",
+                "search method 'lab-method'",
+            ]
+            assert len(run_study(Study.open(folder), limit=3).trials) == 4
+            module.write_text(PACKAGE.replace("camera.fov", "2 * camera.fov"))
+            edited = "objective 'lab-width' of lab-parts 1.0; its module was edited"
+            with pytest.raises(SearchError, match=edited):
+                run_study(Study.open(folder), limit=4)
+            info.rename(tmp_path / "lab_parts-1.1.dist-info")
+            metadata = tmp_path / "lab_parts-1.1.dist-info" / "METADATA"
+            metadata.write_text(metadata.read_text().replace("1.0", "1.1"))
+            with pytest.raises(SearchError, match=r"of lab-parts 1.0; it is of lab-parts 1.1 now"):
+                run_study(Study.open(folder), limit=4)
+            before = Study.open(folder)
+            before.settings = replace(before.settings, packages={})  # as of an earlier release
+            assert len(run_study(before, limit=4).trials) == 5
 
     def test_broken_files_are_told(self, folder: Path, tmp_path: Path) -> None:
         with pytest.raises(SearchError, match="no study in this folder"):

@@ -23,11 +23,9 @@ from optisense.search.space.constraints import Constraint, UserRule
 from optisense.search.space.manufacturing import SAMPLES, ManufacturingErrors
 from optisense.search.space.search_space import SearchSpace
 from optisense.search.study._definitions import SCORING
-from optisense.search.study.settings import StudySettings
+from optisense.search.study._packages import packages_of
+from optisense.search.study.settings import ONLY_HERE, StudySettings
 from optisense.untrusted_files import MOST_PROGRAM, read_bytes
-
-ONLY_HERE = "function:"
-"""Prefix of the name of a goal or rule that is a function of the calling program, in no file."""
 
 RAYS_ACROSS = 320
 """Number of chief rays across the image unless `ray_resolution` is given: a quarter of the rays
@@ -112,6 +110,7 @@ class Plan:
             samples=samples,
             requirements=kept,
             coarse_first=self.coarse_first,
+            packages=packages_of(objectives, kept, self.method, bound),
             scoring=SCORING,
         )
 

@@ -25,10 +25,13 @@ STUDY_FILE = "study.json"
 LIBRARIES = ("optisense", "cma", "numpy", "scipy", "mitsuba")
 """Packages on which the numbers of a study depend."""
 
+ONLY_HERE = "function:"
+"""Prefix of the name of a goal or rule that is a function of the calling program, in no file."""
+
 MOST_NAMES = 100
 """Largest number of a study's objectives, or rules; with more, no useful front is found."""
 
-LATER = ("requirements", "coarse_first")
+LATER = ("requirements", "coarse_first", "packages")
 """Settings that studies of earlier releases do not have. They count as their defaults, and are left
 out of comparisons if they have their defaults, so that such studies can be resumed.
 """
@@ -62,6 +65,8 @@ class StudySettings:
             on which they rest.
         rules: constraints as FILE.py:FUNCTION, or "function:NAME".
         files: SHA-256 of each user's file with objectives or rules, by path.
+        packages: installed packages of objectives, the method and kinds
+            (`optisense.search.study._packages`); empty also if they were not stored yet.
         errors: manufacturing errors, as from `ManufacturingErrors.to_plain`, for P10; else None.
         samples: number of manufactured sensors per trial.
         requirements: conditions that the best trial must meet.
@@ -94,6 +99,7 @@ class StudySettings:
     samples: Whole = 0
     requirements: Names = field(default_factory=list)
     coarse_first: bool = False
+    packages: dict[str, dict[str, str]] = field(default_factory=dict)
     scoring: Whole = 0
     begun: str = field(default_factory=lambda: datetime.now(UTC).isoformat(timespec="seconds"))
     versions: dict[str, str] = field(default_factory=lambda: package_versions())
@@ -109,10 +115,12 @@ class StudySettings:
 
     def comparable(self) -> dict[str, Any]:
         """Return the settings that must be equal for a study to be resumed. The design, which is
-        compared value by value, the budget, which may grow, and the version of the scoring, of
-        which trials are compared, are left out.
+        compared value by value, the budget, which may grow, the version of the scoring, of which
+        trials are compared, and the packages, which have an error of their own, are left out.
         """
-        return self._without("begun", "versions", "scoring", "design", "fingerprint", "budget")
+        return self._without(
+            "begun", "versions", "scoring", "packages", "design", "fingerprint", "budget"
+        )
 
     def _without(self, *names: str) -> dict[str, Any]:
         """Return all settings but these, and but those of `OPTIONAL` that are not used."""

@@ -31,6 +31,7 @@ from optisense.library import with_own_lights
 from optisense.search.evaluation.evaluator import DesignEvaluator, Goal
 from optisense.search.space.constraints import Constraint
 from optisense.search.space.search_space import BoundSpace, SearchSpace
+from optisense.search.study._packages import refuse_other_packages
 from optisense.search.study.best import best_of, front_among, nearest, start_of
 from optisense.search.study.folder import (
     STORE_FILE,
@@ -38,8 +39,8 @@ from optisense.search.study.folder import (
     save_and_reload,
     unedited_design,
 )
-from optisense.search.study.plan import ONLY_HERE, Plan, file_prints, known_goals, known_rules
-from optisense.search.study.settings import StudySettings
+from optisense.search.study.plan import Plan, file_prints, known_goals, known_rules
+from optisense.search.study.settings import ONLY_HERE, StudySettings
 from optisense.search.study.store import Row, Store
 from optisense.search.study.trial import Trial
 from optisense.search.study.trust import not_trusted, trust
@@ -214,8 +215,8 @@ class Study:
         """Return the evaluator of its points, on a variant of the renderer.
 
         Raises:
-            SearchError: a goal or rule is known only to the program that began the study, or is in
-                a Python file that the user has not named.
+            SearchError: a goal or rule is known only to the program that began the study, is in a
+                Python file that the user has not named, or it, the method or a kind was changed.
         """
         known = self.references
         unknown = [each.removeprefix(ONLY_HERE) for each in known if each.startswith(ONLY_HERE)]
@@ -241,6 +242,7 @@ class Study:
                 where=str(self.folder),
                 hint="Read it; if you trust it, continue with optisense search --resume --trust",
             )
+        refuse_other_packages(self.settings, self.space)
         settings = self.settings
         return DesignEvaluator(
             self.space,

@@ -1,0 +1,100 @@
+"""Packages whose objectives, search methods and kinds a study uses, and the check that they are the
+same when the study is resumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from typing import Any
+
+from optisense.design import SensorDesign
+from optisense.errors import OptiSenseError, SearchError
+from optisense.objectives.named import named_in
+from optisense.objectives.registry import OBJECTIVES
+from optisense.registry import Registry
+from optisense.search.evaluation.requirements import requirements_of
+from optisense.search.methods import METHODS
+from optisense.search.space.parameters import Choice
+from optisense.search.space.search_space import BoundSpace
+from optisense.search.study.settings import ONLY_HERE, StudySettings
+
+
+def packages_of(
+    objectives: Sequence[str], requirements: Sequence[str], method: str, space: BoundSpace
+) -> dict[str, dict[str, str]]:
+    """Return the installed packages of the objectives, the method and the kinds of a search.
+
+    Kinds are those of the design that the search starts from, and those that a choice has as an
+    option.
+
+    Args:
+        objectives: references to the objectives, as in `StudySettings`.
+        requirements: conditions as texts.
+
+    Returns:
+        Package, version and SHA-256 of the module (`Registry.origin`) of each object that comes
+        from an entry point, by its noun and name, such as "search method 'halving'".
+
+    Raises:
+        OptiSenseError: one of them can't be loaded.
+    """
+    texts = [each for each in objectives if not each.startswith(ONLY_HERE)]
+    texts += [each.quantity for each in requirements_of(requirements)]
+    used: list[tuple[Registry[Any], str]] = [(OBJECTIVES, name) for name in named_in(texts)]
+    used.append((METHODS, method.strip().lower()))
+    for design in _designs(space):
+        used += [(value.kinds, value.kind) for value in design.values_of_kinds().values()]
+    found = {}
+    for registry, name in dict.fromkeys(used):
+        origin = registry.origin(name)
+        if origin is not None:
+            found[f"{registry.noun} '{name}'"] = origin._asdict()
+    return found
+
+
+def _designs(space: BoundSpace) -> Iterator[SensorDesign]:
+    """Yield the design of a space, and one for each option that may be a kind."""
+    yield space.design
+    for number, parameter in enumerate(space.parameters):
+        kind = parameter.kind
+        if not isinstance(kind, Choice):
+            continue
+        for level, option in zip(kind.levels, kind.options, strict=True):
+            if isinstance(option, Mapping):
+                point = space.start.copy()
+                point[number] = level
+                with suppress(OptiSenseError):  # its trials fail
+                    yield space.apply(point)
+
+
+def refuse_other_packages(settings: StudySettings, space: BoundSpace) -> None:
+    """Raise SearchError if an objective, the method or a kind was of another package, or its module
+    another one, when the trials of a study were scored.
+
+    Studies of releases that stored no packages are not checked.
+    """
+    then = settings.packages
+    if not then:
+        return
+    now = packages_of(settings.objectives, settings.requirements, settings.method, space)
+    for thing, before in then.items():
+        after = now.get(thing)
+        if after == before:
+            continue
+        package = _in_words(before)
+        hint = f"Install {package} again, or begin a new study"
+        if after is None:
+            changed = "it is not of this package any more"
+        elif _in_words(after) != package:
+            changed = f"it is of {_in_words(after)} now"
+        else:
+            changed = "its module was edited since"
+            hint = "Undo the change, or begin a new study"
+        raise SearchError(
+            f"the study's trials were scored with the {thing} of {package}; {changed}", hint=hint
+        )
+
+
+def _in_words(origin: Mapping[str, str]) -> str:
+    return f"{origin.get('package')} {origin.get('version')}"
