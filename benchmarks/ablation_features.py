@@ -198,6 +198,9 @@ def _of_light() -> list[Ablation]:
     def one_length(cells: Any, halves: Any, radii: Any) -> Any:
         return np.full(cells.cells, np.inf)
 
+    def unchanged(kernels: Any, landed: Any, photons: int) -> Any:
+        return np.ones_like(landed)
+
     false = property(lambda store: False)
     return [
         _light("emission guiding", Change(emission_guide, "MIN_DENSITY", 1.0)),
@@ -208,7 +211,7 @@ def _of_light() -> list[Ablation]:
         _light("kernel widths from pilot photons", Change(smoothing, "varies_over", one_length)),
         _light("kernels within one orientation", Change(smoothing, "MIN_NORMAL_COSINE", -2.0)),
         _light("narrow kernels outside the view", Change(store, "SMOOTHED_MARGIN", 1e6)),
-        _light("sharpening", Change(smoothing, "MAX_SHARPENING", 0.0)),
+        _light("sharpening", Change(smoothing.Kernels, "sharpening", unchanged)),
         _light("overlapping bins", Change(tally, "dither", no_overlap)),
         _light("weak beams merged", Change(beams, "STRONG_SHARE", 0.0)),
         _light("widened beams of single photons", Change(beams, "SPARSE_SHARE", 0.0)),

@@ -53,9 +53,6 @@ CELL_BLUR = 1.5
 """Squared radius, in squared cell sides, by which the blur of the cells widens a kernel. Landing in
 a cell and reading from up to half a cell away is three box filters of a cell's side, each of
 variance 1/12; the variance of Epanechnikov's kernel is 1/6 of its squared radius."""
-MAX_SHARPENING = 0.25
-"""Largest relative change of a cell's light by the sharpening. Kernels of `MAX_RADIUS_RATIO` need
-5 % (see `varies_over`); more is due to noise or to the edge of a shadow."""
 CACHED_BYTES = 6e5
 """Size (bytes) of the rows of a table that make one row of a product above which blocks of columns
 are multiplied: a third of a processor core's cache of 2 MB, as each row is used again for the rows
@@ -180,20 +177,24 @@ class Kernels:
         """Return factors (cells, groups) that undo most of the blur of the kernel and the cells.
 
         The kernel lowers peaks and fills hollows. Smoothing the smoothed light once more shows by
-        how much, and the ratio is divided out: multiplicative bias correction (Jones, Linton and
-        Nielsen 1995).
+        how much, and the difference is added ("twicing", see `smoothing`). Light cannot become
+        negative: what a cell lacks to zero is taken from the light that the blur brought there. The
+        power is conserved. With the ratio in place of the difference (Jones, Linton and Nielsen
+        1995), each peak and each edge would add power: a tenth of that of a lamp of 15 degrees.
 
         Args:
             landed: (cells, groups) power (mW) on each cell.
             photons: number of emitted photons.
         """
         kernel = self.smoothing(photons)
+        areas, near = self.cells.areas[:, None], self.near[:, None]
         smooth = kernel.kernel @ landed
-        again = kernel.blur @ (smooth * self.cells.areas[:, None])
-        sharpened = (again > 0) & self.near[:, None]
-        change = np.divide(smooth, again, out=np.ones_like(smooth), where=sharpened) - 1
-        change *= kernel.strength[:, None]
-        return 1 + np.clip(change, -MAX_SHARPENING, MAX_SHARPENING)
+        again = kernel.blur @ (smooth * areas)
+        sharp = smooth + np.where(near, kernel.strength[:, None] * (smooth - again), 0.0)
+        lacks = np.maximum(-sharp, 0.0)
+        share = np.divide(lacks * areas, again, out=np.zeros_like(again), where=lacks > 0)
+        sharp = np.maximum(sharp + lacks - smooth * (kernel.blur.T @ share), 0.0)
+        return np.divide(sharp, smooth, out=np.ones_like(smooth), where=near & (smooth > 0))
 
 
 def varies_over(cells: SurfaceCells, halves: FloatingArray, radii: FloatingArray) -> FloatingArray:
