@@ -14,8 +14,8 @@ from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_weights
+from optisense.geometry.carving import without
 from optisense.geometry.coarseness import chord_error
-from optisense.geometry.common_space import without
 from optisense.geometry.containment import inside
 from optisense.geometry.folds import find_fold
 from optisense.geometry.overlaps import (

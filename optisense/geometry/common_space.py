@@ -1,4 +1,4 @@
-"""The space that two closed meshes share, and what is left of one of them without it."""
+"""The space that two closed meshes share."""
 
 from __future__ import annotations
 
@@ -14,10 +14,6 @@ from optisense.geometry.overlaps import CONTACT, find_overlap
 Places = weakref.WeakKeyDictionary[TriangleMesh, FloatArray | None]
 
 _known: weakref.WeakKeyDictionary[TriangleMesh, Places] = weakref.WeakKeyDictionary()
-
-Rests = weakref.WeakKeyDictionary[TriangleMesh, TriangleMesh | None]
-
-_rests: weakref.WeakKeyDictionary[TriangleMesh, Rests] = weakref.WeakKeyDictionary()
 
 
 def common_space(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
@@ -43,33 +39,6 @@ def _found(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
     if find_overlap(first, second) is None:
         return None
     return thick_place(as_manifold(first) ^ as_manifold(second), CONTACT)
-
-
-def without(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh:
-    """Return a solid without the space that it shares with another one, or the solid itself if they
-    share none or nothing would be left; cached for the next call with the same solids.
-
-    Unlike `common_space`, this also finds solids that share space without crossing each other's
-    surfaces, as those with sides in one plane.
-
-    Args:
-        first, second: closed meshes, mm.
-    """
-    beside = _rests.setdefault(first, weakref.WeakKeyDictionary())
-    if second not in beside:
-        beside[second] = _carved(first, second)
-    rest = beside[second]
-    return first if rest is None else rest
-
-
-def _carved(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh | None:
-    if ((first.bounds[0] >= second.bounds[1]) | (first.bounds[1] <= second.bounds[0])).any():
-        return None
-    one, other = as_manifold(first), as_manifold(second)
-    if thick_place(one ^ other, CONTACT) is None:
-        return None
-    rest = one - other
-    return None if rest.is_empty() else of_manifold(rest)
 
 
 def thick_place(common: Any, thinnest: float) -> FloatArray | None:

@@ -83,7 +83,6 @@ def shapes(design: SensorDesign) -> list[Shape]:
         cage = next((each for each in design.cages.values() if name in each.parts), None)
         if mesh.is_closed and (whole := united(mesh)) is not mesh:
             mesh, cage = whole, None
-            meshes[name] = whole
         if part.role is Role.ELASTOMER:
             left = carved(design, meshes, name)
             if left is not meshes[name]:
