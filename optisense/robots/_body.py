@@ -16,7 +16,8 @@ from optisense.design.projection import image_edges
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.bodies import united
-from optisense.geometry.common_space import as_manifold, of_manifold
+from optisense.geometry.common_space import as_manifold, of_manifold, thick_place
+from optisense.geometry.overlaps import CONTACT
 from optisense.geometry.surface import closest_points
 from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
 from optisense.robots._densities import density_of
@@ -150,7 +151,8 @@ def sensor_body(
     _check(design, solids, mass, given)
     notes: list[str] = []
     real = _without_overlaps(design, solids)
-    for each in [each for each in solids if real[each.name].is_empty()]:
+    # The faces of solids that lie in one plane but for rounding leave slivers.
+    for each in [each for each in solids if thick_place(real[each.name], CONTACT) is None]:
         solids.remove(each)
         notes.append(
             f"{each.name} has neither mass nor contacts, as other parts fill all of its space"

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from optisense import sensors
 from optisense.design import Part, Role, SensorDesign
@@ -152,13 +153,17 @@ def test_a_weighed_sensor() -> None:
     assert heavier.mass - one.mass == pytest.approx(1.03e-6 * gel, rel=1e-3)
 
 
-def test_a_solid_inside_another_one_is_left_out() -> None:
-    """Nothing remains of it, so that it adds neither mass nor a hull."""
+@pytest.mark.parametrize(("off", "turn"), [(0.0, 0.0), (8.0, 0.3)])
+def test_a_solid_inside_another_one_is_left_out(off: float, turn: float) -> None:
+    """Nothing remains of it, so that it adds neither mass nor a hull; or slivers on a common side,
+    if the coordinates are rounded.
+    """
     design = sensors.build("gelsight-mini-ideal")
-    for name, half, priority in (("outer", 10.0, 1), ("inner", 2.0, 0)):
+    for name, middle, half, priority in (("outer", 0.0, 10.0, 1), ("inner", -off, 2.0, 0)):
         design.parts[name] = Part(role=Role.BLOCKER, mesh=f"meshes/{name}.obj", priority=priority)
-        low, high = np.array([0.0, 0.0, -50.0]) + half * np.array([[-1.0], [1.0]])
-        design.meshes[name] = TriangleMesh.box(low, high)
+        box = TriangleMesh.box((middle - half, -half, -half), (middle + half, half, half))
+        turned = box.vertices @ Rotation.from_euler("xz", [turn, turn]).as_matrix().T
+        design.meshes[name] = box.with_vertices(np.round(turned, 6) - (0.0, 0.0, 50.0))
     both = sensor_body(design)
     assert any(note.startswith("inner has neither mass nor contacts") for note in both.notes)
     assert "inner-hull" not in {each.name for each in both.hulls}
