@@ -34,14 +34,6 @@ from optisense.writing import TEMPORARY, remedy
 
 LOCK_FILE = ".optisense.lock"
 
-DESIGN = "design.yaml"
-"""File by which the folder of a design is recognised."""
-
-MOST_OF_MARK = 1 << 24
-"""Largest number of bytes of a file in which the mark of earlier results is searched; the largest
-tables of scores have a tenth of it.
-"""
-
 SUBFOLDERS = (
     "arrays",
     "cameras",
@@ -304,41 +296,6 @@ def holder_of(folder: Path) -> Holder | None:
         return holder if holder is not None and holder.is_elsewhere else None
     finally:
         os.close(file)
-
-
-def refuse_to_replace(folder: str | Path, files: Iterable[str], mark: tuple[str, str]) -> bool:
-    """Refuse to write results into the folder of a design, or over files of the user.
-
-    Args:
-        folder: folder of the results; it need not exist.
-        files: files that will be written, relative to the folder.
-        mark: one of the files and a text in it, by which a folder of earlier results of the same
-            kind is recognised; there, files may be replaced.
-
-    Returns:
-        Whether the folder holds earlier results.
-
-    Raises:
-        OutputError: the folder holds a design, or one of the files exists and is not of such
-            results.
-    """
-    place = Path(folder)
-    if (place / DESIGN).exists():
-        raise OutputError(
-            "this is the folder of a design", where=str(folder), hint="Name another one after --out"
-        )
-    file, text = mark
-    with contextlib.suppress(OSError), (place / file).open("rb") as opened:
-        if text.encode() in opened.read(MOST_OF_MARK):
-            return True
-    for name in files:
-        if os.path.lexists(place / name):
-            raise OutputError(
-                "the file exists already, and is not of earlier results of this command",
-                where=str(place / name),
-                hint="Name another folder after --out, or remove the file",
-            )
-    return False
 
 
 def remove_temporary_files(folder: Path, subfolders: Iterable[str]) -> None:

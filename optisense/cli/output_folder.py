@@ -7,8 +7,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from optisense.cli.console import on_exit
+from optisense.earlier_results import refuse_to_replace
 from optisense.errors import OutputError
-from optisense.folders import hold, refuse_to_replace
+from optisense.folders import hold
 
 
 def take_folder(

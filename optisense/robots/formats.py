@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.design import SensorDesign
+from optisense.earlier_results import holds_earlier_results, refuse_to_replace
 from optisense.errors import DesignError, OutputError, OwnCodeError
-from optisense.folders import refuse_to_replace
 from optisense.registry import Registry, must_be
 from optisense.robots._body import SensorBody, sensor_body
 from optisense.robots._mjcf import mjcf
@@ -98,9 +98,9 @@ def export_robot(
         f"{MESHES}/{each.name}.stl": stl_bytes_of(f"{each.name}, metres", each.mesh)
         for each in meshes
     }
-    again = refuse_to_replace(
-        folder, files, (f"{MESHES}/{meshes[0].name}.stl", f"{meshes[0].name}, metres")
-    )
+    mark = f"{MESHES}/{meshes[0].name}.stl", f"{meshes[0].name}, metres"
+    again = holds_earlier_results(folder, mark)
+    refuse_to_replace(folder, files, mark)
     finals = [inside(Path(folder), name) for name in files]
     with written_together("the files for a robot simulator") as stage:
         for final, data in zip(finals, files.values(), strict=True):

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from optisense.design import SensorDesign
+from optisense.earlier_results import holds_earlier_results, refuse_to_replace
 from optisense.errors import DesignError, OutputError
-from optisense.folders import refuse_to_replace
 from optisense.workshop._assembly_files import assembly_files
 from optisense.workshop._bill_of_materials import bill_of_materials
 from optisense.workshop._drawings import cut_file, drawing
@@ -168,7 +168,8 @@ def _write_all(folder: Path, writers: dict[str, Writer], notes: list[str]) -> li
     """Write each file under a temporary name, and rename them when all are complete; a list that a
     writer returns is added to the notes.
     """
-    again = refuse_to_replace(folder, writers, MARK)
+    again = holds_earlier_results(folder, MARK)
+    refuse_to_replace(folder, writers, MARK)
     finals = [folder / file for file in writers]
     with written_together("the workshop's files") as stage:
         for final, write in zip(finals, writers.values(), strict=True):
