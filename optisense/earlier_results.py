@@ -23,11 +23,15 @@ def holds_earlier_results(folder: str | Path, mark: tuple[str, str]) -> bool:
 
     Args:
         folder: folder of the results; it need not exist.
-        mark: a file of the results and a text in it, by which they are recognised.
+        mark: a file of the results (one of those that match, if it has a `*`) and a text in it, by
+            which they are recognised.
     """
     file, text = mark
-    with contextlib.suppress(OSError), (Path(folder) / file).open("rb") as opened:
-        return text.encode() in opened.read(MOST_OF_MARK)
+    with contextlib.suppress(OSError):
+        for place in Path(folder).glob(file):
+            with contextlib.suppress(OSError), place.open("rb") as opened:
+                if text.encode() in opened.read(MOST_OF_MARK):
+                    return True
     return False
 
 

@@ -20,6 +20,9 @@ from optisense.writing import inside, written_together
 MESHES = "meshes"
 """Folder of the mesh files, beside the files that name them."""
 
+MARK = (f"{MESHES}/*.stl", ", metres")
+"""Files of each export, and a text in them, by which the folder of an earlier one is recognised."""
+
 
 @dataclass(frozen=True)
 class RobotFormat:
@@ -98,9 +101,8 @@ def export_robot(
         f"{MESHES}/{each.name}.stl": stl_bytes_of(f"{each.name}, metres", each.mesh)
         for each in meshes
     }
-    mark = f"{MESHES}/{meshes[0].name}.stl", f"{meshes[0].name}, metres"
-    again = holds_earlier_results(folder, mark)
-    refuse_to_replace(folder, files, mark)
+    again = holds_earlier_results(folder, MARK)
+    refuse_to_replace(folder, files, MARK)
     finals = [inside(Path(folder), name) for name in files]
     with written_together("the files for a robot simulator") as stage:
         for final, data in zip(finals, files.values(), strict=True):

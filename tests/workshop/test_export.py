@@ -57,15 +57,22 @@ def test_a_long_name_keeps_the_file_of_the_moulds_apart(flat: SensorDesign, tmp_
     assert {f"{design.name}.3mf", f"{design.name}-moulds.3mf"} <= names
 
 
+def with_part_renamed(design: SensorDesign, old: str, new: str) -> SensorDesign:
+    """A copy of the design, without cages, in which a part has another name."""
+    copy = design.model_copy(deep=True)
+    copy.cages = {}
+    copy.parts = {new if name == old else name: part for name, part in copy.parts.items()}
+    copy.meshes[new] = copy.meshes.pop(old)
+    return copy
+
+
 def test_files_of_an_earlier_export_are_named(flat: SensorDesign, tmp_path: Path) -> None:
     """They stay, as the user may need them; and nothing is said of a folder of other files."""
     notes: list[str] = []
     (tmp_path / "mine.txt").write_text("")
     export(flat, tmp_path, "stl", notes)
     assert not notes
-    renamed = flat.model_copy(deep=True)
-    renamed.parts["holder"] = renamed.parts.pop("guide")
-    renamed.meshes["holder"] = renamed.meshes.pop("guide")
+    renamed = with_part_renamed(flat, "guide", "holder")
     export(renamed, tmp_path, "stl", notes)
     assert len(notes) == 1
     assert notes[0].endswith("one: guide-cut.dxf, guide-drawing.svg, guide.stl, mine.txt")
@@ -74,6 +81,9 @@ def test_files_of_an_earlier_export_are_named(flat: SensorDesign, tmp_path: Path
     export_robot(flat, tmp_path / "robot", notes=told)
     export_robot(renamed, tmp_path / "robot", notes=told)
     assert told[-1].endswith("one: meshes/guide-hull.stl, meshes/guide.stl")
+    (first, *_) = flat.parts
+    export_robot(with_part_renamed(renamed, first, "other"), tmp_path / "robot", notes=told)
+    assert told[-1].endswith(f"meshes/guide.stl, meshes/{first}.stl")
 
 
 @pytest.mark.parametrize("holds_all", [False, True])
