@@ -8,12 +8,12 @@ from pathlib import Path
 
 from optisense.design import SensorDesign
 from optisense.earlier_results import holds_earlier_results, refuse_to_replace
-from optisense.errors import DesignError, OutputError, OwnCodeError
+from optisense.errors import OutputError, OwnCodeError
 from optisense.registry import Registry, must_be
 from optisense.robots._body import SensorBody, sensor_body
 from optisense.robots._mjcf import mjcf
 from optisense.robots._urdf import urdf, without_friction
-from optisense.workshop.export import notes_on_others
+from optisense.workshop.export import notes_on_others, twin_of, twins
 from optisense.workshop.mesh_formats import stl_bytes_of
 from optisense.writing import inside, written_together
 
@@ -87,20 +87,13 @@ def export_robot(
     wanted = [formats] if isinstance(formats, str) else formats
     kinds = [ROBOT_FORMATS.find(name) for name in dict.fromkeys(wanted)]
     body = sensor_body(design, mass=mass, densities=densities)
-    meshes = [*body.looks, *body.hulls]
-    names = [each.name.casefold() for each in meshes]
-    twice = next((each.name for each in meshes if names.count(each.name.casefold()) > 1), None)
-    if twice is not None:
-        raise DesignError(
-            f"two files would have the name '{twice}.stl'",
-            where=f"parts.{twice}",
-            hint="Rename the part: their files would overwrite each other",
-        )
     files = {f"{body.name}{kind.suffix}": _text_of(kind, body).encode() for kind in kinds}
-    files |= {
-        f"{MESHES}/{each.name}.stl": stl_bytes_of(f"{each.name}, metres", each.mesh)
-        for each in meshes
-    }
+    for each in (*body.looks, *body.hulls):
+        file = f"{MESHES}/{each.name}.stl"
+        twin = twin_of(file, files)
+        if twin is not None:
+            raise twins(file, twin, Path(twin).stem)
+        files[file] = stl_bytes_of(f"{each.name}, metres", each.mesh)
     again = holds_earlier_results(folder, MARK)
     refuse_to_replace(folder, files, MARK)
     finals = [inside(Path(folder), name) for name in files]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -133,22 +133,31 @@ def _add(writers: dict[str, Writer], file: str, write: Writer, part: str | None 
         OutputError: another format has a file of the same name, also in another case.
         DesignError: another part, or its mould or one of its plates, has such a file.
     """
-    same = file.casefold()
-    other = next((old for name, old in writers.items() if name.casefold() == same), None)
-    if other is None:
+    twin = twin_of(file, writers)
+    if twin is None:
         writers[file] = write
         return
-    formats = [each.name for each in (other, write) if isinstance(each, _ShapeWriter)]
+    formats = [each.name for each in (writers[twin], write) if isinstance(each, _ShapeWriter)]
     if len(set(formats)) > 1:
         raise OutputError(
             f"formats '{formats[0]}' and '{formats[1]}' would both write {file}",
             hint="Export them into two folders",
         )
-    case = "" if file in writers else " but for upper and lower case"
-    raise DesignError(
+    raise twins(file, twin, part)
+
+
+def twin_of(file: str, others: Iterable[str]) -> str | None:
+    """Return the one of other files that has the name of a file, also in another case."""
+    return next((other for other in others if other.casefold() == file.casefold()), None)
+
+
+def twins(file: str, twin: str, part: str | None) -> DesignError:
+    """Return the error of a file of a part, and of `twin_of` it."""
+    case = "" if file == twin else " but for upper and lower case"
+    return DesignError(
         f"two files would have the name '{file}'{case}",
         where="parts" if part is None else f"parts.{part}",
-        hint="Rename the part: their files would overwrite each other",
+        hint="Rename a part, so that neither file overwrites the other",
     )
 
 

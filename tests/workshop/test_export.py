@@ -31,6 +31,15 @@ def test_two_formats_that_would_write_the_same_files_are_refused(
     assert len(files) == len(set(files))
 
 
+def with_part_renamed(design: SensorDesign, old: str, new: str) -> SensorDesign:
+    """A copy of the design, without cages, in which a part has another name."""
+    copy = design.model_copy(deep=True)
+    copy.cages = {}
+    copy.parts = {new if name == old else name: part for name, part in copy.parts.items()}
+    copy.meshes[new] = copy.meshes.pop(old)
+    return copy
+
+
 @pytest.mark.parametrize(
     ("part", "clash"),
     [("wall-1", "wall-1-cut.dxf"), ("gel-mould-front", "gel-mould-front.stl"), ("GEL", "GEL.stl")],
@@ -51,19 +60,25 @@ def test_no_file_of_a_part_replaces_that_of_another(
     assert not (tmp_path / "parts").exists()
 
 
+def test_files_for_robots_and_those_without_a_part_have_their_own_names(
+    flat: SensorDesign, tmp_path: Path
+) -> None:
+    design = with_part_renamed(flat, "tray", "GEL")
+    with pytest.raises(DesignError, match=r"'meshes/GEL.stl' but for upper and lower") as found:
+        export_robot(design, tmp_path / "robot")
+    assert found.value.hint == "Rename a part, so that neither file overwrites the other"
+    placed = with_part_renamed(flat, "tray", "pick-and-place")
+    with FORMATS.forgetting(), pytest.raises(DesignError) as without_part:
+        FORMATS.register("table", ShapeFormat(".csv", lambda path, *_: path.write_text("")))
+        export(placed, tmp_path / "parts", ["table"])
+    assert (without_part.value.where, without_part.value.hint) == ("parts", found.value.hint)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_long_name_keeps_the_file_of_the_moulds_apart(flat: SensorDesign, tmp_path: Path) -> None:
     design = flat.model_copy(update={"name": "n" * 64})
     names = {file.name for file in export(design, tmp_path, "3mf", with_moulds=True)}
     assert {f"{design.name}.3mf", f"{design.name}-moulds.3mf"} <= names
-
-
-def with_part_renamed(design: SensorDesign, old: str, new: str) -> SensorDesign:
-    """A copy of the design, without cages, in which a part has another name."""
-    copy = design.model_copy(deep=True)
-    copy.cages = {}
-    copy.parts = {new if name == old else name: part for name, part in copy.parts.items()}
-    copy.meshes[new] = copy.meshes.pop(old)
-    return copy
 
 
 def test_files_of_an_earlier_export_are_named(flat: SensorDesign, tmp_path: Path) -> None:
