@@ -66,7 +66,7 @@ class LatestRequest:
         self,
         what: str,
         take: Callable[[dict[str, Any], bpy.types.Scene], None],
-        refused: Callable[[EngineError], None] = lambda error: None,
+        refused: Callable[[EngineError, bpy.types.Scene], None] = lambda error, scene: None,
         **fields: Any,
     ) -> None:
         """Send the request with the scene's design.
@@ -74,21 +74,17 @@ class LatestRequest:
         Args:
             take: function that is called with the answer and the scene of the sensor, unless that
                 is gone or has another sensor by then.
-            refused: function that is called with an error; none is shown by default, as the
-                buttons show those of the design.
+            refused: function that is called likewise with an error; none is shown by default, as
+                the buttons show those of the design.
             fields: further fields of the request.
         """
         self.drop()
         try:
             design = design_transfer.design(bpy.context.scene)
         except EngineError as error:
-            refused(error)
+            refused(error, bpy.context.scene)
             return
         subject = Subject(bpy.context.scene)
-
-        def taken(result: dict[str, Any]) -> None:
-            scene = subject.scene
-            if scene is not None:
-                take(result, scene)
-
-        self.open = session.ask(what, taken, refused, design=design, **fields)
+        self.open = session.ask(
+            what, subject.taking(take), subject.taking(refused), design=design, **fields
+        )

@@ -109,8 +109,8 @@ def words(result: dict[str, Any]) -> str:
     return text if picture > 99.5 else f"{text}; {picture:.0f} % of its pixels see skin"
 
 
-def _refused(error: EngineError) -> None:
-    if error.kind in ("Replaced", "Cancelled"):
+def _refused(error: EngineError, scene: bpy.types.Scene) -> None:
+    if error.kind in ("Replaced", "Cancelled") or scene != bpy.context.scene or not is_on(scene):
         return
     _shown.clear()
     bpy.context.window_manager.optisense_footprint.text = f"No footprint: {error.message}"

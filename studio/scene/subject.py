@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
 import bpy
 
 from .collections import objects_of
 from .contacts import pressing
 from .gather import part_names
+
+T = TypeVar("T")
 
 
 def scene_of(number: int) -> bpy.types.Scene | None:
@@ -35,6 +40,21 @@ class Subject:
         """Scene of the sensor; None if it is gone or has another sensor by now."""
         scene = scene_of(self._scene)
         return scene if scene is not None and scene.optisense.opening == self._opening else None
+
+    def taking(self, take: Callable[[T, bpy.types.Scene], None]) -> Callable[[T], None]:
+        """Return the callback for an answer or an error about the sensor.
+
+        Args:
+            take: function that is called with the answer or error and the scene, unless that is
+                gone or has another sensor by then.
+        """
+
+        def taken(answer: T) -> None:
+            scene = self.scene
+            if scene is not None:
+                take(answer, scene)
+
+        return taken
 
     def contacts(self) -> list[bpy.types.Object | None]:
         """Return the contacts in the order of the request; None in place of those that are gone."""

@@ -29,7 +29,7 @@ def _look() -> None:
         return
     scene = bpy.context.scene
     if scene is not None and scene.optisense.is_open:
-        _request.send("check", _take, lambda error: _found.clear())
+        _request.send("check", _take, lambda error, scene: _found.clear())
     else:
         _request.drop()
 

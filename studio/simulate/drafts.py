@@ -84,6 +84,7 @@ def _ask() -> None:
         return
     warming.put_off()
     subject = Subject(scene)
+    refused = _ignored if first else subject.taking(_refused)
     try:
         design = design_transfer.design(scene)
         contacts = design_transfer.contacts(scene)
@@ -92,7 +93,7 @@ def _ask() -> None:
             session.engine().send(
                 "simulate",
                 on_result=lambda result: _take(result, subject, what),
-                on_error=_ignored if first else _refused,
+                on_error=refused,
                 design=design,
                 contacts=contacts,
                 draft=True,
@@ -103,7 +104,7 @@ def _ask() -> None:
             )
         )
     except EngineError as error:
-        (_ignored if first else _refused)(error)
+        refused(error)
 
 
 def _first(scene: bpy.types.Scene, draft: str | None) -> None:
@@ -148,8 +149,8 @@ def _ignored(_: EngineError) -> None:
     """Ignore the error of a draft that the user did not ask for; *Check* and *Simulate* show it."""
 
 
-def _refused(error: EngineError) -> None:
-    if error.kind not in ("Replaced", "Cancelled"):
+def _refused(error: EngineError, scene: bpy.types.Scene) -> None:
+    if error.kind not in ("Replaced", "Cancelled") and scene == bpy.context.scene:
         session.state().note = f"{NONE}{error.message}"  # `say` would change the selection
         session.redraw()
 

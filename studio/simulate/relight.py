@@ -11,6 +11,7 @@ from ..core.engine import Engine, EngineError, Request
 from ..core.numbers import short
 from ..engine import session
 from ..scene.properties import when_relit
+from ..scene.subject import Subject
 from . import picture
 from .exposure import exposure, keep_exposure, shown_size, when_exposed
 
@@ -76,10 +77,11 @@ def _ask() -> None:
     if not now.is_of(scene):
         return
     _shown = lights(scene)
+    subject = Subject(scene)
     _open = engine.send(
         "relight",
-        on_result=_take,
-        on_error=_refused,
+        on_result=subject.taking(_take),
+        on_error=subject.taking(_refused),
         image=now.image,
         lights=_shown,
         exposure=exposure(scene),
@@ -88,18 +90,14 @@ def _ask() -> None:
     )
 
 
-def _take(result: dict[str, Any]) -> None:
-    now = bpy.context.window_manager.optisense_picture
-    scene = next((each for each in bpy.data.scenes if now.is_of(each)), None)
-    if scene is None:
-        return
+def _take(result: dict[str, Any], scene: bpy.types.Scene) -> None:
     picture.show(np.load(result["files"]["pixels"]), shown_size(scene))
     keep_exposure(scene, result["exposure"])
-    now.is_relit = True
+    bpy.context.window_manager.optisense_picture.is_relit = True
     session.redraw()
 
 
-def _refused(error: EngineError) -> None:
+def _refused(error: EngineError, scene: bpy.types.Scene) -> None:
     # After lights were added, or if the engine has forgotten the picture, only rendering helps.
     bpy.context.window_manager.optisense_picture.image = ""
     session.state().note = AGAIN

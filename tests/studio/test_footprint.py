@@ -11,8 +11,9 @@ from mathutils import Vector
 from waiting import until
 
 from studio.core import outlines
+from studio.engine import session
 from studio.looks import drawing, footprint
-from studio.scene.collections import objects_of
+from studio.scene.collections import object_of, objects_of
 from studio.scene.contacts import sensing_surface
 
 
@@ -90,6 +91,16 @@ def test_the_section_cuts_it(shown: Any) -> None:
     looks.cut, looks.axis, looks.share = True, "X", 0.5
     half = drawing.cut(shown, whole, 3)
     assert 0.3 < len(half) / len(whole) < 0.7 and (half[:, 0] > -0.1).all()
+
+
+def test_a_late_error_does_not_reach_the_next_sensor(shown: Any) -> None:
+    request, before = footprint._request, text()
+    object_of(shown, "PART", "gel").optisense.material = ""
+    footprint.wanted()
+    shown.optisense.opening = "another sensor"
+    assert request.open is not None and not request.open.done
+    session.engine().wait(request.open)
+    assert text() == before and footprint._shown
 
 
 def test_a_sensor_that_can_not_be_built_has_none(shown: Any) -> None:

@@ -30,6 +30,19 @@ def test_undo_relights_the_picture(mini: Any) -> None:
     assert np.array_equal(shown(), brighter)
 
 
+def test_a_late_answer_does_not_reach_the_next_sensor(mini: Any) -> None:
+    settings, now = mini.optisense_simulation, bpy.context.window_manager.optisense_picture
+    settings.size, settings.noise = "160", 50.0
+    assert bpy.ops.optisense.simulate() == {"FINISHED"}
+    before = shown()
+    mini.optisense.light_groups[0].flux = 20.0
+    assert relight._open is not None and not relight._open.done
+    kept = settings.exposure
+    mini.optisense.opening = "another sensor"
+    assert np.array_equal(shown(), before) and not now.is_relit
+    assert settings.auto_exposure and settings.exposure == kept
+
+
 def test_a_group_without_a_colour_is_dark(mini: Any) -> None:
     mini.optisense_simulation.size, mini.optisense_simulation.noise = "160", 50.0
     assert bpy.ops.optisense.simulate() == {"FINISHED"}

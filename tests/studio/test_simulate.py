@@ -129,6 +129,14 @@ def test_a_draft_that_can_not_be_made_selects_nothing_and_is_forgotten(
     gel.optisense.material = material
     draft()
     assert not now.note
+    gel.optisense.material, opening = "", mini.optisense.opening
+    drafts.wanted()
+    drafts._soon()
+    mini.optisense.opening = "another sensor"
+    for each in drafts._open:
+        session.engine().wait(each)
+    assert not now.note, "it is about the earlier sensor"
+    gel.optisense.material, mini.optisense.opening = material, opening
     objects_of(mini, "CAMERA")[0].optisense.kind = "NONE"
     draft()
     assert "no camera" in now.note and not now.problem
