@@ -172,6 +172,7 @@ def start_job(
     on_result: Answer,
     *,
     on_event: Answer | None = None,
+    subject: Subject | None = None,
     wait: bool,
     **fields: Any,
 ) -> bool:
@@ -181,6 +182,7 @@ def start_job(
         title: name of the job in the progress bar.
         on_result: called with the result after the job has ended.
         on_event: called with the job's events, except progress.
+        subject: sensor that errors are about; None for that of the present scene as it is.
         wait: block until the job is over, for scripts.
     """
     global _job, _job_goes_on
@@ -191,7 +193,7 @@ def start_job(
     now.fraction = 0.0
     now.cancelling = False
     now.about = title
-    subject = Subject(bpy.context.scene)
+    subject = subject or Subject(bpy.context.scene)
 
     def result(answer: dict[str, Any]) -> None:
         _over()
@@ -269,10 +271,12 @@ def say(error: EngineError, subject: Subject | None = None) -> None:
     now = state()
     _about.clear()
     texts = [error.where, f"{error.hint[:1].upper()}{error.hint[1:]}" if error.hint else ""]
-    subject = subject or Subject(bpy.context.scene)
+    here = bpy.context.scene
     is_placed = error.part or error.path or error.contact is not None
-    if is_placed and subject.scene == bpy.context.scene:
-        found = objects_at(subject, error.path or "", error.part or "", error.contact)
+    if is_placed and (subject is None or subject.scene == here):
+        found = objects_at(
+            subject or Subject(here), error.path or "", error.part or "", error.contact
+        )
         chosen = select(found)
         if found:
             _about.extend(each.name for each in found)

@@ -52,14 +52,8 @@ class OPTISENSE_OT_ledger(polls.Asking, bpy.types.Operator):
         if active is not None and active.optisense.kind == "CONTACT" and active.select_get():
             held = active.evaluated_get(context.evaluated_depsgraph_get()).matrix_world
             at = [[round(value, 5) for value in held.translation]]
-        subject = Subject(context.scene)
-
-        def traced(result: dict[str, Any]) -> None:
-            scene = subject.scene
-            if scene is not None:
-                take(result, scene)
-
-        return start(self, TITLE, "ledger", traced, design=design, at=at)
+        about = Subject(context.scene)
+        return start(self, TITLE, "ledger", about.taking(take), subject=about, design=design, at=at)
 
 
 def take(result: dict[str, Any], scene: bpy.types.Scene) -> None:

@@ -55,18 +55,13 @@ class OPTISENSE_OT_evaluate(polls.Checked, Starting, bpy.types.Operator):
 
     def start(self, context: bpy.types.Context, *, wait: bool) -> set[str]:
         subject = Subject(context.scene)
-
-        def taken(result: dict[str, Any]) -> None:
-            scene = subject.scene
-            if scene is not None:
-                take(result, scene)
-
         return start_with_design(
             self,
             context,
             "Evaluating",
             "evaluate",
-            taken,
+            subject.taking(take),
+            subject=subject,
             wait=wait,
             objectives=chosen(context),
             figures=True,
@@ -184,21 +179,19 @@ class OPTISENSE_OT_show_figure(polls.Checked, bpy.types.Operator):
 
 def draw_again(scene: bpy.types.Scene, _: str | None) -> None:
     """Trace the chief rays of a sensor that replaced another one, without waiting."""
-    subject = Subject(scene)
-
-    def traced(result: dict[str, Any]) -> None:
-        scene = subject.scene
-        if scene is not None:
-            bpy.context.window_manager.optisense_evaluation.rays = rays.show(scene, result)
-
     try:
         design = design_transfer.design(scene)
     except EngineError:  # the buttons say that
         return
+    traced = Subject(scene).taking(_show_rays)
     request = session.ask("chief_rays", traced, lambda _: None, design=design)
     running = session.running()
     if bpy.app.background and request is not None and running is not None:
         running.wait(request)
+
+
+def _show_rays(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+    bpy.context.window_manager.optisense_evaluation.rays = rays.show(scene, result)
 
 
 class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):
@@ -210,14 +203,18 @@ class OPTISENSE_OT_show_rays(polls.Asking, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         subject = Subject(context.scene)
 
-        def traced(result: dict[str, Any]) -> None:
-            scene = subject.scene
-            if scene is not None:
-                text = rays.show(scene, result)
-                bpy.context.window_manager.optisense_evaluation.rays = text
-                session.push_undo("Chief rays")
+        def traced(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+            _show_rays(result, scene)
+            session.push_undo("Chief rays")
 
-        return start_with_design(self, context, "Tracing rays", "chief_rays", traced)
+        return start_with_design(
+            self,
+            context,
+            "Tracing rays",
+            "chief_rays",
+            subject.taking(traced),
+            subject=subject,
+        )
 
 
 class OPTISENSE_OT_hide_rays(polls.Checked, bpy.types.Operator):

@@ -128,8 +128,8 @@ class _Saves:
 
         wait = bpy.app.background
         return start(
-            self, "Saving", "save", saved, wait=wait, design=design, to=folder, only_new=not own,
-            **known,
+            self, "Saving", "save", saved, subject=subject, wait=wait, design=design, to=folder,
+            only_new=not own, **known,
         )  # fmt: skip
 
 
@@ -193,7 +193,9 @@ class OPTISENSE_OT_check(polls.Asking, bpy.types.Operator):
             worst = next((p for p in problems if p["severity"] == "error"), problems[0])
             session.say(EngineError({"kind": "DesignError", **worst}), subject)
 
-        session.start_job("Checking", "check", checked, wait=bpy.app.background, design=design)
+        session.start_job(
+            "Checking", "check", checked, subject=subject, wait=bpy.app.background, design=design
+        )
         return {"FINISHED"}  # the panels show what is wrong with the design
 
 

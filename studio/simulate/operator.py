@@ -48,7 +48,7 @@ class OPTISENSE_OT_simulate(polls.Asking, Starting, bpy.types.Operator):
         def taken(result: dict[str, Any]) -> None:
             requests.take(result, subject, draft=False)
 
-        return start(self, "Simulating", "simulate", taken, wait=wait, **fields)
+        return start(self, "Simulating", "simulate", taken, subject=subject, wait=wait, **fields)
 
 
 class OPTISENSE_OT_show_picture(polls.Checked, bpy.types.Operator):
@@ -155,10 +155,9 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         subject, like = Subject(context.scene), self._like(context)
 
-        def placed(result: dict[str, Any]) -> None:
-            scene = subject.scene
-            surface = None if scene is None else sensing_surface(scene)
-            if scene is None or surface is None:
+        def placed(result: dict[str, Any], scene: bpy.types.Scene) -> None:
+            surface = sensing_surface(scene)
+            if surface is None:
                 return
             tree = tree_of(surface)
             points = [each["point"] for each in result["contacts"]]
@@ -179,7 +178,8 @@ class OPTISENSE_OT_nine_contacts(polls.Checked, bpy.types.Operator):
             context,
             "Finding nine places",
             "nine_places",
-            placed,
+            subject.taking(placed),
+            subject=subject,
             indenter=ball,
             depth=0.3,
         )
