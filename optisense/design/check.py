@@ -22,7 +22,7 @@ from optisense.design.material_checks import absorption_problems, index_problems
 from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, invalid_values, kind_problems
-from optisense.design.sensor_design import SensorDesign, without_dicts
+from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
@@ -67,7 +67,6 @@ def check_design(
     problems = invalid_values(design)
     if problems:  # the other checks rely on valid values
         return problems
-    design = without_dicts(design)
     meshes: dict[str, TriangleMesh] = {}
     for name in design.parts:
         problems += _check_mesh(design, name, meshes)

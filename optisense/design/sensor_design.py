@@ -5,15 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, cast
+from typing import Annotated, Any, Literal, Self, cast, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, StringConstraints, ValidationError, model_validator
+from pydantic import (
+    Field,
+    PrivateAttr,
+    StringConstraints,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import PydanticSerializationError
 
 from optisense.design.cage import Cage
 from optisense.design.camera import Camera
+from optisense.design.components import Components
 from optisense.design.fields import InconsistentValueError, Model, Name, is_left_out
 from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup
@@ -65,7 +74,9 @@ class SensorDesign(Model):
 
     `design.meshes` holds the undeformed mesh of each part by name; it is not part of the design
     file but stored next to it. Meshes never change: assign another one, such as
-    ``mesh.with_vertices(...)``. Changing a field checks it; see also `set_value`.
+    ``mesh.with_vertices(...)``. Changing a field checks it; see also `set_value`. A dict that is
+    set as a material, part, light group or cage (``design.materials["gel"] = {...}``) becomes the
+    object that it describes.
     """
 
     schema_version: Literal[1] = Field(default=1, description="version of this file format")
@@ -83,6 +94,7 @@ class SensorDesign(Model):
     cages: dict[Name, Cage] = Field(
         default_factory=dict,
         max_length=MOST_OF_A_KIND,
+        validate_default=True,
         description="control points that deform parts",
     )
     dispersion: bool | None = Field(
@@ -102,6 +114,12 @@ class SensorDesign(Model):
     _meshes: dict[str, TriangleMesh] = PrivateAttr(default_factory=dict)
     _source: Path | None = PrivateAttr(default=None)
     _lines: dict[tuple[str | int, ...], int] = PrivateAttr(default_factory=dict)
+
+    @field_validator("materials", "parts", "lights", "cages")
+    @classmethod
+    def _as_components(cls, given: dict[str, Any], info: ValidationInfo) -> Components:
+        section = str(info.field_name)
+        return Components(section, get_args(cls.model_fields[section].annotation)[1], given)
 
     @model_validator(mode="after")
     def _references_hold(self) -> SensorDesign:
@@ -236,15 +254,12 @@ class SensorDesign(Model):
     def values_of_kinds(self) -> dict[tuple[str | int, ...], KindModel]:
         """Return all components that come in kinds and may name files, by path: coating, materials,
         emitters, and the effects of the camera's lens and sensor.
-
-        Dicts in place of objects are left out; see `without_dicts`.
         """
         found: dict[tuple[str | int, ...], KindModel] = {("coating",): self.coating}
         for name, material in self.materials.items():
-            if isinstance(material, KindModel):
-                found["materials", name] = material
+            found["materials", name] = material
         for name, group in self.lights.items():
-            if isinstance(group, LightGroup) and group.emitter is not None:
+            if group.emitter is not None:
                 found["lights", name, "emitter"] = group.emitter
         for name, value in self.camera.kinds_of_imaging().items():
             found["camera", name] = value
@@ -311,11 +326,9 @@ class SensorDesign(Model):
         from optisense.design.section_drawing import section_svg
 
         try:
-            drawing = section_svg(without_dicts(self))
-        except (DesignError, KeyError, ValueError):  # dicts that do not fit, parts without meshes
-            parts = self.parts.items()
-            named = (f"{n} ({p.role.value})" if isinstance(p, Part) else str(n) for n, p in parts)
-            drawing = to_html(", ".join(named))
+            drawing = section_svg(self)
+        except (DesignError, KeyError, ValueError):  # incomplete: parts without meshes
+            drawing = to_html(", ".join(f"{n} ({p.role.value})" for n, p in self.parts.items()))
         return f"<div><b>{to_html(self.name)}</b><br>{drawing}</div>"
 
     def where(self, *path: str | int) -> str:
@@ -364,18 +377,6 @@ class SensorDesign(Model):
             if path in before:
                 value.located(before[path].folder)
         return design
-
-
-def without_dicts(design: SensorDesign) -> SensorDesign:
-    """Return the design, or a copy if dicts were put in place of materials, parts, light groups or
-    cages, which a copy turns into objects.
-
-    Raises:
-        DesignError: such a dict does not describe one.
-    """
-    groups = (design.materials, design.parts, design.lights, design.cages)
-    given = [each for group in groups for each in group.values()]
-    return design.copy() if any(isinstance(each, Mapping) for each in given) else design
 
 
 def same_mesh(one: TriangleMesh | None, other: TriangleMesh | None) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from optisense.design.sensor_design import SensorDesign, without_dicts
+from optisense.design.sensor_design import SensorDesign
 from optisense.library.loader import entry, is_own
 
 
@@ -18,7 +18,6 @@ def with_own_lights(design: SensorDesign) -> SensorDesign:
     Raises:
         LibraryError: a light of the user can't be read.
     """
-    design = without_dicts(design)
     groups = [
         name
         for name, group in design.lights.items()

@@ -9,7 +9,7 @@ from pathlib import Path
 from optisense import library
 from optisense.design import Diagnostic, SensorDesign, check_design, load_design, storage
 from optisense.design.problems import raise_problems
-from optisense.design.sensor_design import refuse_no_design, without_dicts
+from optisense.design.sensor_design import refuse_no_design
 from optisense.errors import DesignError
 from optisense.near import suggestion
 from optisense.registry import Registry, place_of_definition
@@ -149,4 +149,4 @@ def find_problems(design: SensorDesign, known: list[Diagnostic] | None = None) -
     found = check_design(design, light_names=library.names("light")) if known is None else known
     if any(each.severity == "error" for each in found):
         return found
-    return [*found, *light_problems(without_dicts(design))]
+    return [*found, *light_problems(design)]

@@ -2,6 +2,7 @@
 
 import json
 import os
+import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,7 @@ from optisense.design.fields import Positive
 from optisense.design.materials import CoatingModel, Dielectric, Material, Medium, Reflection
 from optisense.design.parts import Role
 from optisense.errors import DesignError, LibraryError
+from optisense.workshop.shapes import shapes
 
 COSINE_POWER = '''"""A lamp of another package."""
 
@@ -270,19 +272,28 @@ def test_reflections_and_media_of_arrays_are_those_of_tuples() -> None:
     assert absorbing == Medium(1.4, absorption=(0.1, 0.1, 0.1))
 
 
-def test_a_dict_in_place_of_a_material_or_a_light_is_what_it_says() -> None:
+def test_a_dict_in_place_of_a_material_a_part_or_a_light_is_what_it_says(tmp_path: Path) -> None:
     design = sensors.load("builtin:gelsight-mini-ideal")
+    before = design.copy()
     gel = str(design.parts["gel"].material)
     design.materials[gel] = {"kind": "dielectric", "ior": 1.4}  # type: ignore[assignment]
-    design.lights["red"] = design.lights["red"].model_dump()  # type: ignore[assignment]
-    sensors.check(design)
-    assert "red lights" in design._repr_html_()
-    assert design.copy().materials[gel] == Dielectric(ior=1.4)
-    design.materials[gel] = {"kind": "dielectric", "ior": -1.0}  # type: ignore[assignment]
-    with pytest.raises(DesignError, match=r"materials\..*\.ior"):
-        sensors.check(design)
-    design.parts["gel"] = design.parts["gel"].model_dump()  # type: ignore[assignment]
-    assert "gel, tray (" in design._repr_html_()
+    design.parts |= {"gel": design.parts["gel"].model_dump()}  # type: ignore[dict-item]
+    design.lights.update(red=design.lights["red"].model_dump())
+    design.lights.setdefault("blue", {})  # type: ignore[arg-type]
+    assert design.materials[gel] == Dielectric(ior=1.4)
+    assert (design.parts, design.lights) == (before.parts, before.lights)
+    copied = pickle.loads(pickle.dumps(design))
+    copied.parts["gel"] = copied.parts["gel"].model_dump()
+    for each in (design, copied):
+        sensors.check(each)
+        assert "red lights" in each._repr_html_()
+        assert {shape.name for shape in shapes(each)} >= {"gel"}
+    save_design(copied, tmp_path)
+    assert load_design(tmp_path) == design
+    for bad in ({"kind": "dielectric", "ior": -1.0}, "acrylic"):
+        with pytest.raises(DesignError, match=rf"'materials\.{gel}"):
+            design.materials[gel] = bad  # type: ignore[assignment]
+    assert design.materials[gel] == Dielectric(ior=1.4)
 
 
 def test_an_unknown_kind_may_be_of_a_package_that_is_not_installed() -> None:
