@@ -52,7 +52,8 @@ def test_a_draft_is_stored_for_the_sensor_that_it_shows(
     drafts._opened = True
     drafts._ask()
     mini.optisense.light_groups[0].flux *= 2.0
-    until(lambda: place.is_dir() and any(place.glob("*.npy")))
+    assert drafts._open
+    until(lambda: all(each.done for each in drafts._open))
     assert not stored_drafts.show_kept(mini)
     mini.optisense.light_groups[0].flux /= 2.0
     assert stored_drafts.show_kept(mini)
