@@ -249,11 +249,12 @@ def _print_guesses(recipe: Recipe, guessed: bool) -> None:
     for name, part in recipe.parts.items():
         faces = f"faces of {part.faces_of} towards {part.towards}"
         faces += ", and those that continue them smoothly" if part.tangent else ""
-        source = part.file or faces
-        source += f", body {part.solid}" if part.solid else ""
+        source = ", body ".join([part.file or faces, *part.solids])
         messages.print(f"guessed: {name} is {part.role.value} ({source})")
     groups = ", ".join(recipe.lights)
     messages.print(f"guessed: lights {groups}; camera {recipe.camera.model}")
+    if all(group.colour == "white" for group in recipe.lights.values()):
+        messages.print("guessed: all lights are white, as no name says red, green or blue")
 
 
 def _print_next_steps(folder: Path, recipe: Path | None = None) -> None:

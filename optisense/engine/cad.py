@@ -56,7 +56,7 @@ def cad(session: Session, fields: Cad, job: Job) -> dict[str, Any]:
             {
                 "name": each.name,
                 "file": each.file,
-                "solid": each.body.name,
+                "solid": each.solid,
                 "use": str(getattr(each.use, "value", each.use)),
                 "own_units": each.body.own_units,
                 "closed": mesh.welded().is_closed,

@@ -43,7 +43,9 @@ def main() -> int:
         arrays[f"vertices{number}"] = body.mesh.vertices
         arrays[f"faces{number}"] = body.mesh.faces
     names = np.array([body.name for body in bodies], dtype=str)
-    np.savez(folder / BODIES_FILE, names=names, solids=[body.solid for body in bodies], **arrays)
+    arrays["solids"] = [body.solid for body in bodies]
+    arrays["kinds"] = [body.kind for body in bodies]
+    np.savez(folder / BODIES_FILE, names=names, **arrays)
     return 0
 
 

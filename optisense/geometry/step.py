@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -61,11 +62,13 @@ class StepBody:
             numbered if several bodies share it.
         mesh: the mesh in the frame of the whole file, mm.
         solid: whether it is a solid.
+        kind: number that bodies of one name in one assembly share, such as copies of an LED.
     """
 
     name: str
     mesh: TriangleMesh
     solid: bool
+    kind: int
 
 
 def no_step(error: ImportError, action: str, instead: str, where: Path | None = None) -> SetupError:
@@ -137,9 +140,12 @@ def _read_apart(path: Path) -> list[StepBody]:
         with np.load(Path(folder, BODIES_FILE), allow_pickle=False) as found:
             return [
                 StepBody(
-                    str(name), TriangleMesh(found[f"vertices{n}"], found[f"faces{n}"]), bool(solid)
+                    str(name),
+                    TriangleMesh(found[f"vertices{n}"], found[f"faces{n}"]),
+                    bool(found["solids"][n]),
+                    int(found["kinds"][n]),
                 )
-                for n, (name, solid) in enumerate(zip(found["names"], found["solids"], strict=True))
+                for n, name in enumerate(found["names"])
             ]
 
 
@@ -172,14 +178,16 @@ def bodies_of(path: Path) -> list[StepBody]:
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     transfers = reader.Reader().WS().TransferReader()
     bodies = []
-    for product, shape, place in _products(tool.Label()):
+    kinds: dict[tuple[int, str], int] = {}
+    for assembly, product, shape, place in _products(tool.Label()):
         within = list(_bodies(shape))
         by_bodies = len(within) > 1 or product.startswith(NAMELESS)
         for solid, body in within:
             mesh = triangles(body.Moved(place, False))
             if len(mesh.faces):
-                name = by_bodies and _name_of_body(transfers, body)
-                bodies.append(StepBody(name or product, mesh, solid))
+                name = (by_bodies and _name_of_body(transfers, body)) or product
+                kind = kinds.setdefault((assembly, name), len(kinds))
+                bodies.append(StepBody(name, mesh, solid, kind))
     if not bodies:
         raise MeshError(
             "the STEP file holds no faces",
@@ -196,13 +204,13 @@ def _unique(names: list[str]) -> list[str]:
 
     A number that makes another of the names is skipped.
     """
-    taken, count, labels = set(names), dict[str, int](), list[str]()
+    taken, used, labels = set(names), dict[str, int](), list[str]()
     for name in names:
         label = name
-        while name in count and label in taken:
-            count[name] += 1
-            label = f"{name}-{count[name]}"
-        count.setdefault(name, 1)
+        while name in used and label in taken:
+            used[name] += 1
+            label = f"{name}-{used[name]}"
+        used.setdefault(name, 1)
         taken.add(label)
         labels.append(label)
     return labels
@@ -217,8 +225,10 @@ def quiet() -> None:
         messenger.RemovePrinter(printer)
 
 
-def _products(root: Any) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the name, the shape and the place of each leaf of the tree of assemblies."""
+def _products(root: Any) -> Iterator[tuple[int, str, Any, Any]]:
+    """Yield the number of its assembly, the name, the shape and the place of each leaf of the tree
+    of assemblies.
+    """
     from OCP.TDF import TDF_ChildIterator, TDF_Label
     from OCP.TopLoc import TopLoc_Location
     from OCP.XCAFDoc import XCAFDoc_ShapeTool
@@ -230,18 +240,23 @@ def _products(root: Any) -> Iterator[tuple[str, Any, Any]]:
             children.Next()
         return found
 
-    def walk(label: Any, place: Any, name: str) -> Iterator[tuple[str, Any, Any]]:
+    numbers = count(1)
+
+    def walk(
+        label: Any, place: Any, name: str, assembly: int = 0
+    ) -> Iterator[tuple[int, str, Any, Any]]:
         if XCAFDoc_ShapeTool.IsReference_s(label):
             product = TDF_Label()
             XCAFDoc_ShapeTool.GetReferredShape_s(label, product)
             here = place.Multiplied(XCAFDoc_ShapeTool.GetLocation_s(label))
-            yield from walk(product, here, _name(product) or _name(label) or name)
+            yield from walk(product, here, _name(product) or _name(label) or name, assembly)
         elif XCAFDoc_ShapeTool.IsAssembly_s(label):
+            assembly = next(numbers)
             for child in below(label):
                 if XCAFDoc_ShapeTool.IsComponent_s(child):
-                    yield from walk(child, place, name)
+                    yield from walk(child, place, name, assembly)
         else:
-            yield name, XCAFDoc_ShapeTool.GetShape_s(label), place
+            yield assembly, name, XCAFDoc_ShapeTool.GetShape_s(label), place
 
     free = [
         label

@@ -21,8 +21,8 @@ needs_step = pytest.mark.skipif(
 )
 
 
-def write_step(path: Path, parts: dict[str, tuple[Any, float]], unit: str = "MM") -> Path:
-    """An assembly of named shapes, each moved along x by some mm."""
+def write_step(path: Path, parts: dict[str, tuple[Any, ...]], unit: str = "MM") -> Path:
+    """An assembly of named shapes, each with one copy or several, moved along x by some mm."""
     from OCP.gp import gp_Trsf, gp_Vec
     from OCP.Interface import Interface_Static
     from OCP.STEPCAFControl import STEPCAFControl_Writer
@@ -36,12 +36,13 @@ def write_step(path: Path, parts: dict[str, tuple[Any, float]], unit: str = "MM"
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     assembly = tool.NewShape()
     TDataStd_Name.Set_s(assembly, TCollection_ExtendedString("sensor"))
-    for name, (shape, shift) in parts.items():
+    for name, (shape, *shifts) in parts.items():
         label = tool.AddShape(shape, False)
         TDataStd_Name.Set_s(label, TCollection_ExtendedString(name))
-        move = gp_Trsf()
-        move.SetTranslation(gp_Vec(shift, 0, 0))
-        tool.AddComponent(assembly, label, TopLoc_Location(move))
+        for shift in shifts:
+            move = gp_Trsf()
+            move.SetTranslation(gp_Vec(shift, 0, 0))
+            tool.AddComponent(assembly, label, TopLoc_Location(move))
     tool.UpdateAssemblies()
     writer = STEPCAFControl_Writer()
     Interface_Static.SetCVal_s("write.step.unit", unit)

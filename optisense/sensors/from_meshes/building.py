@@ -146,7 +146,7 @@ class _Builder(RecipeState):
             self.notes += [f"{name}: {note}" for note in notes]
             mended = mended if part.towards is None else self._chosen(name, mended)
             self.meshes[name] = self._cut(name, mended)
-            source = f"CAD file {part.file}" + (f", body {part.solid}" if part.solid else "")
+            source = ", body ".join([f"CAD file {part.file}", *part.solids])
             if part.on is not None:
                 source += f", laid on {part.on}"
             elif part.mirror or part.turn or part.move:

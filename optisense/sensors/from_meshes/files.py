@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,12 +48,14 @@ class Body:
         name: name of the body in a STEP file, else None.
         mesh: mesh in the file's own units; STEP files are in mm.
         own_units: whether the file states its units.
+        kind: number that bodies of one name in one assembly of a STEP file share, else None.
     """
 
     file: str
     name: str | None
     mesh: TriangleMesh
     own_units: bool
+    kind: int | None = None
 
 
 class CadFiles:
@@ -75,7 +77,9 @@ class CadFiles:
         if path not in self._read:
             self._check_exists(path, file)
             if path.suffix.lower() in STEP_FORMATS:
-                self._read[path] = [Body(file, b.name, b.mesh, True) for b in read_step(path)]
+                self._read[path] = [
+                    Body(file, each.name, each.mesh, True, each.kind) for each in read_step(path)
+                ]
             else:
                 self._read[path] = [Body(file, None, _mesh(path), False)]
         return self._read[path]
@@ -88,8 +92,8 @@ class CadFiles:
             where: name for messages, such as 'part gel (gel.stl)'.
 
         Raises:
-            OptiSenseError: see `bodies`; or a STEP file has no such body, or it has several and
-                none is named.
+            OptiSenseError: see `bodies`; or a STEP file lacks one of the bodies, or it has several
+                and none is named.
         """
         assert shape.file is not None
         bodies = self.bodies(shape.file)
@@ -101,12 +105,13 @@ class CadFiles:
                 hint="Leave solid out",
             )
         if body.own_units:
-            body = _named(bodies, shape.solid, where)
+            names = shape.solids or (None,)
+            named = [_named(bodies, name, where) for name in names]
             if shape.units is not None:
                 raise DesignError(
                     "a STEP file states its units", where=where, hint="Leave units out"
                 )
-            return body.mesh
+            return joined(named)
         scale = MM_PER[shape.units or units]
         return body.mesh.with_vertices(scale * body.mesh.vertices) if scale != 1.0 else body.mesh
 
@@ -144,6 +149,12 @@ def _mesh(path: Path) -> TriangleMesh:
             hint="In the CAD tool: show the body, select it, and export a solid or a surface as "
             "a mesh; sketches, points and hidden bodies have no faces",
         ) from None
+
+
+def joined(bodies: Sequence[Body]) -> TriangleMesh:
+    """Return the mesh of one or several bodies."""
+    meshes = [body.mesh for body in bodies]
+    return meshes[0] if len(meshes) == 1 else TriangleMesh.joined(meshes)
 
 
 def _named(bodies: list[Body], name: str | None, where: str) -> Body:

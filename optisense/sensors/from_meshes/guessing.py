@@ -26,6 +26,7 @@ from optisense.sensors.from_meshes.files import (
     ALL_FORMATS,
     Body,
     CadFiles,
+    joined,
     largest_dimension,
     likely_units,
 )
@@ -85,22 +86,30 @@ class CadBody:
         file: path of the file from the folder of the recipe.
         body: body that was read; its mesh is in the file's own units.
         use: probable use.
+        copies: further lights of its name on the same side of the gel, which count as one with it.
     """
 
     name: str
     file: str
     body: Body
     use: Use
+    copies: tuple[Body, ...] = ()
+
+    @property
+    def solid(self) -> str | list[str] | None:
+        """Name of the body in a STEP file, or names of it and its copies."""
+        names = [each.name for each in (self.body, *self.copies) if each.name is not None]
+        return names if self.copies else self.body.name
 
     @property
     def shape(self) -> ShapeReference:
         """Reference to the body in a recipe."""
-        return ShapeReference(file=self.file, solid=self.body.name)
+        return ShapeReference(file=self.file, solid=self.solid)
 
     def mesh(self, units: Units | None) -> TriangleMesh:
         """Return its mesh in mm; `units` is that of files that don't state theirs (mm if None)."""
         if self.body.own_units:
-            return self.body.mesh
+            return joined((self.body, *self.copies))
         scale = MM_PER[units or "mm"]
         return self.body.mesh.with_vertices(scale * self.body.mesh.vertices)
 
@@ -141,12 +150,37 @@ def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
                 unknown.add(name)
             found.append(CadBody(name, file.name, body, use or Role.BLOCKER))
     gels = [each.body.mesh for each in found if each.use is Role.ELASTOMER]
-    return [
+    found = [
         replace(each, use=Role.SUPPORT)
         if each.name in unknown and any(_carries(each.body.mesh, gel) for gel in gels)
         else each
         for each in found
     ]
+    return _with_copies(found)
+
+
+def _with_copies(found: list[CadBody]) -> list[CadBody]:
+    """Return the bodies, with lights of one kind on one side of the gel taken together."""
+    carrier = _carrier({each.name: each.use for each in found})
+    gel = next((each.body.mesh.bounds for each in found if each.name == carrier), np.zeros((2, 3)))
+    groups: dict[tuple[object, ...], CadBody] = {}
+    for each in found:
+        key: tuple[object, ...] = (each.name,)
+        if each.use == "lights" and each.body.kind is not None:
+            side = nearest_side((gel - each.body.mesh.bounds).mean(axis=0))
+            key = (each.file, each.body.kind, side)
+        first = groups.setdefault(key, each)
+        if first is not each:
+            groups[key] = replace(first, copies=(*first.copies, each.body))
+    return list(groups.values())
+
+
+def _carrier(uses: Mapping[str, Use | None]) -> str | None:
+    """Return the name of the body that carries the coating: the first gel, else the first support,
+    else the sensing surface itself; None if there is none of them.
+    """
+    roles = (Role.ELASTOMER, Role.SUPPORT, Role.SENSING_SURFACE)
+    return next((name for role in roles for name, use in uses.items() if use is role), None)
 
 
 def _carries(mesh: TriangleMesh, gel: TriangleMesh) -> bool:
@@ -231,11 +265,7 @@ def recipe_of(
     parts = {each.name: part_of(each, each.use) for each in found if isinstance(each.use, Role)}
     meshes = {each.name: each.mesh(units) for each in found}
     skin = next((n for n, part in parts.items() if part.role is Role.SENSING_SURFACE), None)
-    carrier = next(
-        (n for role in (Role.ELASTOMER, Role.SUPPORT) for n, part in parts.items()
-         if part.role is role),
-        skin,
-    )  # fmt: skip
+    carrier = _carrier({name: part.role for name, part in parts.items()})
     if carrier is None:
         raise MeshError(
             "no body is recognised as the gel or the sensing surface: "
@@ -284,7 +314,7 @@ def usual_name(source: Path) -> str:
 
 def part_of(found: CadBody, role: Role, material: str | None = None) -> PartChoice:
     """Return a body as a part of the recipe."""
-    return PartChoice(file=found.file, solid=found.body.name, role=role, material=material)
+    return PartChoice(file=found.file, solid=found.solid, role=role, material=material)
 
 
 def insert_skin(
@@ -315,7 +345,7 @@ def lights_over(found: CadBody, mesh: TriangleMesh, gel: TriangleMesh) -> LightC
         model=LIGHT,
         colour=colour,
         flux=usual_flux(LIGHT),
-        over=LightsOver(file=found.file, solid=found.body.name, towards=side, patches="all"),
+        over=LightsOver(file=found.file, solid=found.solid, towards=side, patches="all"),
     )
 
 

@@ -21,7 +21,9 @@ class ShapeReference(Model):
     """Shape of a recipe: a file, or faces of another part."""
 
     file: str | None = Field(default=None, description="OBJ, STL, PLY or STEP file")
-    solid: str | None = Field(default=None, description="name of the body in a STEP file")
+    solid: str | Annotated[list[str], Field(min_length=1)] | None = Field(
+        default=None, description="name of the body in a STEP file, or [NAME, NAME] for several"
+    )
     units: Units | None = Field(
         default=None, description="unit of this file, if not that of the others"
     )
@@ -46,6 +48,11 @@ class ShapeReference(Model):
         description="rotations about x, then y, then z of the frame of the file, degrees",
     )
     move: Vector | None = Field(default=None, description="translation after mirror and turn, mm")
+
+    @property
+    def solids(self) -> list[str]:
+        """Names of the bodies in a STEP file; empty if none is named."""
+        return self.solid if isinstance(self.solid, list) else [self.solid] if self.solid else []
 
     @model_validator(mode="after")
     def _one_source(self) -> ShapeReference:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from step_extra import needs_step
+from step_extra import needs_step, write_step
 
 from optisense import library, load
 from optisense.design import (
@@ -291,6 +291,23 @@ class TestStep:
             design_from_meshes(cad.write(text.replace(", solid: gel", "")))
         with pytest.raises(DesignError, match="states its units"):
             design_from_meshes(cad.write(text.replace("solid: gel", "solid: gel, units: cm")))
+
+    def test_copies_of_one_led_are_one_group_on_each_side(self, tmp_path: Path) -> None:
+        from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+        from OCP.gp import gp_Pnt
+
+        gel = BRepPrimAPI_MakeBox(gp_Pnt(-20, -2, 0), 40.0, 20.0, 4.0).Shape()
+        led = BRepPrimAPI_MakeBox(gp_Pnt(0, -4, 1), 1.0, 1.0, 1.0).Shape()
+        file = write_step(tmp_path / "pad.step", {"Gel": (gel, 0.0), "LED": (led, -3, 0, 30, 3)})
+        recipe = guess_recipe(file)
+        assert set(recipe.lights) == {"LED", "LED-3"}
+        front = recipe.lights["LED"].over
+        assert front is not None and front.towards == "+y"
+        assert front.solid == ["LED", "LED-2", "LED-4"]
+        lights = design_from_meshes(recipe).design.lights
+        assert [len(group.lights) for group in lights.values()] == [3, 1]
+        at = sorted(light.position[0] for light in lights["LED"].lights)
+        assert at == pytest.approx([-2.5, 0.5, 3.5])
 
 
 class TestFlux:
