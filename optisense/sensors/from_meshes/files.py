@@ -151,6 +151,16 @@ def _mesh(path: Path) -> TriangleMesh:
         ) from None
 
 
+def obj_objects(path: Path) -> list[str]:
+    """Return the names of the objects in an OBJ file, which are read as one body; [] for other
+    files.
+    """
+    if path.suffix.lower() != ".obj":
+        return []
+    lines = path.read_bytes().splitlines()
+    return [line[2:].strip().decode(errors="replace") for line in lines if line[:2] == b"o "]
+
+
 def joined(bodies: Sequence[Body]) -> TriangleMesh:
     """Return the mesh of one or several bodies."""
     meshes = [body.mesh for body in bodies]

@@ -29,6 +29,7 @@ from optisense.sensors.from_meshes.files import (
     joined,
     largest_dimension,
     likely_units,
+    obj_objects,
 )
 from optisense.sensors.from_meshes.fingertips import LED_PITCH, is_round, lights_and_camera
 from optisense.sensors.from_meshes.recipe import CameraChoice, Recipe
@@ -40,6 +41,7 @@ from optisense.sensors.from_meshes.recipe_lights import (
 )
 from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
 from optisense.sensors.from_meshes.surfaces import WITHIN
+from optisense.text import brief
 
 Use = Role | Literal["lights", "camera", "nothing"]
 """Use of a body: a part of some role, a reference for lights or the camera, or none."""
@@ -271,7 +273,7 @@ def recipe_of(
             "no body is recognised as the gel or the sensing surface: "
             + ", ".join(f"{each.name}: {each.use}" for each in found),
             where=str(source),
-            hint=_naming_hint(found) + ", or give the role of each body in a recipe",
+            hint=_naming_hint(found, folder),
         )
     outward = guess_outward(meshes, carrier)
     dome = is_round(meshes[carrier], outward)
@@ -296,14 +298,20 @@ def recipe_of(
     return recipe.relative_to(folder)
 
 
-def _naming_hint(found: Iterable[CadBody]) -> str:
-    """Return how to name bodies so that their roles are recognised."""
+def _naming_hint(found: Iterable[CadBody], folder: Path) -> str:
+    """Return how to name bodies so that their roles are recognised; `folder` has the files."""
+    for each in found:
+        objects = obj_objects(folder / each.file)
+        if len(objects) > 1:
+            listed = brief(", ".join(objects))
+            return (
+                f"{each.file} holds {len(objects)} objects ({listed}), which are read as one "
+                "body: export each into a file of its own, named after its role"
+            )
+    ways = "Name the files after their roles (gel.stl, window.stl, housing.stl, ...)"
     if any(each.body.own_units for each in found):
-        return (
-            "In the CAD tool: name the bodies or components after their roles (gel, window, "
-            "housing, ...)"
-        )
-    return "Name the files after their roles (gel.stl, window.stl, housing.stl, ...)"
+        ways = "In the CAD tool: name the bodies or components after their roles (gel, window, ...)"
+    return ways + ", or give the role of each body in a recipe"
 
 
 def usual_name(source: Path) -> str:

@@ -128,6 +128,18 @@ class TestFiles:
             guess_recipe(cad.folder)
         assert "gel.stl" in str(caught.value.hint)
 
+    def test_objects_of_an_obj_file_are_told(self, cad: Any) -> None:
+        cad.folder.mkdir()
+        shapes = [cad.shapes()[name] for name in ("gel", "plate")]
+        first, text = (trimesh.exchange.obj.export_obj(shape) for shape in shapes)
+        second = "\n".join(line for line in text.splitlines() if line[:2] != "f ")
+        faces = shapes[1].faces + len(shapes[0].vertices) + 1
+        second += "".join(f"\nf {a} {b} {c}" for a, b, c in faces)
+        (cad.folder / "all.obj").write_text(f"o gel\n{first}\no plate\n{second}\n")
+        with pytest.raises(MeshError, match="all: blocker") as caught:
+            guess_recipe(cad.folder)
+        assert "all.obj holds 2 objects (gel, plate)" in str(caught.value.hint)
+
     @needs_step
     def test_bodies_of_a_step_file_whose_names_say_nothing(self, tmp_path: Path) -> None:
         from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
