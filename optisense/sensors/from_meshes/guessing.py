@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal, cast
+from typing import cast
 
 import numpy as np
 
@@ -19,14 +19,13 @@ from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.joining import touching_area
 from optisense.geometry.patches import faces_towards
-from optisense.length_units import MM_PER, Units
+from optisense.length_units import Units
 from optisense.sensors._led_flux import balanced_flux
+from optisense.sensors.from_meshes.cad_bodies import CadBody, Use, carrier_of, with_copies
 from optisense.sensors.from_meshes.directions import SIDES, nearest_side, vector
 from optisense.sensors.from_meshes.files import (
     ALL_FORMATS,
-    Body,
     CadFiles,
-    joined,
     largest_dimension,
     likely_units,
     obj_objects,
@@ -39,12 +38,9 @@ from optisense.sensors.from_meshes.recipe_lights import (
     LightRow,
     LightsOver,
 )
-from optisense.sensors.from_meshes.recipe_parts import PartChoice, ShapeReference
+from optisense.sensors.from_meshes.recipe_parts import PartChoice
 from optisense.sensors.from_meshes.surfaces import WITHIN
 from optisense.text import brief
-
-Use = Role | Literal["lights", "camera", "nothing"]
-"""Use of a body: a part of some role, a reference for lights or the camera, or none."""
 
 WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
     ("lights", ("led", "leds", "light", "lights", "lamp", "lamps", "diode")),
@@ -77,43 +73,6 @@ coarse meshes of one curved face differ by that."""
 
 LIGHT, CAMERA = "smd-3528", "pi-v2"
 """Default light and camera of the library."""
-
-
-@dataclass(frozen=True)
-class CadBody:
-    """Body in the user's CAD files.
-
-    Attributes:
-        name: name for a part of the design, made of the body's or file's name.
-        file: path of the file from the folder of the recipe.
-        body: body that was read; its mesh is in the file's own units.
-        use: probable use.
-        copies: further lights of its name on the same side of the gel, which count as one with it.
-    """
-
-    name: str
-    file: str
-    body: Body
-    use: Use
-    copies: tuple[Body, ...] = ()
-
-    @property
-    def solid(self) -> str | list[str] | None:
-        """Name of the body in a STEP file, or names of it and its copies."""
-        names = [each.name for each in (self.body, *self.copies) if each.name is not None]
-        return names if self.copies else self.body.name
-
-    @property
-    def shape(self) -> ShapeReference:
-        """Reference to the body in a recipe."""
-        return ShapeReference(file=self.file, solid=self.solid)
-
-    def mesh(self, units: Units | None) -> TriangleMesh:
-        """Return its mesh in mm; `units` is that of files that don't state theirs (mm if None)."""
-        if self.body.own_units:
-            return joined((self.body, *self.copies))
-        scale = MM_PER[units or "mm"]
-        return self.body.mesh.with_vertices(scale * self.body.mesh.vertices)
 
 
 def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
@@ -158,31 +117,7 @@ def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
         else each
         for each in found
     ]
-    return _with_copies(found)
-
-
-def _with_copies(found: list[CadBody]) -> list[CadBody]:
-    """Return the bodies, with lights of one kind on one side of the gel taken together."""
-    carrier = _carrier({each.name: each.use for each in found})
-    gel = next((each.body.mesh.bounds for each in found if each.name == carrier), np.zeros((2, 3)))
-    groups: dict[tuple[object, ...], CadBody] = {}
-    for each in found:
-        key: tuple[object, ...] = (each.name,)
-        if each.use == "lights" and each.body.kind is not None:
-            side = nearest_side((gel - each.body.mesh.bounds).mean(axis=0))
-            key = (each.file, each.body.kind, side)
-        first = groups.setdefault(key, each)
-        if first is not each:
-            groups[key] = replace(first, copies=(*first.copies, each.body))
-    return list(groups.values())
-
-
-def _carrier(uses: Mapping[str, Use | None]) -> str | None:
-    """Return the name of the body that carries the coating: the first gel, else the first support,
-    else the sensing surface itself; None if there is none of them.
-    """
-    roles = (Role.ELASTOMER, Role.SUPPORT, Role.SENSING_SURFACE)
-    return next((name for role in roles for name, use in uses.items() if use is role), None)
+    return with_copies(found)
 
 
 def _carries(mesh: TriangleMesh, gel: TriangleMesh) -> bool:
@@ -267,7 +202,7 @@ def recipe_of(
     parts = {each.name: part_of(each, each.use) for each in found if isinstance(each.use, Role)}
     meshes = {each.name: each.mesh(units) for each in found}
     skin = next((n for n, part in parts.items() if part.role is Role.SENSING_SURFACE), None)
-    carrier = _carrier({name: part.role for name, part in parts.items()})
+    carrier = carrier_of({name: part.role for name, part in parts.items()})
     if carrier is None:
         raise MeshError(
             "no body is recognised as the gel or the sensing surface: "
