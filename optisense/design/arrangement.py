@@ -145,12 +145,17 @@ def skin_distances(
     design: SensorDesign, meshes: dict[str, TriangleMesh], rays: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the distances (k,), mm, at which rays (k, 3) from the camera meet the sensing surface;
-    infinite if they miss it or meet a blocker first.
+    infinite if they miss it, or meet a blocker or the outside of its coating first.
     """
     skin, blocker = np.full((2, len(rays)), np.inf)
-    for role, nearest in ((Role.SENSING_SURFACE, skin), (Role.BLOCKER, blocker)):
-        for name in design.parts_of(role):
-            if name in meshes:
-                hits = ray_hits(meshes[name], design.camera.position, rays)
-                np.minimum.at(nearest, hits.ray, hits.distance)
+    for name in design.parts_of(Role.SENSING_SURFACE, Role.BLOCKER):
+        if name not in meshes:
+            continue
+        hits = ray_hits(meshes[name], design.camera.position, rays)
+        inside = np.zeros(len(hits.ray), dtype=bool)
+        if design.parts[name].role is Role.SENSING_SURFACE:  # its normals point inward
+            normals = meshes[name].face_normals[hits.face]
+            inside = np.einsum("ki,ki->k", normals, rays[hits.ray]) < 0.0
+        np.minimum.at(skin, hits.ray[inside], hits.distance[inside])
+        np.minimum.at(blocker, hits.ray[~inside], hits.distance[~inside])
     return np.where(skin < blocker, skin, np.inf)

@@ -176,13 +176,17 @@ class ViewShares(NamedTuple):
     """Shares of the camera's view along straight rays, 0 to 1.
 
     Attributes:
-        skin: share of the sensing surface's area that is in the picture and not hidden.
+        skin: share of the sensing surface's area that faces the camera, is in the picture and not
+            hidden.
+        outside: share of the sensing surface's area that is in the picture, but whose coating's
+            outside faces the camera.
         picture: share of the picture that shows the sensing surface.
         hidden: share of the sensing surface's area that is in the picture behind a blocker, by the
             name of the blocker that is nearest to the camera.
     """
 
     skin: float
+    outside: float
     picture: float
     hidden: dict[str, float]
 
@@ -211,6 +215,18 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
                 "neglected",
                 design.where("parts", hider, "role"),
                 "If it is clear, its role is support; otherwise move it or the camera",
+                severity="warning",
+            )
+        ]
+    if shares.outside > shares.skin:
+        return [
+            Diagnostic(
+                f"the camera looks at the outside of the coating on {100 * shares.outside:.0f} % "
+                f"of the sensing surface, and sees the inside of {100 * shares.skin:.0f} %, if "
+                "refraction is neglected",
+                design.where("camera", "position"),
+                "Move the camera to the side of the gel; or, if it is there, turn the faces of the "
+                "sensing surface over, as their normals must point to that side",
                 severity="warning",
             )
         ]
@@ -246,9 +262,11 @@ def view_shares(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> ViewSh
     if total == 0.0 or design.parts_of(Role.MIRROR):
         return None
     camera = design.camera
-    points = np.concatenate([_even_points(skin, total) for skin in skins])
-    inside = points[in_picture(camera, points)]
     position = np.array(camera.position)
+    points, normals = np.concatenate([_even_points(skin, total) for skin in skins], axis=1)
+    facing = np.einsum("ki,ki->k", position - points, normals) > 0.0
+    shown = in_picture(camera, points)
+    inside = points[facing & shown]
     some = inside[::HIDDEN_STEP]
     nearest, hider = np.ones(len(some)), np.full(len(some), -1)
     blockers = [name for name in design.parts_of(Role.BLOCKER) if name in meshes]
@@ -258,24 +276,25 @@ def view_shares(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> ViewSh
         np.minimum.at(closest, hits.ray, hits.distance)
         closer = closest < nearest - BEFORE
         nearest[closer], hider[closer] = closest[closer], number
-    shown = np.isfinite(skin_distances(design, meshes, straight_rays(camera)))
-    picture = np.count_nonzero(shown) / SAMPLES
+    arriving = np.isfinite(skin_distances(design, meshes, straight_rays(camera)))
+    picture = np.count_nonzero(arriving) / SAMPLES
     counts = np.bincount(hider + 1, minlength=len(blockers) + 1) / max(1, len(some))
     counts *= len(inside) / len(points)
     hidden = {name: float(n) for name, n in zip(blockers, counts[1:], strict=True) if n > 0.0}
-    return ViewShares(float(counts[0]), picture, hidden)
+    outside = np.count_nonzero(shown & ~facing) / len(points)
+    return ViewShares(float(counts[0]), outside, picture, hidden)
 
 
 def _even_points(skin: TriangleMesh, total: float) -> NDArray[np.float64]:
-    """Return the points (k, 3), mm, of one of several sensing surfaces that stand for equal shares
-    of their `total` area, mm².
+    """Return points, mm, of one of several sensing surfaces, which stand for equal shares of their
+    `total` area, mm², and their inward normals: (2, k, 3) together.
     """
     spacing = float(np.sqrt(total / VIEW_POINTS))
-    points, _, areas = surface_samples(skin.vertices, skin.faces, spacing)
+    points, faces, areas = surface_samples(skin.vertices, skin.faces, spacing)
     count = max(1, round(VIEW_POINTS * skin.area / total))
     reached = np.cumsum(areas)
     chosen = np.searchsorted(reached, (np.arange(count) + 0.5) / count * reached[-1])
-    return np.asarray(points.T[chosen], dtype=np.float64)
+    return np.stack([points.T[chosen], skin.face_normals[faces[chosen]]]).astype(np.float64)
 
 
 def _small(message: str, where: str) -> Diagnostic:

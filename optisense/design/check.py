@@ -211,16 +211,19 @@ def _check_sensing_surfaces(
     for name in design.parts_of(Role.SENSING_SURFACE):
         chosen, front, back = solids_beside(meshes[name], solids)
         place = design.where("parts", name, "mesh")
-        if np.count_nonzero(back & ~front) > len(chosen) / 2:
+        outward = np.count_nonzero(back & ~front) / len(chosen)
+        if outward > 0.0:
+            share = "" if outward == 1.0 else f" on {100 * outward:.0f} % of its faces"
             problems.append(
                 Diagnostic(
-                    f"the sensing surface '{name}' faces outward: its normals must look into the "
-                    "elastomer, to where the light comes from",
+                    f"the sensing surface '{name}' faces outward{share}: its normals must look "
+                    "into the elastomer, to where the light comes from",
                     place,
-                    "Turn the faces of the mesh over",
+                    "Turn these faces of the mesh over",
+                    severity="error" if outward > 0.5 else "warning",
                 )
             )
-        elif np.count_nonzero(front) < len(chosen) / 2:
+        if np.count_nonzero(front | back) < len(chosen) / 2:
             problems.append(
                 Diagnostic(
                     f"most of the sensing surface '{name}' does not lie on a transparent solid",

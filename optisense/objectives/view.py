@@ -34,7 +34,8 @@ class View:
         if self.picture == 0.0:
             raise ObjectiveError(
                 "the camera sees nothing of the sensing surface",
-                hint="Check the camera's position, direction and field of view",
+                hint="Check the camera's position, direction and field of view, and that the "
+                "normals of the sensing surface point to its side",
             )
         for name, seen, least, what in (
             (

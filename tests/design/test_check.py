@@ -106,7 +106,15 @@ def test_a_light_in_the_gel_is_fine(design: SensorDesign) -> None:
 
 def test_a_sensing_surface_that_faces_outward(design: SensorDesign) -> None:
     design.meshes["skin"] = design.meshes["skin"].flipped()
-    assert "faces outward" in only(check_design(design)).message
+    assert "faces outward:" in only(check_design(design)).message
+
+
+def test_a_sensing_surface_of_which_a_part_faces_outward(design: SensorDesign) -> None:
+    skin = design.meshes["skin"]
+    turned = skin.faces.copy()
+    turned[: len(turned) // 4] = turned[: len(turned) // 4, ::-1]
+    design.meshes["skin"] = skin.with_faces(turned)
+    assert "faces outward on 25 % of its faces" in only(check_design(design), "warning").message
 
 
 def test_a_sensing_surface_away_from_the_gel(design: SensorDesign) -> None:
@@ -310,6 +318,15 @@ class TestView:
         far = set_value(plain, "camera.position", [0, 0, -300])
         problem = only(check_design(far), "warning")
         assert "fills 0 % of the picture" in problem.message
+
+    def test_the_outside_of_the_coating_is_not_seen(self, plain: SensorDesign) -> None:
+        plain.meshes["skin"] = TriangleMesh.grid((6, 5), (1, 1)).flipped()
+        above = set_value(
+            set_value(plain, "camera.position", [0, 0, 20]), "camera.direction", [0, 0, -1]
+        )
+        shares = view_shares(above, above.meshes)
+        assert shares is not None and shares.skin == 0.0 and shares.picture == 0.0
+        assert "the outside of the coating on 100 %" in only(check_design(above), "warning").message
 
     @pytest.mark.parametrize("distance", [9.0, 15.0, 19.0])
     def test_the_share_of_the_picture_that_a_rectangle_fills(

@@ -74,7 +74,7 @@ def test_a_flat_plate_shifts_rays_by_snells_law() -> None:
 def test_a_mirror_at_45_degrees_swaps_two_axes() -> None:
     tilted = [(-9.0, -50, -4), (9.0, -50, 14), (9.0, 50, 14), (-9.0, 50, -4)]
     silver = Surface(SurfaceKind.MIRROR, metal_eta=(0.1,) * 3, metal_k=(4.0,) * 3)
-    wall = [(12.0, -50, -50), (12.0, 50, -50), (12.0, 50, 50), (12.0, -50, 50)]
+    wall = [(12.0, -50, -50), (12.0, -50, 50), (12.0, 50, 50), (12.0, 50, -50)]
     rays = trace([quad("mirror", tilted, silver), quad("wall", wall, COATING)], camera(fov=30))
     right, up = slopes(30.0, 32, 24)
     x = -right
@@ -93,6 +93,11 @@ def test_a_mirror_at_45_degrees_swaps_two_axes() -> None:
 def test_a_ray_that_meets_nothing_escapes() -> None:
     rays = trace([plane(3.0)], camera(direction=(0, 0, -1)))
     assert (rays.outcome == RayOutcome.ESCAPED).all()
+
+
+def test_the_outside_of_the_coating_is_no_hit() -> None:
+    rays = trace([plane(3.0)], camera(direction=(0, 0, -1), position=(0, 0, 10)))
+    assert (rays.outcome == RayOutcome.ABSORBED).all()
 
 
 @pytest.mark.parametrize("kind", [SurfaceKind.ABSORBER, SurfaceKind.LIGHT, SurfaceKind.OPAQUE])

@@ -114,7 +114,7 @@ def test_the_limit_of_total_reflection_moves_with_a_tilted_interface() -> None:
     sheet = flat((200.0, 200.0), (0.0, 0.0, 5.0))
     glass = Surface(SurfaceKind.DIELECTRIC, eta=1.0 / eta)
     behind = flat((400.0, 400.0), (0.0, 0.0, 20.0))
-    skin = Piece("skin", behind.vertices, behind.faces, SKIN.surface)
+    skin = Piece("skin", behind.vertices, behind.faces[:, ::-1], SKIN.surface)
 
     def tilted_by(slope: float) -> DifferentiableRays:
         mesh = tilted(sheet, slope)

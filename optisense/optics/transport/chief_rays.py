@@ -31,9 +31,9 @@ kernel. Mirrors whose surface numbers differ by a multiple of it share a bit."""
 class RayOutcome(IntEnum):
     """The outcome of a chief ray."""
 
-    HIT = 0  # reached the sensing surface (or an indenter pressed into it)
+    HIT = 0  # reached the inside of the sensing surface (or an indenter pressed into it)
     ESCAPED = 1  # left the sensor
-    ABSORBED = 2  # ended on a blocker, a light, or another opaque surface
+    ABSORBED = 2  # ended on a blocker, a light, the outside of the coating, or anything opaque
     TOTAL_REFLECTION = 3  # was totally reflected on its way and did not reach the surface
     DEPTH_LIMIT = 4  # still on its way after `interact.MAX_DEPTH` surfaces
 
@@ -306,7 +306,10 @@ def sees_nothing(rays: ChiefRays, scene: RayScene) -> RenderError:
     names = {outcome: outcome.name.lower().replace("_", " ") for outcome in RayOutcome}
     counts = {names[o]: int((rays.outcome == o).sum()) for o in RayOutcome}
     met = ", ".join(f"{name}: {count}" for name, count in counts.items() if count)
-    hint = "Check the camera's position, direction and field of view, and what is in its way"
+    hint = (
+        "Check the camera's position, direction and field of view, what is in its way, and that "
+        "the normals of the sensing surface point to its side"
+    )
     if any(_is_rough_metal(piece.surface) for piece in scene.pieces):
         hint += f". Mirrors show an image if their roughness is below {SMOOTH_METAL:g}"
     return RenderError(

@@ -94,9 +94,9 @@ class Interaction:
         opaque: mask of the rays that meet an opaque surface.
         light: mask of the rays that meet the emitting face of a light.
         scattered: mask of the rays that continue from an opaque surface or a mirror.
-        sensed: mask of the rays that meet the sensing surface or an indenter.
-        ended: mask of the rays that end on anything else: a blocker, a light, another opaque
-            surface.
+        sensed: mask of the rays that meet the inside of the sensing surface, or an indenter.
+        ended: mask of the rays that end on anything else: a blocker, a light, the outside of the
+            sensing surface, another opaque surface.
         goes_on: mask of the rays that neither end nor escape.
         totally: mask of the rays that are totally reflected.
         rough: mask of the rays that meet a rough interface.
@@ -180,7 +180,8 @@ def interact(
         eta = dr.select(
             interface, channel_eta(scene.table, hit.surface, ray.channel, interface), eta
         )
-    sensed = opaque & (region != int(Region.OTHER))
+    outside = (region == int(Region.SENSING)) & (side < 0)
+    sensed = opaque & (region != int(Region.OTHER)) & ~outside
     scattered = mirror
     goes_on = interface | mirror
     if dr.hint(ray_kind.scatters, mode="scalar"):

@@ -167,16 +167,10 @@ def view_note(design: SensorDesign) -> str | None:
     shares = view_shares(design, design.meshes)
     if shares is None:
         return None
-    skin = TriangleMesh.joined(
-        [design.meshes[name] for name in design.parts_of(Role.SENSING_SURFACE)]
-    )
-    way = skin.triangles[:, 0] - np.array(design.camera.position)
-    facing = np.einsum("ij,ij->i", way, skin.face_vectors) < 0.0
-    seen = min(shares.skin, float(skin.face_areas[facing].sum() / skin.area))
-    if seen < LITTLE_SEEN:
+    if shares.skin < LITTLE_SEEN:
         return (
-            f"the camera sees about {100 * seen:.0f} % of the area of the sensing surface, if "
-            "refraction is neglected: check its place (at), what it looks at (look_at) and its "
+            f"the camera sees about {100 * shares.skin:.0f} % of the area of the sensing surface, "
+            "if refraction is neglected: check its place (at), what it looks at (look_at) and its "
             "field of view"
         )
     if shares.picture < LEAST_PICTURE:
