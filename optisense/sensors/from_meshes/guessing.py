@@ -76,7 +76,8 @@ LIGHT, CAMERA = "smd-3528", "pi-v2"
 
 
 def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
-    """Return all bodies of a CAD file, or of the CAD files in a folder.
+    """Return all bodies of a CAD file, or of the CAD files in a folder; copies of one light on one
+    side of the gel are one body.
 
     Args:
         source: file or folder.
@@ -86,6 +87,11 @@ def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
         SetupError: a file is a STEP file, but the extra for it is missing.
         MeshError: there is no CAD file, or one can't be read.
     """
+    return with_copies(_each_body(source, chosen))
+
+
+def _each_body(source: Path, chosen: Sequence[str]) -> list[CadBody]:
+    """Return each body by itself; see `find_bodies`."""
     folder = source if source.is_dir() else source.parent
     files = sorted(source.iterdir()) if source.is_dir() else [source]
     files = [file for file in files if file.suffix.lower() in ALL_FORMATS or file == source]
@@ -111,13 +117,12 @@ def find_bodies(source: Path, chosen: Sequence[str] = ()) -> list[CadBody]:
                 unknown.add(name)
             found.append(CadBody(name, file.name, body, use or Role.BLOCKER))
     gels = [each.body.mesh for each in found if each.use is Role.ELASTOMER]
-    found = [
+    return [
         replace(each, use=Role.SUPPORT)
         if each.name in unknown and any(_carries(each.body.mesh, gel) for gel in gels)
         else each
         for each in found
     ]
-    return with_copies(found)
 
 
 def _carries(mesh: TriangleMesh, gel: TriangleMesh) -> bool:
