@@ -116,19 +116,30 @@ def _each_body(source: Path, chosen: Sequence[str]) -> list[CadBody]:
             if use is None:
                 unknown.add(name)
             found.append(CadBody(name, file.name, body, use or Role.BLOCKER))
-    gels = [each.body.mesh for each in found if each.use is Role.ELASTOMER]
+    gels = [_outward(each.body.mesh) for each in found if each.use is Role.ELASTOMER]
     return [
         replace(each, use=Role.SUPPORT)
-        if each.name in unknown and any(_carries(each.body.mesh, gel) for gel in gels)
+        if each.name in unknown and _carries(_outward(each.body.mesh), gels)
         else each
         for each in found
     ]
 
 
-def _carries(mesh: TriangleMesh, gel: TriangleMesh) -> bool:
+def _outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a solid with its faces turned outward, or any other mesh as it is."""
+    try:
+        return mesh.validate("body", closed=True)
+    except MeshError:
+        return mesh
+
+
+def _carries(mesh: TriangleMesh, gels: Iterable[TriangleMesh]) -> bool:
     """Return whether a body touches so much of a gel that light must come through it."""
-    near = NEAR * float(np.ptp(gel.bounds, axis=0).max())
-    return touching_area(mesh, gel, near) > CARRIED * gel.area
+    return any(
+        touching_area(mesh, gel, NEAR * float(np.ptp(gel.bounds, axis=0).max()))
+        > CARRIED * gel.area
+        for gel in gels
+    )
 
 
 def guess_use(name: str) -> Use | None:

@@ -244,6 +244,18 @@ class TestGuessing:
         assert parts["core"].role is Role.SUPPORT
         assert parts["thing"].role is Role.BLOCKER
 
+    @pytest.mark.parametrize("share", [1.0, 0.5])
+    @pytest.mark.parametrize("name", ["gel", "plate"])
+    def test_faces_that_are_inside_out_do_not_hide_what_carries_the_gel(
+        self, cad: Any, name: str, share: float
+    ) -> None:
+        shape = cad.shapes()[name].subdivide()
+        turned = np.random.default_rng(0).random(len(shape.faces)) < share
+        shape.faces[turned] = shape.faces[turned][:, ::-1]
+        cad.write(**{name: shape})
+        (cad.folder / "plate.stl").rename(cad.folder / "core.stl")
+        assert guess_recipe(cad.folder).parts["core"].role is Role.SUPPORT
+
     def test_a_single_file_gets_lights_and_a_camera(self, cad: Any) -> None:
         cad.write()
         design = design_from_meshes(guess_recipe(cad.folder / "gel.stl")).design
