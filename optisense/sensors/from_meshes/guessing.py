@@ -52,16 +52,27 @@ WORDS: tuple[tuple[Use, tuple[str, ...]], ...] = (
     (Role.INDENTER, ("indenter", "probe", "object")),
     (
         Role.SUPPORT,
-        ("support", "window", "acrylic", "pmma", "glass", "epoxy", "resin", "guide", "clear",
-         "transparent", "plate"),
+        ("support", "window", "acrylic", "pmma", "glass", "epoxy", "resin", "guide", "lightguide",
+         "waveguide", "clear", "transparent", "plate"),
     ),
     (
         Role.BLOCKER,
         ("blocker", "housing", "case", "body", "enclosure", "board", "pcb", "cover", "frame",
-         "wall", "shell", "base", "mount", "holder", "black", "shade", "cap"),
+         "wall", "shell", "base", "mount", "holder", "barrel", "black", "shade", "cap"),
     ),
 )  # fmt: skip
 """Words in the names of parts by use; those listed first take precedence."""
+
+KINDS = {
+    "guide", "lightguide", "waveguide", "window",
+    "barrel", "case", "cover", "enclosure", "frame", "holder", "housing", "mount",
+}  # fmt: skip
+"""Words for kinds of bodies: words before them say what they are for, as in lens holder. Boards and
+plates are not among them: lights are placed on a board of LEDs, and a plate may be of anything.
+"""
+
+CLEAR = {"acrylic", "clear", "glass", "pmma", "transparent"}
+"""Words that tell a clear body also before a word for its kind, as in clear cover."""
 
 CARRIED = 0.2
 """Share of a gel's surface that a body of unknown use touches if it carries the gel. The inner side
@@ -144,9 +155,11 @@ def _carries(mesh: TriangleMesh, gels: Iterable[TriangleMesh]) -> bool:
 
 def guess_use(name: str) -> Use | None:
     """Return the probable use of a body by the words in its name, or None if they don't tell."""
-    words = set(re.split(r"[^a-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower()))
+    words = re.split(r"[^a-z]+", re.sub(r"([a-z])([A-Z])", r"\1 \2", name).lower())
+    start = max((place for place, word in enumerate(words) if word in KINDS), default=0)
+    telling = CLEAR.intersection(words).union(words[start:])
     for use, signs in WORDS:
-        if words & set(signs):
+        if telling.intersection(signs):
             return use
     return None
 

@@ -29,6 +29,8 @@ from optisense.sensors.from_meshes import (
     read_recipe,
     save_recipe,
 )
+from optisense.sensors.from_meshes.cad_bodies import Use
+from optisense.sensors.from_meshes.guessing import guess_use
 from optisense.workshop import export
 
 
@@ -232,6 +234,25 @@ class TestGuessing:
         assert len(design.lights["leds"].lights) == 3
         assert design.camera.position == pytest.approx((0, 0, -20))
         assert check(design) == []
+
+    @pytest.mark.parametrize(
+        ("names", "use"),
+        [
+            ("light_guide LightGuide lightguide light-guide-plate acrylic_cover", Role.SUPPORT),
+            (
+                "camera_mount lens-barrel led_holder GelFrame mirror_mount window_frame",
+                Role.BLOCKER,
+            ),
+            ("led_board LEDs_red", "lights"),
+            ("camera camera_board", "camera"),
+            ("mirror_plate", Role.MIRROR),
+            ("base_gel", Role.ELASTOMER),
+        ],
+    )
+    def test_a_holder_is_not_what_it_holds(self, names: str, use: Use) -> None:
+        assert {name: guess_use(name) for name in names.split()} == dict.fromkeys(
+            names.split(), use
+        )
 
     def test_a_body_of_unknown_use_that_carries_the_gel_is_clear(self, cad: Any) -> None:
         cad.write()
