@@ -90,7 +90,7 @@ def make_camera(
     ux, uy, uz = (up + 0.0).tolist()
     return Camera(
         model=choice.model,
-        projection=model.projection,
+        projection=choice.projection or model.projection,
         fov=fov,
         resolution=(width, height),
         position=(x, y, z),

@@ -7,7 +7,7 @@ no mesh.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import Field, PrivateAttr, ValidationError, model_validator
 
@@ -54,6 +54,10 @@ class CameraChoice(Model):
     )
     direction: Way | None = Field(default=None, description="viewing direction, instead of look_at")
     up: Way | None = Field(default=None, description="direction to the top of the picture")
+    projection: Literal["perspective", "equidistant"] | None = Field(
+        default=None,
+        description="perspective; equidistant (fisheye); that of the library if left out",
+    )
     fov: Annotated[Number, Field(ge=SMALLEST_FOV, le=360.0)] | None = Field(
         default=None,
         description="field of view across the width, degrees; that of the library if left out",

@@ -9,6 +9,7 @@ import pytest
 import trimesh
 
 from optisense.design import Camera
+from optisense.design.camera_checks import lens_problems
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.sensors.from_meshes._camera import make_camera
@@ -136,6 +137,11 @@ class TestCamera:
     def test_it_looks_at_its_target(self) -> None:
         camera = self.camera(place=np.array([3.0, 4.0, -12.0]))
         np.testing.assert_allclose(camera.direction, np.array([-3, -4, 12]) / 13, atol=1e-8)
+
+    def test_a_wide_view_needs_a_fisheye(self) -> None:
+        (problem,) = lens_problems(self.camera(fov=170.0), "fov")
+        assert "projection: equidistant" in str(problem.hint)
+        assert not lens_problems(self.camera(fov=170.0, projection="equidistant"), "fov")
 
     @pytest.mark.parametrize(
         ("choice", "message"),
