@@ -50,7 +50,8 @@ def new(
         typer.Option(
             metavar="|".join(MM_PER),
             help="With --from-meshes: unit of the files that do not contain one (STL, OBJ, "
-            "PLY); mm if left out.",
+            "PLY). If left out, the recipe states it or a question asks for it; with --yes it is "
+            "the only unit that gives a plausible size, or else mm.",
         ),
     ] = None,
     yes: Annotated[
@@ -156,7 +157,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
     except OptiSenseError:
         if asked or guessed:  # answers need not be given again; wrong guesses can be corrected
             save_recipe(recipe, folder / RECIPE_FILE)
-            _print_guesses(recipe, guessed)
+            _print_guesses(recipe, guessed, units is None)
             what = "Your answers are" if asked else "The guessed recipe is"
             named = f"{argument(folder / RECIPE_FILE)} {argument(folder)}"
             messages.print(
@@ -175,7 +176,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
         messages.print(f"warning: {problem}", style="yellow")
     for sentence in overdriven_lights(made.design):
         messages.print(f"warning: {sentence}", style="yellow")
-    _print_guesses(recipe, guessed)
+    _print_guesses(recipe, guessed, units is None)
     _print_next_steps(folder, folder / RECIPE_FILE)
 
 
@@ -242,10 +243,12 @@ def _refuse_changed(folder: Path) -> None:
     )
 
 
-def _print_guesses(recipe: Recipe, guessed: bool) -> None:
-    """Print the guesses that were made without a question."""
+def _print_guesses(recipe: Recipe, guessed: bool, unit_too: bool) -> None:
+    """Print the guesses that were made without a question; `unit_too` if the unit is one."""
     if not guessed:
         return
+    if unit_too and recipe.units is not None:
+        messages.print(f"guessed: unit {recipe.units}")
     for name, part in recipe.parts.items():
         faces = f"faces of {part.faces_of} towards {part.towards}"
         faces += ", and those that continue them smoothly" if part.tangent else ""

@@ -170,6 +170,16 @@ def test_guesses_are_told(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
+def test_a_guessed_unit_is_told(tmp_path: Path) -> None:
+    gel = TriangleMesh.load(CAD / "gel.stl")
+    gel.with_vertices(gel.vertices / 1000.0).save_obj(tmp_path / "gel.obj")
+    source = tmp_path / "gel.obj"
+    code, text = new("--from-meshes", source, tmp_path / "pad", "--yes")
+    assert code == 0 and "guessed: unit m\n" in text
+    _, text = new("--from-meshes", source, tmp_path / "given", "--yes", "--units", "m")
+    assert "guessed: gel is" in text and "guessed: unit" not in text
+
+
 @pytest.mark.usefixtures("at_terminal")
 class TestQuestions:
     def test_enter_takes_what_is_suggested(self, tmp_path: Path) -> None:
