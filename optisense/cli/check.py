@@ -28,7 +28,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
     contacts = parse_contacts(contact)
 
     from optisense import sensors
-    from optisense.library import overdriven_lights
+    from optisense.library import unusual_fluxes
 
     sensor = sensors.load(design)
     problems = sensors.check(sensor)
@@ -37,7 +37,7 @@ def check(design: DesignArgument, contact: ContactOption = None) -> None:
         output.print(f"warning: {problem}", style="yellow")
     if len(problems) > MOST_WARNINGS:
         output.print(f"warning: {len(problems) - MOST_WARNINGS:,} more like these", style="yellow")
-    for sentence in overdriven_lights(sensor):
+    for sentence in unusual_fluxes(sensor):
         output.print(f"note: {sentence}")
     if any(part.role == "mirror" for part in sensor.parts.values()):
         warnings += _print_views(sensor)

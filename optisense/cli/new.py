@@ -116,7 +116,7 @@ def _from_built_in(name: str, folder: Path, overwrite: bool) -> None:
 
 
 def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: bool) -> None:
-    from optisense.library import overdriven_lights, unused_imaging
+    from optisense.library import unused_imaging, unusual_fluxes
     from optisense.sensors import check, save_design
     from optisense.sensors.from_meshes import (
         RECIPE_FILE,
@@ -174,7 +174,7 @@ def _from_cad(source: Path, folder: Path, units: str | None, yes: bool, is_new: 
         print_notes([f"{unused}; set imaging: true in the recipe's camera to use them"])
     for problem in problems:
         messages.print(f"warning: {problem}", style="yellow")
-    for sentence in overdriven_lights(made.design):
+    for sentence in unusual_fluxes(made.design):
         messages.print(f"warning: {sentence}", style="yellow")
     _print_guesses(recipe, guessed, units is None)
     _print_next_steps(folder, folder / RECIPE_FILE)

@@ -11,7 +11,7 @@ from optisense.library._entries import (
 )
 from optisense.library._imaging import unused_imaging, with_imaging
 from optisense.library._portable import with_own_lights
-from optisense.library._typical import OVERDRIVEN, overdriven_lights, typical_colour
+from optisense.library._typical import OVERDRIVEN, typical_colour, unusual_fluxes
 from optisense.library.adding import Added, add_file, add_ies, add_tuning, parse_colour
 from optisense.library.loader import (
     camera,
@@ -46,12 +46,12 @@ __all__ = [
     "light",
     "material",
     "names",
-    "overdriven_lights",
     "own_folder",
     "parse_colour",
     "specularity_to_roughness",
     "typical_colour",
     "unused_imaging",
+    "unusual_fluxes",
     "with_imaging",
     "with_own_lights",
 ]

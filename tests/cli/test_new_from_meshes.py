@@ -76,15 +76,23 @@ def test_an_ideal_camera_is_told_until_the_recipe_takes_its_imaging(tmp_path: Pa
     assert design.provenance["camera.noise"].source.startswith("rpi.noise")
 
 
-def test_a_flux_above_the_nominal_one_is_told(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("flux", "told"),
+    [
+        (4.2, "lights red: 4.2 mW each is 2 times the nominal flux of a red smd-3528"),
+        (0.0021, "lights red: 0.0021 mW each is 0.001 times the median of the groups, 2.1 mW"),
+    ],
+)
+def test_an_unusual_flux_is_told(tmp_path: Path, flux: float, told: str) -> None:
     cad = tmp_path / "cad"
     shutil.copytree(CAD, cad)
     recipe = cad / "sensor.yaml"
-    assert "times the nominal" not in new("--from-meshes", recipe, tmp_path / "pad")[1]
-    recipe.write_text(recipe.read_text().replace("flux: 2.1", "flux: 4.2", 1))
-    told = "lights red: 4.2 mW each is 2 times the nominal flux of a red smd-3528"
-    assert f"warning: {told}" in new("--from-meshes", recipe, tmp_path / "bright")[1]
-    assert f"note: {told}" in runner.invoke(app, ["check", str(tmp_path / "bright")]).output
+    text = recipe.read_text()
+    recipe.write_text(text.replace("flux: 2.1", "flux: 0", 1))  # switched off
+    assert "mW each" not in new("--from-meshes", recipe, tmp_path / "pad")[1]
+    recipe.write_text(text.replace("flux: 2.1", f"flux: {flux}", 1))
+    assert f"warning: {told}" in new("--from-meshes", recipe, tmp_path / "odd")[1]
+    assert f"note: {told}" in runner.invoke(app, ["check", str(tmp_path / "odd")]).output
 
 
 def test_the_recipe_beside_the_design_makes_it_again(tmp_path: Path) -> None:
