@@ -147,6 +147,19 @@ def picture(
     ], rays
 
 
+@pytest.mark.parametrize(
+    ("factor", "height", "side"),
+    [(1.0, 41.2, 0.5), (4.0, 5.0, 0.5), (4.0, 21.2, 1.0), (4.0, 41.2, 80 / 30 / 2)],
+)
+def test_cells_of_a_large_skin_grow_with_the_distance_of_the_lamp(
+    factor: float, height: float, side: float
+) -> None:
+    large = replace(skin(), vertices=factor * skin().vertices)  # 20 or 80 mm
+    lamp = replace(OVERHEAD, position=(0.0, 0.0, height))
+    cells = store([large], lamp, np.zeros((1, 3))).cells
+    assert 1 / np.asarray(cells.inverse_size)[0] == pytest.approx(side)
+
+
 @pytest.mark.parametrize("camera", [CAMERA, OBLIQUE])
 def test_raised_flank_in_grazing_light_is_lit_as_in_the_open(camera: RayCamera) -> None:
     image, rays = picture([skin()], ball(), camera, PHOTONS, guided_by=CAMERA)

@@ -30,6 +30,11 @@ an edge between a wall and a top: light from beside the wall reaches the top and
 LEAST_EXTENT = 10.0
 """Extent (mm) of the sensing surface below which lengths such as the side of cells shrink with it.
 On a pad of 10 mm, cells of 0.5 mm are accurate to 3 %; on one of 4 mm, they would be 20 % off."""
+
+LARGE_EXTENT = 30.0
+"""Extent (mm) of the sensing surface above which cells may grow with it where no lamp is near, so
+that they do not become more: a surface of 80 mm has 20,000 of 0.5 mm. Below it, as on the built-in
+sensors that a finger fits on, pictures are fast with small cells."""
 SEARCH_CELLS = 3
 """Distance from the surface, in cell sides, within which a point still finds the nearest cell: 1.5
 mm with cells of 0.5 mm, as presses are usually less than 1 mm deep."""
@@ -81,10 +86,22 @@ def fineness(pieces: Sequence[Piece]) -> float:
     """Return the factor, at most 1, on lengths that suit sensing surfaces of `LEAST_EXTENT` and
     more: the longest side of the box around the sensing surface over that length.
     """
+    extent = _extent(pieces)
+    return 1.0 if extent is None else min(1.0, extent / LEAST_EXTENT)
+
+
+def coarseness(pieces: Sequence[Piece]) -> float:
+    """Return the largest factor, at least 1, by which cells may be larger on a large sensing
+    surface: the longest side of the box around it over `LARGE_EXTENT`.
+    """
+    extent = _extent(pieces)
+    return 1.0 if extent is None else max(1.0, extent / LARGE_EXTENT)
+
+
+def _extent(pieces: Sequence[Piece]) -> float | None:
+    """Return the longest side (mm) of the box around the sensing surface; None without one."""
     skin = [piece.vertices for piece in pieces if piece.surface.region is Region.SENSING]
-    if not skin:
-        return 1.0
-    return min(1.0, float(np.ptp(np.concatenate(skin), axis=0).max()) / LEAST_EXTENT)
+    return float(np.ptp(np.concatenate(skin), axis=0).max()) if skin else None
 
 
 def _twice_areas(
