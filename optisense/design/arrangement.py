@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design.camera import Camera
+from optisense.design.material_checks import is_gas
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.projection import directions, picture_places, within_view
@@ -100,17 +101,22 @@ def films(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnos
     """
     problems = []
     solids = {n: mesh for n, mesh in meshes.items() if design.parts[n].role in TRANSPARENT_SOLIDS}
-    for name, other in combinations(solids, 2):
+    media = {n: design.materials[design.parts[n].material or ""].medium() for n in solids}
+    dense = [n for n, medium in media.items() if medium is None or not is_gas(medium)]
+    for name, other in combinations(dense, 2):
         seam = sample_seam(solids[name], solids[other], WIDEST_FILM)
         gap = seam.heights > COINCIDENCE_TOLERANCE
+        least = FILM_SHARE * len(gap)
+        if (~gap).sum() <= least:
+            continue
         for between, mesh in solids.items():
-            if gap.any() and between not in (name, other):
+            if gap.sum() > least and between not in (name, other):
                 gap[gap] = ~inside(seam.middles[gap], mesh)
-        if FILM_SHARE * len(gap) < gap.sum() < (1.0 - FILM_SHARE) * len(gap):
+        if gap.sum() > least:
             problems.append(
                 Diagnostic(
                     f"parts '{name}' and '{other}' touch, but leave a film of air of up to "
-                    f"{seam.heights[gap].max():.2g} mm over {gap.sum() * seam.area:.2g} mm²",
+                    f"{seam.heights[gap].max():.2g} mm over {gap.sum() * seam.area:.3g} mm²",
                     design.where("parts", other, "mesh"),
                     "Give both the same triangles there, or let one reach into the other and "
                     "give it the larger priority",

@@ -116,27 +116,33 @@ class Seam:
 
 def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
     """Measure the distance of two solids where they face each other, at points spread evenly over
-    the surface of the first.
+    the faces of one of them that are near the other: of the one with less area there.
 
     Args:
         one, other: closed meshes, mm, whose normals point outward.
         reach: largest absolute height, mm.
     """
-    near = one.with_faces(one.faces[_in_reach(one, other, reach)])
-    facing = other.with_faces(other.faces[_in_reach(other, one, reach)])
-    if len(near.faces) == 0 or len(facing.faces) == 0:
+    near, facing = (
+        _in_reach(one, other, reach).nonzero()[0],
+        _in_reach(other, one, reach).nonzero()[0],
+    )
+    if len(near) == 0 or len(facing) == 0:
         return Seam(np.zeros(0), np.zeros((0, 3)), 0.0)
+    if one.face_areas[near].sum() > other.face_areas[facing].sum():
+        one, other, near, facing = other, one, facing, near
     share = (np.arange(SEAM_SAMPLES) + 0.5) / SEAM_SAMPLES
-    sums = np.cumsum(near.face_areas)
-    own = np.searchsorted(sums, share * sums[-1])
+    sums = np.cumsum(one.face_areas[near])
+    own = near[np.searchsorted(sums, share * sums[-1])]
     weights = np.random.default_rng(0).dirichlet(np.ones(3), SEAM_SAMPLES)
-    points = np.einsum("kc,kci->ki", weights, near.triangles[own])
-    ends = points + reach * np.array([[[-1.0]], [[1.0]]]) * near.face_normals[own]
-    point, face = overlapping_boxes(ends.min(axis=0), ends.max(axis=0), *facing.face_bounds)
-    frames = _Frames.of(near, own[point])
-    opposite = np.einsum("pi,pi->p", frames.axes[:, 2], facing.face_normals[face]) < -PARALLEL
+    points = np.einsum("kc,kci->ki", weights, one.triangles[own])
+    ends = points + reach * np.array([[[-1.0]], [[1.0]]]) * one.face_normals[own]
+    boxes = (corner[facing] for corner in other.face_bounds)
+    point, face = overlapping_boxes(ends.min(axis=0), ends.max(axis=0), *boxes)
+    face = facing[face]
+    frames = _Frames.of(one, own[point])
+    opposite = np.einsum("pi,pi->p", frames.axes[:, 2], other.face_normals[face]) < -PARALLEL
     point, face, frames = point[opposite], face[opposite], frames.take(opposite)
-    corners = frames.flat(facing.triangles[face])
+    corners = frames.flat(other.triangles[face])
     places = frames.flat(points[point, None])[:, :, :2]
     met = contains(corners[:, :, :2], places, THINNEST)
     point, height = point[met], heights_over(places[met], corners[met])[:, 0]
@@ -144,7 +150,7 @@ def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
     first = order[np.unique(point[order], return_index=True)[1]]
     first = first[np.abs(height[first]) <= reach]
     middles = points[point[first]]
-    middles += 0.5 * height[first, None] * near.face_normals[own[point[first]]]
+    middles += 0.5 * height[first, None] * one.face_normals[own[point[first]]]
     return Seam(height[first], middles, float(sums[-1]) / SEAM_SAMPLES)
 
 

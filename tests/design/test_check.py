@@ -229,6 +229,8 @@ class TestOverlaps:
             found = [problem.message for problem in check_design(sunk)]
             assert len(found) == films
             assert all("'gel' and 'plate' touch, but leave a film of air" in f for f in found)
+            hollow = set_value(sunk, "materials.glass.ior", 1.0)
+            assert not [each for each in check_design(hollow) if "film" in each.message], "a gas"
 
     def test_a_solid_wholly_inside_another(self, design: SensorDesign) -> None:
         gel = design.parts["gel"].priority

@@ -8,7 +8,7 @@ import shapely
 
 from optisense.geometry import TriangleMesh
 from optisense.geometry._flat_polygons import area_and_length, common
-from optisense.geometry.coincidence import cut, find_coincident
+from optisense.geometry.coincidence import cut, find_coincident, sample_seam
 
 SIDES = 96
 
@@ -51,3 +51,12 @@ def test_triangles_are_clipped_by_one_another() -> None:
     solid = area > 1e-6
     assert solid.sum() > 200
     assert length[solid] == pytest.approx(shapely.length(known)[solid], abs=1e-6)
+
+
+def test_the_seam_of_a_small_solid_on_a_large_one_is_measured_in_either_order() -> None:
+    plate = TriangleMesh.box((-50.0, -50.0, 0.0), (50.0, 50.0, 10.0))
+    pad = TriangleMesh.box((-2.5, -2.5, 10.02), (2.5, 2.5, 15.0))
+    for one, other in ((plate, pad), (pad, plate)):
+        seam = sample_seam(one, other, 0.05)
+        assert len(seam.heights) * seam.area == pytest.approx(25.0, rel=0.02)
+        np.testing.assert_allclose(seam.heights, 0.02, atol=1e-9)
