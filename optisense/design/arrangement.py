@@ -42,8 +42,9 @@ change by about as much."""
 SAMPLES, SAMPLES_TURN = 89, 55
 """Number of points of the picture at which the sensing surface is looked for, and the step by which
 they go round it downwards. They are two Fibonacci numbers, so that the points are a lattice whose
-rows are not parallel to the edges of the picture: shares are right to 0.02. With 8 by 6 points, a
-whole row is counted or not, which is 0.17."""
+rows are not parallel to the edges of the picture: of 3000 rectangles of any size and angle, the
+shares of nine in ten are right to 0.02, of 99 in 100 to 0.04, and of all to 0.08. With 8 by 6
+points, a whole row is counted or not, which is 0.17."""
 
 
 def one_medium(design: SensorDesign, name: str, other: str) -> bool:

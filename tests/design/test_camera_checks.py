@@ -10,7 +10,7 @@ import pytest
 from optisense import sensors
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
 from optisense.design._focus_checks import apparent_distances
-from optisense.design.arrangement import SAMPLES, straight_rays
+from optisense.design.arrangement import SAMPLES, SAMPLES_TURN, straight_rays
 from optisense.design.camera_checks import camera_fault, view_shares
 from optisense.geometry import TriangleMesh
 from optisense.optics._skin_view import ray_camera
@@ -176,3 +176,15 @@ def test_the_shares_of_the_view_follow_the_lens(mini: SensorDesign) -> None:
         assert found is not None and found.picture == 1.0
         shares.append(found.skin)
     assert shares[1] < 0.95 * shares[0]
+
+
+def test_shares_of_oblique_rectangles() -> None:
+    number = np.arange(SAMPLES)
+    places = np.stack([number + 0.5, number * SAMPLES_TURN % SAMPLES + 0.5], axis=1) / SAMPLES
+    sides = np.array([0.5, 0.3])
+    errors = []
+    for angle in np.linspace(0.0, np.pi, 180, endpoint=False):
+        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+        inside = (np.abs((places - 0.5) @ turn.T) < 0.5 * sides).all(axis=1)
+        errors.append(abs(inside.mean() - sides.prod()))
+    assert max(errors) < 0.08 and np.quantile(errors, 0.9) < 0.02
