@@ -145,14 +145,6 @@ class Press:
         raise _no_such(kind)
 
     @property
-    def steepest(self) -> float:
-        """The tilt (degrees) of the ball at the rim of its contact with a flat surface."""
-        offset = self.points[self.mask].astype(np.float64) - self.centre
-        radius = float(np.median(np.linalg.norm(offset, axis=1)))
-        height = float((self.place - self.centre) @ self.inward)
-        return float(np.degrees(np.arccos(np.clip(height / radius, -1.0, 1.0))))
-
-    @property
     def name(self) -> str:
         """The name of the press in messages."""
         x, y, z = self.place

@@ -67,10 +67,11 @@ MOST_LEAST_PIXELS = 1_000_000
 """Largest number of pixels that a press may be asked to have; no press has as many."""
 
 LEAST_SHARE = 0.5
-"""Least share of a ball's steepest tilt that the camera must see towards every direction. A press
-that the view's edge cuts half-way between its middle and its rim has this share, and four fifths of
-its tilts; without the others, confusion would be lower. On the built-in sensors, contacts on
-distant walls have the lowest share, 0.79."""
+"""Least share of the steepest tilt seen in any direction that the camera must see towards every
+direction. A press that the view's edge cuts half-way between its middle and its rim has this share,
+and four fifths of its tilts; without the others, confusion would be lower. The skin and the
+indenter scale all directions alike. On the built-in sensors, contacts on distant walls have the
+lowest share, 0.75."""
 
 DIRECTIONS = 8
 """Number of directions in which the tilts are checked, those of RGB2Normal."""
@@ -232,16 +233,17 @@ def _refuse_cut(press: Press, theta: FloatArray, phi: FloatArray) -> None:
         theta, phi: (n,) polar angles and azimuths of its indented pixels, degrees.
 
     Raises:
-        ObjectiveError: the tilts towards a direction are below `LEAST_SHARE` of the steepest one.
+        ObjectiveError: the steepest tilt towards a direction is below `LEAST_SHARE` of the steepest
+            one towards any.
     """
     angles = np.arange(DIRECTIONS) * 360.0 / DIRECTIONS
-    towards = [float((theta * np.cos(np.radians(phi - angle))).max()) for angle in angles]
-    least = int(np.argmin(towards))
-    if towards[least] < LEAST_SHARE * press.steepest:
+    towards = (theta * np.cos(np.radians(phi - angles[:, None]))).max(axis=1)
+    least, most = towards.min(), towards.max()
+    if least < LEAST_SHARE * most:
         raise ObjectiveError(
-            f"the camera sees only a part of {press.name}: tilts of up to "
-            f"{max(towards[least], 0.0):.0f} of {press.steepest:.0f} degrees towards "
-            f"{angles[least]:g} degrees",
+            f"the camera sees only a part of {press.name}: tilts of up to {max(least, 0.0):.0f} "
+            f"degrees towards {angles[towards.argmin()]:g} degrees, and up to {most:.0f} towards "
+            f"{angles[towards.argmax()]:g} degrees",
             hint="Move the place so that the camera sees the whole contact",
         )
 

@@ -140,14 +140,22 @@ def test_a_press_that_the_view_cuts_has_no_score(
 ) -> None:
     """The edge is that of the view, in contact radii to the right of the middle."""
     press = make_press(lambda n: n, pixels=101)
-    assert press.steepest == pytest.approx(np.degrees(np.arccos(0.8)))
-    reach = 1.5 * np.sin(np.radians(press.steepest))
+    reach = 1.5 * np.sin(np.arccos(0.8))
     cut = replace(press, mask=press.mask & (press.points[..., 0] < edge * reach))
     if whole:
         assert normdiff(evaluation_of(cut))[0] < 0.0
         return
     with pytest.raises(ObjectiveError, match=r"sees only a part of place 1 .* towards 0 degrees"):
         normdiff(evaluation_of(cut))
+
+
+def test_a_whole_press_on_a_skin_that_lowers_its_tilts_has_a_score(
+    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
+) -> None:
+    press = make_press(lambda n: n, pixels=101)
+    lowered = press.normals * np.float32([0.4, 0.4, 1.0])
+    lowered /= np.linalg.norm(lowered, axis=2, keepdims=True)
+    assert normdiff(evaluation_of(replace(press, normals=lowered)))[0] < 0.0
 
 
 def test_too_few_pixels_say_where(
