@@ -18,7 +18,8 @@ def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:
     """Return the bodies of a closed mesh: for each its outside first, then its cavities.
 
     A cavity's normals point inward, so that its volume is subtracted from its body's; it belongs to
-    the smallest body around it.
+    the smallest body that contains all of it. Where its corners touch the outside of its body, this
+    is the smallest one that contains the most of its vertices.
     """
     everything = np.arange(len(mesh.faces))
     pieces = [mesh.with_faces(mesh.faces[faces]).compacted() for faces in patches(mesh, everything)]
@@ -29,10 +30,9 @@ def _grouped(pieces: list[TriangleMesh]) -> list[list[TriangleMesh]]:
     """Return the bodies of closed pieces of a surface; see `bodies`."""
     found = [[piece] for piece in sorted(pieces, key=lambda p: p.volume) if piece.volume > 0.0]
     for cavity in (piece for piece in pieces if piece.volume <= 0.0):
-        for body in found:
-            if inside(cavity.vertices[:1], body[0])[0]:
-                body.append(cavity)
-                break
+        contained = [int(inside(cavity.vertices, body[0]).sum()) for body in found]
+        if any(contained):
+            found[int(np.argmax(contained))].append(cavity)
     return found
 
 

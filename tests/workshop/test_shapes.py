@@ -168,6 +168,15 @@ def test_bodies_keep_their_cavities() -> None:
     assert volumes == [[1.0], [1.0], [27.0, -8.0]]
 
 
+def test_a_cavity_belongs_to_the_body_that_contains_all_of_it() -> None:
+    """A smaller body fills a half of the cavity of 16 mm³, and has 24 mm³ outside the cube."""
+    cube = TriangleMesh.box((0, 0, 0), (10, 10, 10))
+    cavity = TriangleMesh.box((4, 4, 4), (8, 6, 6)).flipped()
+    smaller = TriangleMesh.box((3, 3, 3), (6, 7, 12))
+    found = united(TriangleMesh.joined([cube, cavity, smaller]))
+    assert found.volume == pytest.approx(1000.0 - 16.0 + 8.0 + 24.0)
+
+
 def test_overlapping_bodies_of_a_part_are_one(flat: SensorDesign) -> None:
     """Their common space is counted once; bodies that touch, and cavities, stay as they are."""
     cubes = [TriangleMesh.box((x, 0, 40), (x + 10, 10, 50)) for x in (0, 5, 30)]
