@@ -18,7 +18,14 @@ from optisense.geometry import TriangleMesh, parse_contact
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene._lamp_places import with_media
 from optisense.optics.scene._solids import Solid
-from optisense.optics.scene.emitters import Emitter, EmitterShape, StartMedium, emit, emitter_table
+from optisense.optics.scene.emitters import (
+    FACE_CELLS,
+    Emitter,
+    EmitterShape,
+    StartMedium,
+    emit,
+    emitter_table,
+)
 from optisense.optics.scene.ray_scene import Piece, RayScene
 from optisense.optics.scene.surfaces import CLEAR, RGB, Surface, SurfaceKind
 from optisense.optics.transport.camera_paths import find_visible_points
@@ -113,6 +120,36 @@ def test_lights_on_the_border_of_two_solids_start_in_each() -> None:
     origin, _, _, cell = emit(table, dr.zeros(mi.UInt32, 4), mi.Point2f(0.5), corner)
     below = np.asarray(origin)[2] < -3
     assert np.array_equal(np.asarray(dr.gather(mi.UInt32, table.solids, cell)) == 2, below)
+
+
+def test_media_that_cover_a_part_of_a_light_are_found_and_those_beside_it_are_not() -> None:
+    gel = Solid(
+        "gel", TriangleMesh.box((-3, -3, -3), (3, 3, 3)), "gel", 1.41, absorption=ABSORPTION
+    )
+    film = Solid("film", TriangleMesh.box((-3, -3, 0.2), (3, 3, 0.8)), "film", 1.41, priority=1)
+    square = Emitter(0, (0, 0, 0), (1, 0, 0), None, EmitterShape.RECTANGLE, (2.0, 2.0))
+    (lamp,) = with_media([square], [gel, film])
+    assert np.mean([medium.solid == 1 for medium in lamp.media]) == pytest.approx(0.3, abs=0.05)
+    # The first two are flush with a side of the gel; a corner of the square around the disc is not.
+    inner = [replace(square, position=(0, side * 2.8, 0), size=(0.4, 0.4)) for side in (-1, 1)]
+    inner += [Emitter(0, (0, side * 2.9965, 0), (1, 0, 0)) for side in (-1, 1)]
+    disc = replace(square, shape=EmitterShape.DISC, up=(0, 1, 1), position=(0, 2, 2))
+    for lamp in with_media([*inner, disc], [gel]):
+        assert [medium.solid for medium in lamp.media] == [0]
+
+
+def test_kernels_do_not_contain_the_number_of_media_of_a_light() -> None:
+    def hashes(media: int) -> list[object]:
+        lamp = Emitter(0, (0, 0, 0), (1, 0, 0), media=(StartMedium(0, ABSORPTION),) * media)
+        table = emitter_table([lamp], 1)
+        light, place = dr.opaque(mi.UInt32, 0, 4), mi.Point2f(dr.opaque(mi.Float, 0.5, 4))
+        dr.eval(table.rows, table.solids, light, place)
+        dr.kernel_history_clear()
+        dr.eval(emit(table, light, place, place)[3])
+        return [kernel["hash"] for kernel in dr.kernel_history() if "hash" in kernel]
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        assert hashes(1) == hashes(FACE_CELLS**2) != []
 
 
 def test_light_between_two_media_is_absorbed_by_each() -> None:

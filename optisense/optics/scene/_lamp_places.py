@@ -35,48 +35,60 @@ SIGNS = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)], dtype=float)
 
 ASIDE = np.array([0.004, 0.003])
 """Distances (mm), along the width and the height of a light, by which the medium in front of it is
-looked up off the place itself: a light in the middle of its parts may lie on the faces of two that
-touch. Each is longer than the 0.002 mm below which faces touch, and they differ, as such a face may
-also run along a diagonal of the light."""
-TRIED = np.array([(x, y) for y in (-0.99, 0.0, 0.99) for x in (-0.99, 0.0, 0.99)])
-"""Places (9, 2) on a window, in half widths and heights, at which its medium is looked up first."""
+looked up off the place itself if that is in no solid: it may lie in the gap between the faces of
+two that touch. Each is longer than the 0.002 mm below which faces touch, and they differ, as such a
+face may also run along a diagonal of the light."""
 
 
 def with_media(emitters: Sequence[Emitter], solids: Sequence[Solid]) -> list[Emitter]:
     """Return lights with the media that their photons start in: one for each light if it is the
-    same at `TRIED` places of its window, else one for each of its cells.
+    same in all cells of its window, else one for each cell.
 
     Where no solid absorbs, the lights are unchanged, as their media make no difference.
     """
     lights = list(emitters)
     if all(solid.absorption == CLEAR for solid in solids):
         return lights
-    found = _solids_before(lights, solids, TRIED)
-    mixed = np.flatnonzero((found != found[:, :1]).any(axis=1))
-    numbers = dict(enumerate(found[:, :1].tolist()))
-    middle = (2 * np.arange(FACE_CELLS) + 1) / FACE_CELLS - 1
-    cells = np.stack([np.tile(middle, FACE_CELLS), np.repeat(middle, FACE_CELLS)], axis=1)
-    each = _solids_before([lights[i] for i in mixed], solids, cells)
-    numbers.update(zip(mixed.tolist(), each.tolist(), strict=True))
     around = [*solids, AROUND]
-    return [
-        replace(lamp, media=tuple(StartMedium(k, around[k].absorption) for k in numbers[i]))
-        for i, lamp in enumerate(lights)
-    ]
+    result = []
+    for lamp, found in zip(lights, _solids_before(lights, solids), strict=True):
+        numbers = found[:1] if (found == found[0]).all() else found
+        media = tuple(StartMedium(k, around[k].absorption) for k in numbers.tolist())
+        result.append(replace(lamp, media=media))
+    return result
 
 
-def _solids_before(
-    lights: Sequence[Emitter], solids: Sequence[Solid], places: FloatingArray
-) -> NDArray[np.int64]:
-    """Return the numbers (n, k) of the solids in front of places (k, 2) of each of n windows, in
-    half widths and heights; -1 for air.
+def _solids_before(lights: Sequence[Emitter], solids: Sequence[Solid]) -> list[NDArray[np.int64]]:
+    """Return the numbers (k,) of the solids in front of the `_looked_up` places of each of n
+    lights; -1 for air.
     """
-    axes = np.array([lamp.frame for lamp in lights]).reshape(-1, 3, 3)
-    half = np.array([lamp.size for lamp in lights]).reshape(-1, 2) / 2
-    flat = places * half[:, None] + ASIDE
-    points = flat @ axes[:, :2] + PROBE * axes[:, 2:]
-    points += np.array([lamp.position for lamp in lights]).reshape(-1, 1, 3)
-    return solid_at(points.reshape(-1, 3), solids).reshape(-1, len(places))
+    points, aside = [], []
+    for lamp in lights:
+        s, t, direction = lamp.frame
+        flat = _looked_up(lamp.shape) * np.array(lamp.size) / 2
+        place = flat @ np.array([s, t]) + np.array(lamp.position) + PROBE * direction
+        points.append(place)
+        aside.append(place + ASIDE @ np.array([s, t]))
+    ends = np.cumsum([len(each) for each in points])[:-1]
+    found = solid_at(np.concatenate(points), solids)
+    air = found < 0
+    found[air] = solid_at(np.concatenate(aside)[air], solids)
+    return np.split(found, ends)
+
+
+@lru_cache
+def _looked_up(shape: EmitterShape) -> FloatingArray:
+    """Return the places (k, 2) on a window, in half widths and heights, at which its media are
+    looked up: the middles of its cells. On a disc, those beyond it are moved inward, as photons
+    start in parts of some of these cells.
+    """
+    if shape is EmitterShape.POINT:
+        return np.zeros((1, 2))
+    middle = (2 * np.arange(FACE_CELLS) + 1) / FACE_CELLS - 1
+    places = np.stack([np.tile(middle, FACE_CELLS), np.repeat(middle, FACE_CELLS)], axis=1)
+    if shape is EmitterShape.DISC:
+        places *= np.minimum(1.0, middle[-1] / np.linalg.norm(places, axis=1, keepdims=True))
+    return places
 
 
 def off_faces(emitters: Sequence[Emitter], pieces: Sequence[Piece]) -> list[Emitter]:

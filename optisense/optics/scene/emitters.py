@@ -127,7 +127,7 @@ class EmitterTable:
     rows: mi.Float
     polar: mi.Float
     azimuth: mi.Float
-    across: int
+    across: mi.UInt32
     absorption: mi.Float
     solids: mi.UInt32
     media: int
@@ -248,7 +248,7 @@ def emitter_table(emitters: list[Emitter], groups: int) -> EmitterTable:
         rows=floats(rows),
         polar=floats(np.concatenate(polar)),
         azimuth=floats(np.concatenate(azimuth)),
-        across=across,
+        across=dr.opaque(mi.UInt32, across),
         absorption=floats(np.array([medium.absorption for medium in media])),
         solids=indices(np.array([medium.solid + 1 for medium in media])),
         media=max(medium.solid for medium in media) + 2,
@@ -328,7 +328,7 @@ def emit(
     point = mi.Point3f(a.x, a.y, a.z) + s * (offset.x * b.w) + t * (offset.y * c.w) + n * RAY_OFFSET
     direction = s * local.x + t * local.y + n * local.z
     column, row = (
-        dr.minimum(mi.UInt32((along + 1) * (table.across / 2)), table.across - 1)
+        dr.minimum(mi.UInt32((along + 1) * mi.Float(table.across) / 2), table.across - 1)
         for along in (offset.x, offset.y)
     )
     cell = (light * table.across + row) * table.across + column
