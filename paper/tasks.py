@@ -171,11 +171,15 @@ def _follows(numbers: Values, name: str, title: str) -> Claim:
         cells = [each for label in CURVED for each in _agreement(seed, label)[name].values()]
         means.append(spread([each["correlation"] for each in cells])["mean"])
     found = spread(means)
+    cells = [each for label in CURVED for each in numbers["agreement"][label][name].values()]
+    all_seeds = [each["correlation"] for each in cells]
+    there = [value for value in spread(all_seeds)["values"] if value is not None]
     return Claim(
         f"{title} shows the trends of the tasks.",
         "too few coatings with a score"
-        if found["mean"] is None
-        else f"mean rank correlation of single seeds {shown(found, 2)}",
+        if found["mean"] is None or not there
+        else f"mean rank correlation {sum(there) / len(there):+.2f} (from {min(there):+.2f} to "
+        f"{max(there):+.2f}); of single seeds {shown(found, 2)}",
         exceeds(found, FOLLOWS),
         "The tasks press large, slightly tilted objects in the middle and use mean colours; the "
         "objectives press small, steep balls at nine places. A coating may suit one better than "
