@@ -83,7 +83,9 @@ def with_verdicts(rows: Mapping[str, list[float | None]]) -> Values:
 
 
 def claims(numbers: Values) -> list[Claim]:
-    """Return one statement for each conclusion, which agrees if it holds in all geometries."""
+    """Return one statement for each conclusion, which agrees if it holds in all geometries, and
+    disagrees if it fails in all.
+    """
     return [_claim(CONCLUSIONS[name], found) for name, found in numbers["margins"].items()]
 
 
@@ -98,28 +100,39 @@ def _claim(text: str, found: Values) -> Claim:
         here += f"; does not hold for: {', '.join(failing)}" if holding else ""
     if unsure:
         here += f"; within the noise or without a score: {', '.join(unsure)}"
-    agrees = True if holding and not failing and not unsure else None
-    if failing and not holding:
-        agrees = False
-    why = (
-        "The statement is found to hold for none of these values of the assumed dimensions, so "
-        "that another cause explains the difference."
-        if agrees is False
-        else "The statement depends on assumed dimensions."
-        if failing
-        else "In some geometries, the margin is within its noise."
+    different = set(verdicts.values())
+    return Claim(text, here, different.pop() if len(different) == 1 else None, _why(verdicts))
+
+
+def _why(verdicts: Mapping[str, bool | None]) -> str:
+    """Return why a statement does not hold in all geometries."""
+    found = list(verdicts.values())
+    unsure = found.count(None)
+    decided = (
+        "The statement depends on assumed dimensions."
+        if True in found
+        else "The statement holds for none of these values of the assumed dimensions, so that "
+        "another cause explains the difference."
     )
-    return Claim(text, here, agrees, why)
+    if not unsure:
+        return decided
+    open_ones = f"{unsure} of {len(found)}" if unsure < len(found) else f"all {unsure}"
+    text = f"In {open_ones} geometries, the margin is within its noise or there is no score."
+    if False not in found:
+        return text
+    return f"{text} {decided}" if True in found else f"{text} In the others, the statement fails."
 
 
 def notes(numbers: Values) -> list[str]:
     """Return a paragraph that explains geometries and margins."""
     return [
         "A geometry is the sensor with one assumed dimension at an end of its plausible range, or "
-        "with random values of all of them. A statement agrees if it holds in all geometries, and "
-        "disagrees if it holds in none. A margin is the amount by which a statement holds, and is "
-        "negative if it does not. Its noise is the standard deviation over the seeds of the sensor "
-        "as assumed. A margin of one seed is within the noise if it is smaller than the noise "
+        "with random values of all of them. A statement agrees if it holds in all geometries, "
+        "disagrees if it fails in all, and is inconclusive otherwise. It neither holds nor fails "
+        "where its margin is within the noise or it has no score. A margin is the amount by which "
+        "a statement holds, and is negative if it fails. Its noise is the standard deviation over "
+        "the seeds of the sensor as assumed. A margin of one seed is within the noise if it is "
+        "smaller than the noise "
         f"times the {100 * CONFIDENCE:.0f} % quantile of the t distribution, which is "
         f"{quantile(2):.1f} for three seeds."
     ]

@@ -16,6 +16,7 @@ from paper import EXPERIMENTS, Experiment, Finding, Record, find, write_page
 from paper.errors import ExperimentError
 from paper.experiment import gaps, write
 from paper.robustness import AS_ASSUMED, with_verdicts
+from paper.robustness_questions import CONCLUSIONS
 from paper.spread import spread
 from paper.text import PICTURE, RESULT, TEXT
 
@@ -206,6 +207,26 @@ def test_margins_are_held_against_the_noise_of_single_seeds() -> None:
         "c": False,
         "d": None,
     }
+
+
+@pytest.mark.parametrize(
+    ("margins", "verdict", "why"),
+    [
+        ([1.0, 2.0], "agrees", ""),
+        ([-1.0, -2.0], "disagrees", "for none"),
+        ([-1.0, None], "inconclusive", "In 1 of 2 geometries, .* In the others, .* fails"),
+        ([None, None], "inconclusive", "In all 2 geometries, .*no score.$"),
+        ([1.0, -1.0], "inconclusive", "depends on assumed dimensions"),
+    ],
+)
+def test_conclusions_are_decided_by_all_geometries(
+    margins: list[float | None], verdict: str, why: str
+) -> None:
+    found = with_verdicts(dict(zip((AS_ASSUMED, "a"), ([each] for each in margins), strict=True)))
+    numbers = {"margins": {next(iter(CONCLUSIONS)): found}}
+    (claim,) = EXPERIMENTS["robustness"].claims(numbers)
+    assert claim.verdict == verdict
+    assert re.search(why, claim.to_plain()["why"])
 
 
 def test_readings_tell_what_decides(answered: Answered) -> None:
