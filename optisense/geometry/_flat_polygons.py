@@ -9,7 +9,8 @@ from optisense.array_types import FloatArray
 
 THINNEST = 1e-4
 """Thickness (mm) below which the remainder of a face counts as rounding: a thousand cells of the
-grid to which cut polygons are rounded, and a twentieth of the distance below which faces touch."""
+grid to which cut polygons are rounded (`geometry.coincidence._GRID`), and a twentieth of the
+distance below which faces touch (`design.arrangement.COINCIDENCE_TOLERANCE`)."""
 
 
 def common(triangles: FloatArray, others: FloatArray) -> FloatArray:
