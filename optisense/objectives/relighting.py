@@ -266,13 +266,7 @@ class _Relit(Evaluation):
         self._flux = relighting.flux_of(design)
         super().__init__(relighting.model.relit(design), relighting.settings)
         self._relighting = relighting
-        self._lit = design
         self._whole = whole
-
-    @property
-    def design(self) -> SensorDesign:
-        """The design with its own lights."""
-        return self._lit
 
     @property
     def chief_rays(self) -> ChiefRays:
