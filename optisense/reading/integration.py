@@ -75,13 +75,18 @@ class GridIntegrator:
         result[self.mask] = values - mean[self._part]
         return result
 
-    def level(self, values: FloatArray, pixels: NDArray[np.bool_]) -> FloatArray:
-        """Return values (h, w) with the median over some pixels (h, w) of each connected part set
-        to 0; NaN outside the mask and for parts without such pixels.
+    @cached_property
+    def _border(self) -> NDArray[np.bool_]:
+        """Mask (n,) of the mask's pixels that have a neighbour outside; each part has some."""
+        border: NDArray[np.bool_] = ~binary_erosion(self.mask)[self.mask]
+        return border
+
+    def level(self, values: FloatArray) -> FloatArray:
+        """Return values (h, w) with the median along the border of each connected part set to 0;
+        NaN outside the mask.
         """
-        chosen = pixels[self.mask]
         inside = values[self.mask]
-        zero = median(inside[chosen], self._part[chosen], np.arange(self._parts))
+        zero = median(inside[self._border], self._part[self._border], np.arange(self._parts))
         result = np.full(self.mask.shape, np.nan)
         result[self.mask] = inside - zero[self._part]
         return result
@@ -107,7 +112,6 @@ class NormalIntegrator:
     def __init__(self, untouched: UntouchedSurface) -> None:
         """Prepare the integration for a sensor's surface and rays at the image's resolution."""
         self._untouched = untouched
-        self._border = untouched.seen & ~binary_erosion(untouched.seen)
         self._grid = GridIntegrator(untouched.seen)
 
     def depths(self, normals: NDArray[np.floating]) -> FloatArray:
@@ -137,7 +141,7 @@ class NormalIntegrator:
         for _ in range(ROUNDS):
             across, down = (each.of(back) for each in steps)
             back = self._grid.from_steps(across, down)
-            back = np.nan_to_num(self._grid.level(back, self._border))
+            back = np.nan_to_num(self._grid.level(back))
         surface = untouched.points - back[..., None] * untouched.directions
         surface[~untouched.seen] = np.nan
         return untouched.depth(surface)
