@@ -13,9 +13,16 @@ import pytest
 from numpy.typing import ArrayLike
 from pydantic import Field
 
-from optisense import sensors
+from optisense import OpticalModel, sensors
 from optisense.array_types import FloatArray
-from optisense.design import LightGroup, LightModel, check_design, load_design, save_design
+from optisense.design import (
+    LightGroup,
+    LightModel,
+    check_design,
+    load_design,
+    save_design,
+    set_value,
+)
 from optisense.design.emitters import SpotEmitter, Window
 from optisense.design.fields import Positive
 from optisense.design.materials import CoatingModel, Dielectric, Material, Medium, Reflection
@@ -74,7 +81,7 @@ def test_a_kind_of_an_installed_package_is_in_files_and_its_table_has_its_closed
     )
     code = f"""
 import json
-from optisense import sensors
+from optisense import OpticalModel, sensors
 from optisense.design import load_design, save_design
 design = sensors.load("builtin:gelsight-mini-ideal")
 group = next(iter(design.lights.values()))
@@ -340,6 +347,27 @@ def test_a_coating_that_returns_what_cannot_be_simulated_is_refused(
 def test_a_medium_that_cannot_be_simulated_is_refused(result: object, words: str) -> None:
     ((message, where, _),) = problems(material=Fog(result=result))
     assert words in message and where == "materials.fog"
+
+
+class Bright(CoatingModel):
+    """A coating whose class allows any reflectance."""
+
+    kind: Literal["test-bright"] = "test-bright"
+    white: float
+
+    def reflection(self) -> Reflection:
+        return Reflection((self.white, self.white, self.white))
+
+
+def test_a_coating_that_returns_more_light_than_it_gets_is_not_rendered() -> None:
+    possible = set_value(sensors.build("gelsight-mini-ideal"), "coating", Bright(white=0.5))
+    impossible = set_value(possible, "coating.white", 1.5)
+    used = OpticalModel(possible, "llvm")
+    with pytest.raises(DesignError, match=r"reflectance is \(1\.5"):
+        used.set_design(impossible)
+    assert used.design == possible
+    with pytest.raises(DesignError, match=r"reflectance is \(1\.5"):
+        OpticalModel(impossible, "llvm")
 
 
 def test_an_exception_in_a_kind_is_a_problem_at_its_value_with_the_line_of_the_class() -> None:

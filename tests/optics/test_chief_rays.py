@@ -212,3 +212,24 @@ def test_a_blind_camera_is_told_about_rough_mirrors_only(specularity: float, tol
     scene = RayScene([quad("metal", corners, metal)])
     hint = str(sees_nothing(trace_chief_rays(scene, camera()), scene).hint)
     assert ("roughness" in hint) == told
+
+
+@pytest.mark.parametrize("tilt", [-0.002, 0.0, 0.002])
+@pytest.mark.parametrize(
+    ("up", "u", "v"),
+    [((0.0, 1.0, 0.0), (-1, 0, 0), (0, 1, 0)), ((0.0, 0.0, 1.0), (0, -1, 0), (-1, 0, 0))],
+)
+def test_axes_are_those_of_the_picture_for_a_camera_along_the_surface(
+    plain_mini: OpticalModel,
+    tilt: float,
+    up: tuple[float, ...],
+    u: tuple[int, ...],
+    v: tuple[int, ...],
+) -> None:
+    placed = {"position": (-20.0, 0.0, -15.0), "direction": (1.0, 0.0, tilt), "up": up}
+    beside = set_value(plain_mini.design, "camera.fov", 100.0)
+    for name, value in placed.items():
+        beside = set_value(beside, f"camera.{name}", value)
+    surface = OpticalModel(beside).surface
+    assert surface.u_axis == pytest.approx(np.array(u), abs=1e-3)
+    assert surface.v_axis == pytest.approx(np.array(v), abs=1e-3)

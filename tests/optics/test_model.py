@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache, partial
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +12,6 @@ from comparing import ROUNDING, SCORE_ROUNDING, TURNED_BESIDE_CONTACT, same_ligh
 
 from optisense import Contact, OpticalModel, SensorDesign, Sphere
 from optisense.design import set_value
-from optisense.design.materials import CoatingModel, Reflection
 from optisense.errors import ContactError, DesignError, LibraryError, RenderError
 from optisense.optics import RenderProgress, TactileImage
 from optisense.optics.backend.stages import Stage
@@ -213,27 +212,6 @@ def test_a_design_that_cannot_be_built_leaves_the_model_as_it_was() -> None:
     assert np.array_equal(used.chief_rays(PIXELS).points, before)
 
 
-class Bright(CoatingModel):
-    """A coating whose class allows any reflectance."""
-
-    kind: Literal["test-bright"] = "test-bright"
-    white: float
-
-    def reflection(self) -> Reflection:
-        return Reflection((self.white, self.white, self.white))
-
-
-def test_a_coating_that_returns_more_light_than_it_gets_is_not_rendered() -> None:
-    possible = set_value(design(), "coating", Bright(white=0.5))
-    impossible = set_value(possible, "coating.white", 1.5)
-    used = OpticalModel(possible, "llvm")
-    with pytest.raises(DesignError, match=r"reflectance is \(1\.5"):
-        used.set_design(impossible)
-    assert used.design == possible
-    with pytest.raises(DesignError, match=r"reflectance is \(1\.5"):
-        OpticalModel(impossible, "llvm")
-
-
 def test_a_contact_leaves_no_trace_in_the_next_image() -> None:
     used = OpticalModel(design(), "llvm")
     render(used, ASIDE)
@@ -266,27 +244,6 @@ def test_only_contacts_lights_what_the_whole_image_shows_there_and_nothing_else(
     assert (only.radiance[~mask] == 0).all()
     # What a pixel shows does not depend on which others are rendered.
     assert same_light(only.radiance[mask], whole.radiance[mask])
-
-
-@pytest.mark.parametrize("tilt", [-0.002, 0.0, 0.002])
-@pytest.mark.parametrize(
-    ("up", "u", "v"),
-    [((0.0, 1.0, 0.0), (-1, 0, 0), (0, 1, 0)), ((0.0, 0.0, 1.0), (0, -1, 0), (-1, 0, 0))],
-)
-def test_axes_are_those_of_the_picture_for_a_camera_along_the_surface(
-    plain_mini: OpticalModel,
-    tilt: float,
-    up: tuple[float, ...],
-    u: tuple[int, ...],
-    v: tuple[int, ...],
-) -> None:
-    placed = {"position": (-20.0, 0.0, -15.0), "direction": (1.0, 0.0, tilt), "up": up}
-    beside = set_value(plain_mini.design, "camera.fov", 100.0)
-    for name, value in placed.items():
-        beside = set_value(beside, f"camera.{name}", value)
-    surface = OpticalModel(beside).surface
-    assert surface.u_axis == pytest.approx(np.array(u), abs=1e-3)
-    assert surface.v_axis == pytest.approx(np.array(v), abs=1e-3)
 
 
 @pytest.mark.parametrize(
