@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from optisense import sensors
 from optisense.design import Diagnostic, SensorDesign, check_design, set_value
@@ -179,12 +180,15 @@ def test_the_shares_of_the_view_follow_the_lens(mini: SensorDesign) -> None:
 
 
 def test_shares_of_oblique_rectangles() -> None:
+    """Of any size, place and angle; see `SAMPLES`."""
     number = np.arange(SAMPLES)
     places = np.stack([number + 0.5, number * SAMPLES_TURN % SAMPLES + 0.5], axis=1) / SAMPLES
-    sides = np.array([0.5, 0.3])
+    rng = np.random.default_rng(0)
     errors = []
-    for angle in np.linspace(0.0, np.pi, 180, endpoint=False):
-        turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
-        inside = (np.abs((places - 0.5) @ turn.T) < 0.5 * sides).all(axis=1)
-        errors.append(abs(inside.mean() - sides.prod()))
+    for _ in range(500):
+        (x, y), (wide, high) = rng.random(2), rng.uniform(0.05, 0.5, 2)
+        box = shapely.box(x - wide, y - high, x + wide, y + high)
+        turned = shapely.affinity.rotate(box, rng.uniform(0.0, 180.0), origin=(x, y))
+        share = shapely.contains_xy(turned, *places.T).mean()
+        errors.append(abs(share - turned.intersection(shapely.box(0, 0, 1, 1)).area))
     assert max(errors) < 0.08 and np.quantile(errors, 0.9) < 0.02
