@@ -326,7 +326,7 @@ def _slot(outline: list[OutlinePiece]) -> tuple[float, float, float] | None:
 
 def _steps(plate: Plate, ring: shapely.Polygon, axis: int) -> list[float]:
     """Return the distances along an axis, mm, of corners and of straight edges across it, without
-    those of the plate's own sides, ascending.
+    the sides of the plate and those of openings, which the table gives, ascending.
     """
     found: set[float] = set()
     for outline, loop in zip(plate.outlines, (ring.exterior, *ring.interiors), strict=True):
@@ -335,8 +335,10 @@ def _steps(plate: Plate, ring: shapely.Polygon, axis: int) -> list[float]:
         places = list(_corners(np.array(loop.coords)[:-1]))
         lines = [piece.points for piece in outline if piece.kind == "line"]
         places += [ends[0] for ends in lines if abs(ends[1, axis] - ends[0, axis]) < SAME]
-        found |= {round(float(place[axis]), 2) for place in places}
-    return sorted(value for value in found if SAME < value < ring.bounds[2 + axis] - 0.01)
+        low, high = loop.bounds[axis], loop.bounds[2 + axis]
+        along = (round(float(place[axis]), 2) for place in places)
+        found |= {value for value in along if low + 0.01 < value < high - 0.01}
+    return sorted(found)
 
 
 def _round(sheet: Sheet, plate: Plate, ring: shapely.Polygon, corner: FloatArray) -> None:

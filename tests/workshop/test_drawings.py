@@ -159,6 +159,8 @@ def test_steps_have_their_distances_from_the_corner() -> None:
     outline = shapely.box(0, 0, 20, 20).difference(shapely.box(8, 5, 20, 15))
     told = texts(drawing(extruded(outline), "a design"))
     assert sorted(told[:8]) == sorted(["20", "20", "3", "0", "8", "0", "5", "15"])
+    window = shapely.box(0, 0, 20, 20).difference(shapely.box(8, 5, 12, 15))
+    assert "0" not in texts(drawing(extruded(window), "a design")), "the table has its sides"
     plain = texts(drawing(extruded(shapely.box(0, 0, 20, 10)), "a design"))
     assert sorted(plain[:3]) == ["10", "20", "3"] and "0" not in plain
 
