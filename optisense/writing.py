@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import csv
 import errno
+import io
 import json
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -144,6 +146,13 @@ def written_whole(path: Path, what: str = "the file", hint: str | None = None) -
     """
     with written_together(what, hint) as stage:
         yield stage(path)
+
+
+def csv_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table (RFC 4180) with a line of headings."""
+    text = io.StringIO()
+    csv.writer(text).writerows([head, *rows])
+    return text.getvalue()
 
 
 def write_text(path: Path, text: str, what: str = "the file", hint: str | None = None) -> None:

@@ -27,13 +27,15 @@ from optisense.cli.options import (
 from optisense.cli.output_folder import take_folder
 from optisense.cli.progress import ProgressLine, about, progress_line
 from optisense.commands.scoring import ToleranceOptions
-from optisense.writing import remove_own_page, write_json, write_text
+from optisense.text import cell
+from optisense.writing import csv_table, remove_own_page, write_json, write_text
 
 if TYPE_CHECKING:
     from optisense.search.tolerance.analysis import ScoreDistribution, Tolerance
     from optisense.search.tolerance.sensitivity import Estimate
 
 JSON_FILE = "tolerance.json"
+VALUES_FILE = "tolerance.csv"
 REPORT_FILE = "tolerance.html"
 
 
@@ -43,7 +45,7 @@ def tolerance(
     *,
     options: ToleranceOptions,
     workers: WorkersOption = 1,
-    out: Annotated[Path | None, out_option("Folder for tolerance.json.")] = None,
+    out: Annotated[Path | None, out_option("Folder for tolerance.json and .csv.")] = None,
     report: Annotated[
         bool,
         typer.Option("--report", help="Also write tolerance.html, with figures, into the folder."),
@@ -97,7 +99,7 @@ def tolerance(
     else:
         _print(found)
         if out is not None:
-            for name in [JSON_FILE, *([REPORT_FILE] if report else [])]:
+            for name in [JSON_FILE, VALUES_FILE, *([REPORT_FILE] if report else [])]:
                 output.print(f"written: {out / name}")
     if found.interrupted:
         kept = "" if out is not None else "; use --out DIR to keep it"
@@ -130,6 +132,8 @@ def _write(found: Tolerance, folder: Path, report: bool) -> None:
     from optisense.report.tolerance import render_tolerance
 
     write_json(folder / JSON_FILE, found.to_dict())
+    rows = found.values.reshape(-1, len(found.names)).tolist()
+    write_text(folder / VALUES_FILE, csv_table([cell(name) for name in found.names], rows))
     if report:
         write_text(folder / REPORT_FILE, render_tolerance(found))
     else:  # a page of earlier figures would contradict these

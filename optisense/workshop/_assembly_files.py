@@ -17,7 +17,8 @@ from optisense.text import cell
 from optisense.workshop._boards import boards_of
 from optisense.workshop._dxf import closed, dxf
 from optisense.workshop._placement import Placement, what_to_order
-from optisense.workshop._tables import csv_table, digits, light_entry
+from optisense.workshop._tables import digits, light_entry
+from optisense.writing import csv_table
 
 MARGIN = 1.0
 """Width of the board around the bodies of its LEDs in the outline, mm; an assumption."""

@@ -10,8 +10,9 @@ from optisense.library import OVERDRIVEN, AnyEntry, typical_colour
 from optisense.library.facts import summary
 from optisense.text import cell, markdown
 from optisense.workshop._placement import what_to_order
-from optisense.workshop._tables import csv_table, entry_or_none, light_entry
+from optisense.workshop._tables import entry_or_none, light_entry
 from optisense.workshop.shapes import Shape, shapes
+from optisense.writing import csv_table
 
 MM2_PER_CM2, MM3_PER_CM3 = 100.0, 1000.0
 """Square millimetres in a square centimetre, and cubic ones in a cubic centimetre."""

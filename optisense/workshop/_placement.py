@@ -13,7 +13,8 @@ from optisense.design import Light, LightGroup, SensorDesign
 from optisense.design.lights import frame_of
 from optisense.design.posing import triple
 from optisense.workshop._boards import boards_of
-from optisense.workshop._tables import csv_table, digits, light_entry
+from optisense.workshop._tables import digits, light_entry
+from optisense.writing import csv_table
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,11 @@
-"""Tables of the workshop's files: their text, and the entries of the library that they name."""
+"""Entries of the workshop's tables: their digits, and the entries of the library that they name."""
 
 from __future__ import annotations
-
-import csv
-import io
-from collections.abc import Iterable, Sequence
 
 from optisense import library
 from optisense.design import LightGroup
 from optisense.errors import LibraryError
 from optisense.library import AnyEntry, LightEntry
-
-
-def csv_table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table (RFC 4180) with a line of headings."""
-    text = io.StringIO()
-    csv.writer(text).writerows([head, *rows])
-    return text.getvalue()
 
 
 def digits(value: float, places: int) -> str:

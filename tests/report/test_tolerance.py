@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -93,6 +95,11 @@ def test_the_command(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     told = json.loads(done.stdout)
     assert told == json.loads((out / "tolerance.json").read_text(encoding="utf-8"))
+    head, *rows = csv.reader((out / "tolerance.csv").read_text(encoding="utf-8").splitlines())
+    assert head == ["camera.fov", "camera.position.z"]
+    values = np.array(rows, dtype=float)
+    assert values.shape == (24, 2) and (np.ptp(values, axis=0) > 0.0).all()
+    assert not {"names", "values"} & set(told)
     assert told["errors"] == {"camera.fov": ["normal", 0.5], "camera.position.z": ["uniform", 0.2]}
     result = told["objectives"]["aoap"]
     assert told["sensors"] == len(result["scores"]) == 24

@@ -144,10 +144,7 @@ class Tolerance:
     names: Sequence[str] = field(repr=False)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all results, ready for JSON.
-
-        ``values`` has a row for each of the ``scores``, and a column for each of the ``names``.
-        """
+        """Return all results but the numbers with errors, ready for JSON."""
         return {
             "design": self.design.name,
             "versions": package_versions(),
@@ -159,8 +156,6 @@ class Tolerance:
             "settings": dict(self.settings),
             "failures": dict(self.failures),
             "objectives": {name: _plain(each) for name, each in self.results.items()},
-            "names": list(self.names),
-            "values": self.values.reshape(-1, len(self.names)).tolist(),
         }
 
 
