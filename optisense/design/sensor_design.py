@@ -20,9 +20,9 @@ from pydantic import (
 )
 from pydantic_core import PydanticSerializationError
 
+from optisense.design._components import Components
 from optisense.design.cage import Cage
 from optisense.design.camera import Camera
-from optisense.design.components import Components
 from optisense.design.fields import InconsistentValueError, Model, Name, is_left_out
 from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup

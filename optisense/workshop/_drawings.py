@@ -18,7 +18,7 @@ from optisense.text import to_html
 from optisense.workshop._dxf import Pair, arc, circle, dxf, line
 from optisense.workshop._plates import Circle, Plate
 from optisense.workshop._profiles import OutlinePiece, centre_of
-from optisense.workshop._sheet import LETTER, STYLE, TEXT, Sheet, number
+from optisense.workshop._sheet import LETTER, STYLE, TEXT, DrawingSheet, number
 
 GAP = 16.0
 """Distance between two views, mm: room for a dimension and its number."""
@@ -107,7 +107,7 @@ def drawing(plate: Plate, title: str) -> str:
     side = left + width + GAP
     widest = 2.0 * BORDER + LETTER * max(len(line) for line in words)
     whole = max(side + thick + OFF + BORDER + 2.0 * TEXT, widest), plan + depth + BORDER + OFF
-    sheet = Sheet(whole[1])
+    sheet = DrawingSheet(whole[1])
     corner = np.array([left, plan])
     for outline in plate.outlines:
         _plan(sheet, outline, corner)
@@ -140,7 +140,7 @@ def drawing(plate: Plate, title: str) -> str:
     ])  # fmt: skip
 
 
-def _plan(sheet: Sheet, outline: Circle | list[OutlinePiece], corner: FloatArray) -> None:
+def _plan(sheet: DrawingSheet, outline: Circle | list[OutlinePiece], corner: FloatArray) -> None:
     """Draw an outline in the plan."""
     if isinstance(outline, Circle):
         x, y = (outline.centre + corner).tolist()
@@ -197,7 +197,7 @@ def _fine(piece: OutlinePiece) -> FloatArray:
 
 
 def _beside(
-    sheet: Sheet, ring: shapely.Polygon, corner: tuple[float, float], thick: float, axis: int
+    sheet: DrawingSheet, ring: shapely.Polygon, corner: tuple[float, float], thick: float, axis: int
 ) -> None:
     """Draw a view along the plate: from the front (0, below the plan) or from the right (1)."""
     low, high = ring.bounds[axis], ring.bounds[2 + axis]
@@ -341,7 +341,7 @@ def _steps(plate: Plate, ring: shapely.Polygon, axis: int) -> list[float]:
     return sorted(found)
 
 
-def _round(sheet: Sheet, plate: Plate, ring: shapely.Polygon, corner: FloatArray) -> None:
+def _round(sheet: DrawingSheet, plate: Plate, ring: shapely.Polygon, corner: FloatArray) -> None:
     """Draw axes of holes, and radii of arcs, each radius once, where it is farthest from holes."""
     arcs: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
     for outline in plate.outlines:

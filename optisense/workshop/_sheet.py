@@ -30,7 +30,7 @@ STYLE = (
 
 
 @dataclass
-class Sheet:
+class DrawingSheet:
     """Elements of the drawing, in mm with y up; SVG has y down."""
 
     height: float
