@@ -6,6 +6,7 @@ from the right at its right.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from string import ascii_uppercase
 
@@ -18,7 +19,7 @@ from optisense.text import to_html
 from optisense.workshop._dxf import Pair, arc, circle, dxf, line
 from optisense.workshop._plates import Circle, Plate
 from optisense.workshop._profiles import OutlinePiece, centre_of
-from optisense.workshop._sheet import LETTER, STYLE, TEXT, DrawingSheet, number
+from optisense.workshop._sheet import LETTER, STYLE, TEXT, DrawingSheet, apart, number
 
 GAP = 16.0
 """Distance between two views, mm: room for a dimension and its number."""
@@ -43,8 +44,8 @@ ROW = 2.2 * TEXT
 """Distance between two lines of text, mm."""
 
 MOST_STEPS = 12
-"""Number of places of edges along x or y up to which each has its dimension. A plate of more is a
-freely curved or toothed one, which is cut from its file."""
+"""Number of places of edges along x or y up to which each has its dimension, if their numbers have
+room. A plate of more is a freely curved or toothed one, which is cut from its file."""
 
 SAME = 1e-3
 """Difference of lengths, mm, that counts as none: far below the accuracy of cutting."""
@@ -116,13 +117,14 @@ def drawing(plate: Plate, title: str) -> str:
     sheet.across(left, left + width, plan + depth, plan + depth + OFF)
     sheet.up(plan, plan + depth, left, left - OFF)
     sheet.up(front, front + thick, left, left - OFF)
-    for axis, foot in (
-        (0, (plan - 1.0, plan - 3.0)),
-        (1, (left + width + 1.0, left + width + 3.0)),
+    for axis, side_length, foot in (
+        (0, width, (plan - 1.0, plan - 3.0)),
+        (1, depth, (left + width + 1.0, left + width + 3.0)),
     ):
-        steps = _steps(plate, ring, axis)
-        if steps and len(steps) <= MOST_STEPS:
-            sheet.ordinates([0.0, *steps], foot, corner, axis)
+        steps = [0.0, *_steps(plate, ring, axis)]
+        # Numbers may reach as far beyond the side as the line of its length does.
+        if 1 < len(steps) <= MOST_STEPS + 1 and apart(steps)[-1] < side_length + OFF:
+            sheet.ordinates(steps, foot, corner, axis)
     _round(sheet, plate, ring, corner)
     for letter, (place, _) in zip(_letters(), features, strict=False):
         sheet.text(tuple((place + corner).tolist()), letter, "start")
@@ -261,10 +263,9 @@ def _words(plate: Plate, title: str, features: list[str]) -> list[str]:
 
 
 def _letters() -> Iterator[str]:
-    """Yield A to Z, then AA to AZ, BA and so on."""
-    for before in ("", *ascii_uppercase):
-        for letter in ascii_uppercase:
-            yield before + letter
+    """Yield A to Z, then AA to AZ, BA and so on, without end."""
+    for count in itertools.count(1):
+        yield from map("".join, itertools.product(ascii_uppercase, repeat=count))
 
 
 def _features(plate: Plate) -> list[tuple[FloatArray, str]]:

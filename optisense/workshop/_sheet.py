@@ -109,16 +109,24 @@ class DrawingSheet:
             corner: corner (2,) of the plate on the sheet, mm.
         """
         begin, end = foot
-        shown = -np.inf
-        for value in values:
-            place = float(corner[axis]) + value
-            shown = max(place, shown + 1.2 * TEXT)
+        for value, moved in zip(values, apart(values), strict=True):
+            place, shown = (float(corner[axis]) + each for each in (value, moved))
             if axis == 0:
                 self.line((place, begin), (shown, end), "thin")
                 self.text((shown + 0.4 * TEXT, end - 0.5), number(value), "end", upright=True)
             else:
                 self.line((begin, place), (end, shown), "thin")
                 self.text((end + 0.5, shown - 0.4 * TEXT), number(value), "start")
+
+
+def apart(values: list[float]) -> list[float]:
+    """Return ascending places, mm, of which those that are closer than a line of text are moved
+    up.
+    """
+    found: list[float] = []
+    for value in values:
+        found.append(max(value, found[-1] + 1.2 * TEXT) if found else value)
+    return found
 
 
 def number(value: float) -> str:

@@ -165,6 +165,15 @@ def test_steps_have_their_distances_from_the_corner() -> None:
     assert sorted(plain[:3]) == ["10", "20", "3"] and "0" not in plain
 
 
+def test_distances_of_steps_stay_on_the_sheet() -> None:
+    notches = [shapely.box(x, 6, x + 1, 8) for x in range(1, 11, 2)]
+    outline = shapely.box(0, 0, 12, 8).difference(shapely.union_all(notches))
+    svg = drawing(extruded(outline), "a design")
+    wide, high = (float(x) for x in ElementTree.fromstring(svg).attrib["viewBox"].split()[2:])
+    left, low, right, top = shapely.total_bounds(boxes_of_texts(svg))
+    assert left >= 0 and low >= 0 and right <= wide and top <= high
+
+
 def test_a_sheet_is_as_wide_as_its_longest_line() -> None:
     svg = drawing(extruded(shapely.box(0, 0, 20, 10), name="w" * 64), "a design")
     wide = float(ElementTree.fromstring(svg).attrib["viewBox"].split()[2])
