@@ -289,10 +289,10 @@ def test_an_ascent_ends_on_the_limit_of_its_conditions(svelte: SensorDesign) -> 
 
 def test_powers_of_lights_climb_by_relit_pictures(mini: SensorDesign) -> None:
     """RGB2Normal wants back the green light of a sensor; only the start is rendered."""
-    dark = set_value(mini, "lights.green.flux", 0.6)
+    dark = set_value(mini, "lights.green.flux", 0.1)
     small = {"resolution": (160, 120), "photons": 60_000, "places": [[0, 0], [4, 3]]}
     result = search(
-        dark, {"lights.*.flux": (0.2, 6.0)}, "rgb2normal", method="gradient", budget=5,
+        dark, {"lights.*.flux": (0.05, 6.0)}, "rgb2normal", method="gradient", budget=5,
         settings=small, options={"starts": 1}, require="power <= 60",
     )  # fmt: skip
     assert result.best.score > result.start.score + 0.01
