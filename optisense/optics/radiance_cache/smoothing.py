@@ -180,7 +180,7 @@ class Kernels:
         how much, and the difference is added ("twicing", see `smoothing`). Light cannot become
         negative: what a cell lacks to zero is taken from the light that the blur brought there. The
         power is conserved. With the ratio in place of the difference (Jones, Linton and Nielsen
-        1995), each peak and each edge would add power: a tenth of that of a lamp of 15 degrees.
+        1995), each peak and each edge would add power: 7.6 % of that of a spot of 15 degrees.
 
         Args:
             landed: (cells, groups) power (mW) on each cell.
