@@ -9,7 +9,6 @@ import pytest
 from scipy import stats
 
 from benchmarks.mitsuba_export import surface_bsdf
-from optisense.optics.scene._ggx import sample_ggx
 from optisense.optics.scene.coating_bsdf import (
     CoatingBsdf,
     coating_density,
@@ -17,7 +16,7 @@ from optisense.optics.scene.coating_bsdf import (
     peak_share,
     sample_coating,
 )
-from optisense.optics.scene.interfaces import refract, sample_rough_interface
+from optisense.optics.scene.interfaces import refract, sample_ggx, sample_rough_interface
 from optisense.optics.scene.surfaces import Surface, SurfaceKind
 
 SIGNIFICANCE = 0.001

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.scene._ggx import ggx, ggx_of_disc, sample_ggx, smith_g1
+from optisense.optics.scene.interfaces import ggx, ggx_of_disc, sample_ggx, smith_g1
 
 PEAK_ANGLES = 0.12, 0.3
 """Angles (radians) between the half vector and the normal over which the peak of a narrow metallic

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.geometry import TriangleMesh
 from optisense.mechanics import PressedSkin, SkinMesh, SkinState
 from optisense.optics.backend.arrays import floats
-from optisense.optics.scene.assembly import indenter_piece
 from optisense.optics.scene.ray_scene import Piece, RayScene, share_scene
-from optisense.optics.scene.surfaces import Region, Surface
+from optisense.optics.scene.surfaces import Surface
 
 
 @dataclass
@@ -49,64 +46,6 @@ class ContactScenes:
 
 
 @dataclass(frozen=True)
-class SensorPieces:
-    """The pieces of a sensor, to which contacts are added.
-
-    Attributes:
-        pieces: the pieces of the sensor without contacts.
-        surfaces: the surfaces of the pieces, then the coating where indenters touch it, and the
-            coating where it is bent beside them.
-        table: the table of these surfaces.
-    """
-
-    pieces: list[Piece]
-    surfaces: list[Surface]
-    table: mi.Float
-
-    def with_indenters(self, placed: Sequence[TriangleMesh]) -> RayScene:
-        """Return the sensor with coated indenters; rays see the surface that they meet first."""
-        count = len(self.pieces)
-        pieces = [indenter_piece(mesh, self.surfaces[count]) for mesh in placed]
-        numbers = [*range(count), *[count] * len(pieces)]
-        return RayScene([*self.pieces, *pieces], numbers, self.table, robust=True)
-
-    def with_skin(
-        self, skin: SkinShapes, fixed: RayScene, absorption: mi.Color3f | None
-    ) -> ContactScenes:
-        """Return the sensor with a deformed skin in place of its sensing surface.
-
-        Args:
-            fixed: the opaque surfaces without contacts.
-            absorption: absorption coefficient of the gel, as in `ContactScenes`.
-        """
-        others = [i for i, p in enumerate(self.pieces) if p.surface.region is not Region.SENSING]
-        return ContactScenes(
-            RayScene(
-                [*(self.pieces[i] for i in others), *skin.pieces],
-                [*others, *skin.numbers],
-                self.table,
-                robust=True,
-            ),
-            fixed,
-            None if skin.raised is None else skin.raised.with_table(self.table),
-            skin.balls,
-            absorption=absorption,
-        )
-
-    @property
-    def skin_surfaces(self) -> tuple[tuple[int, Surface], ...]:
-        """Return, for each `SkinState`, the number and the surface of a deformed skin."""
-        count = len(self.pieces)
-        sensing = next(i for i, p in enumerate(self.pieces) if p.surface.region is Region.SENSING)
-        numbers = {
-            SkinState.RESTING: sensing,
-            SkinState.BENT: count + 1,
-            SkinState.TOUCHING: count,
-        }
-        return tuple((numbers[state], self.surfaces[numbers[state]]) for state in SkinState)
-
-
-@dataclass(frozen=True)
 class SkinShapes:
     """A deformed skin prepared for ray tracing, independent of the other parts of the sensor.
 
@@ -130,7 +69,7 @@ class SkinShapes:
         """Prepare a skin.
 
         Args:
-            surfaces: number and surface for each state (`SensorPieces.skin_surfaces`).
+            surfaces: number and surface for each state.
         """
         skin = {}
         for state, (_, surface) in zip(SkinState, surfaces, strict=True):

@@ -1,16 +1,110 @@
-"""Refraction and reflection at smooth and rough interfaces."""
+"""Refraction and reflection at smooth interfaces and at rough ones, of GGX micro-facets (Walter et
+al. 2007).
+"""
 
 from __future__ import annotations
 
 import drjit as dr
 import mitsuba as mi
 
-from optisense.optics.scene._ggx import sample_ggx, smith_g1
-
+MIN_DISC_COSINE = 0.1
+"""Lower bound on the cosine of the half vector with the light, by which a disc of light widens
+among half vectors. Below it the light and the eye are more than 168 degrees apart, so that both are
+at grazing angles."""
+MIN_DISC = 1e-9
+"""Lower bound on the squared radius of a disc of half vectors (radians squared). It avoids a
+division by zero; a disc of this radius (0.002 degrees) is a single direction."""
 SMOOTH_ALPHA = 1e-3
 """GGX roughness below which a dielectric is treated as smooth. With 0.001, half of the micro-facets
 tilt by less than 0.06 degrees: reflections blur by half a pixel of a picture with 320 pixels over
 60 degrees, and refraction by less."""
+
+
+def ggx(cos_m: mi.Float, alpha: mi.Float) -> mi.Float:
+    """Return the GGX distribution (n,), 1/sr, of micro-facet normals.
+
+    Args:
+        cos_m: cosine of the micro-facet normal with the normal.
+        alpha: GGX roughness.
+    """
+    a2 = alpha * alpha
+    base = cos_m * cos_m * (a2 - 1) + 1
+    return a2 / (dr.pi * base * base)
+
+
+def ggx_of_disc(
+    cos_m: mi.Float, cos_d: mi.Float, alpha: mi.Float, light_radius2: mi.Float
+) -> mi.Float:
+    """Return the GGX distribution averaged over the half vectors of a disc of light; it is exact
+    but for the shape of the disc.
+
+    With s the sine of the half vector with the normal, the distribution is
+    a^2 / (pi (a^2 + (1 - a^2) s^2)^2): seen along the normal, the stereographic image of an even
+    density on a sphere. As circles stay circles there, its integral over a disc of radius rho is
+    the area of a spherical cap, of half angle c with cos(c) = q / h,
+    q = a^2 + (1 - a^2) s^2 - rho^2, h^2 = q^2 + 4 a^2 rho^2. Peak, tail and integral are those of
+    the convolution, while a larger alpha would raise the tail.
+
+    Args:
+        cos_m: cosine of the half vector with the normal.
+        cos_d: cosine of the half vector with the light.
+        alpha: GGX roughness.
+        light_radius2: squared angular radius of the disc (radians squared).
+    """
+    a2 = alpha * alpha
+    rho2 = dr.maximum((1 - a2) * _half_vector_disc(cos_m, cos_d, light_radius2), MIN_DISC)
+    q = a2 + (1 - a2) * dr.maximum(1 - cos_m * cos_m, 0) - rho2
+    h = dr.sqrt(q * q + 4 * a2 * rho2)
+    # Two forms of (1 - cos c) / (2 rho^2); each is free of cancellation on its side.
+    return dr.inv_pi * dr.select(q > 0, 2 * a2 / (h * (h + q)), (h - q) / (2 * rho2 * h))
+
+
+def _half_vector_disc(cos_m: mi.Float, cos_d: mi.Float, light_radius2: mi.Float) -> mi.Float:
+    """Return the squared radius (n,) of a disc of half vectors, seen along the normal; see
+    `ggx_of_disc`.
+
+    The solid angle of half vectors is that of the light over 4 cos_d; seen along the normal, it
+    shrinks by cos_m.
+    """
+    return light_radius2 * cos_m / (4 * dr.maximum(cos_d, MIN_DISC_COSINE))
+
+
+def smith_g1(cosine: mi.Float, alpha: mi.Float) -> mi.Float:
+    """Return Smith's shadowing factor (n,) of one direction at GGX micro-facets.
+
+    Args:
+        cosine: cosine of the direction with the normal.
+        alpha: GGX roughness.
+    """
+    tan2 = (1 - cosine * cosine) / dr.maximum(cosine * cosine, 1e-12)
+    return 2 / (1 + dr.sqrt(1 + alpha * alpha * tan2))
+
+
+def sample_ggx(local: mi.Vector3f, alpha: mi.Float, sample: mi.Point2f) -> mi.Vector3f:
+    """Return a visible GGX normal, a unit vector (3, n) (Heitz 2018, "Sampling the GGX distribution
+    of visible normals", listing 1).
+
+    Args:
+        local: unit directions towards the viewer, in the frame whose z axis is the surface's
+            normal.
+        alpha: GGX roughness (n,).
+        sample: random point of the unit square.
+    """
+    stretched = dr.normalize(mi.Vector3f(alpha * local.x, alpha * local.y, local.z))
+    length2 = stretched.x * stretched.x + stretched.y * stretched.y
+    inverse = dr.select(length2 > 0, dr.rsqrt(dr.maximum(length2, 1e-20)), 0)
+    t1 = dr.select(
+        length2 > 1e-12,
+        mi.Vector3f(-stretched.y * inverse, stretched.x * inverse, 0),
+        mi.Vector3f(1, 0, 0),
+    )
+    t2 = dr.cross(stretched, t1)
+    disk = mi.warp.square_to_uniform_disk_concentric(sample)
+    s = 0.5 * (1 + stretched.z)
+    y = (1 - s) * dr.safe_sqrt(1 - disk.x * disk.x) + s * disk.y
+    z = dr.safe_sqrt(1 - disk.x * disk.x - y * y)
+    half = t1 * disk.x + t2 * y + stretched * z
+    return dr.normalize(mi.Vector3f(alpha * half.x, alpha * half.y, dr.maximum(half.z, 1e-6)))
 
 
 def refract(

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
 import numpy as np
+from numpy.typing import NDArray
 
 from optisense.design.materials import CoatingModel
 from optisense.geometry import Contact, TriangleMesh
-from optisense.mechanics import PressedSkin, SkinMesh
+from optisense.mechanics import PressedSkin, SkinMesh, SkinState
 from optisense.optics.backend.arrays import floats
 from optisense.optics.backend.variant import one_scene_per_kernel
-from optisense.optics.scene._fine_scene import FineScene, fine_scene
 from optisense.optics.scene.assembly import Assembly, coating_surface, indenter_piece
-from optisense.optics.scene.contact_scenes import (
-    ContactScenes,
-    SensorPieces,
-    SkinShapes,
-    bounding_ball,
-)
+from optisense.optics.scene.contact_scenes import ContactScenes, SkinShapes, bounding_ball
 from optisense.optics.scene.emitters import EmitterTable, emitter_table
 from optisense.optics.scene.lamp_windows import LampWindows
 from optisense.optics.scene.ray_scene import Piece, RayScene
@@ -35,6 +31,19 @@ PILOT_COATING = Surface(
 dark that scattered light would be missing nor so bright that it would dominate."""
 
 
+class FineScene(NamedTuple):
+    """A scene in which flat parts of the sensing surface keep their triangles.
+
+    Attributes:
+        scene: the ray scene.
+        sensing_faces: number (m,) of the triangle of the sensing surface for each triangle of the
+            scene, or -1.
+    """
+
+    scene: RayScene
+    sensing_faces: NDArray[np.int64]
+
+
 class _Shapes:
     """The ray scenes of an assembly's shapes, each built on first use.
 
@@ -43,7 +52,8 @@ class _Shapes:
     """
 
     def __init__(self, assembly: Assembly, table: mi.Float, before: _Shapes | None) -> None:
-        self._pieces, self._fine_pieces, self._table = assembly.pieces, assembly.fine, table
+        self._pieces, self._table = assembly.pieces, table
+        self.fine_pieces = [assembly.fine.get(i, p) for i, p in enumerate(assembly.pieces)]
         numbers = [i for i, p in enumerate(self._pieces) if p.surface.kind is SurfaceKind.OPAQUE]
         self.opaque = [self._pieces[i] for i in numbers]
         self._opaque_numbers = numbers
@@ -77,8 +87,11 @@ class _Shapes:
 
     @cached_property
     def fine(self) -> FineScene:
-        fine = self._fine_pieces
-        return fine_scene([fine.get(i, p) for i, p in enumerate(self._pieces)], self._table)
+        pieces = self.fine_pieces
+        sensed = [np.full(len(p.faces), p.surface.region is Region.SENSING) for p in pieces]
+        sensing = np.concatenate(sensed)
+        faces = np.where(sensing, np.cumsum(sensing) - 1, -1)
+        return FineScene(RayScene(pieces, table=self._table, robust=True), faces)
 
 
 class SensorScenes:
@@ -202,8 +215,14 @@ class SensorScenes:
         Args:
             placed: meshes of the indenters in the design's frame, mm.
         """
-        pieces = SensorPieces(self.fine.pieces, self.surfaces, self.table)
-        return pieces.with_indenters(placed)
+        return self._with_indenters(self._shapes.fine_pieces, placed)
+
+    def _with_indenters(self, pieces: list[Piece], placed: Sequence[TriangleMesh]) -> RayScene:
+        """Return the sensor with coated indenters; rays see the surface that they meet first."""
+        count = len(pieces)
+        added = [indenter_piece(mesh, self.surfaces[count]) for mesh in placed]
+        numbers = [*range(count), *[count] * len(added)]
+        return RayScene([*pieces, *added], numbers, self.table, robust=True)
 
     def touched(self, contacts: Sequence[Contact], placed: Sequence[TriangleMesh]) -> ContactScenes:
         """Return the scenes of an image in which the skin takes the shape of the indenters.
@@ -218,7 +237,7 @@ class SensorScenes:
         indenters = self._shapes.indenters(len(self.pieces), tuple(placed))
         return _for_renderer(
             ContactScenes(
-                self._sensor_pieces.with_indenters(placed),
+                self._with_indenters(self.pieces, placed),
                 self.fixed,
                 indenters.with_table(self.table),
                 floats(balls),
@@ -236,13 +255,26 @@ class SensorScenes:
             fixed: the scene in which rays are traced behind the deformed skin; that of the opaque
                 surfaces if None.
         """
-        pieces = self._sensor_pieces
-        skin = self._shapes.skin(mesh, pressed, pieces.skin_surfaces)
-        return _for_renderer(pieces.with_skin(skin, fixed or self.fixed, self._absorption()))
-
-    @property
-    def _sensor_pieces(self) -> SensorPieces:
-        return SensorPieces(self.pieces, self.surfaces, self.table)
+        count = len(self.pieces)
+        others = [i for i, p in enumerate(self.pieces) if p.surface.region is not Region.SENSING]
+        sensing = next(i for i in range(count) if i not in others)
+        number = {
+            SkinState.RESTING: sensing,
+            SkinState.TOUCHING: count,
+            SkinState.BENT: count + 1,
+        }
+        surfaces = tuple((number[state], self.surfaces[number[state]]) for state in SkinState)
+        skin = self._shapes.skin(mesh, pressed, surfaces)
+        pieces = [*(self.pieces[i] for i in others), *skin.pieces]
+        return _for_renderer(
+            ContactScenes(
+                RayScene(pieces, [*others, *skin.numbers], self.table, robust=True),
+                fixed or self.fixed,
+                None if skin.raised is None else skin.raised.with_table(self.table),
+                skin.balls,
+                absorption=self._absorption(),
+            )
+        )
 
     def _absorption(self) -> mi.Color3f | None:
         """Absorption coefficient (1/mm, per channel) of the gel in front of the sensing surface;
