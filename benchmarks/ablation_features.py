@@ -78,7 +78,7 @@ def _of_sampling() -> list[Ablation]:
     import mitsuba as mi
 
     from optisense.optics.backend import sequences
-    from optisense.optics.imaging import _grain, cached, lamp_images, sampling
+    from optisense.optics.imaging import cached, lamp_images, sampling
     from optisense.optics.radiance_cache import bin_sums, shading, shading_points
     from optisense.optics.transport import camera_paths
 
@@ -100,7 +100,7 @@ def _of_sampling() -> list[Ablation]:
         _shading("shading of every second pixel",
                  Change(cached, "SPARSE_SHADING_BEAMS", np.inf),
                  Change(cached, "SPARSE_METALLIC_BEAMS", np.inf)),
-        _shading("more samples in noisy areas", Change(_grain, "GRAIN_THRESHOLD", np.inf)),
+        _shading("more samples in noisy areas", Change(sampling, "GRAIN_THRESHOLD", np.inf)),
         _shading("more samples in small contacts", Change(sampling, "MIN_CONTACT_SAMPLES", 0)),
         _shading("lattice of the samples of a pixel",
                  Change(camera_paths, "folded_lattice", random_2d)),
@@ -228,7 +228,6 @@ def _of_lobes() -> list[Ablation]:
     from optisense.optics.imaging import _traced_light, cached
     from optisense.optics.radiance_cache import (
         _lobe_branches,
-        _ray_resampling,
         lit_scene,
         traced_lobes,
     )
@@ -262,7 +261,7 @@ def _of_lobes() -> list[Ablation]:
                Change(traced_lobes, "richtmyer", at_random)),
         _lobes("part of the branches followed", Change(_lobe_branches, "BRANCH_FACTOR", 1e9)),
         _lobes("branches of second segments", Change(traced_lobes, "BRANCHED_SEGMENTS", 1)),
-        _lobes("rays split at contacts", Change(_ray_resampling, "SPLIT_SHARE", 0.0)),
+        _lobes("rays split at contacts", Change(_lobe_branches, "SPLIT_SHARE", 0.0)),
         _lobes("drawn places of cached light",
                Change(traced_lobes, "MOST_CACHED", 10**9),
                Change(traced_lobes, "MOST_GATHERED", 10**9)),

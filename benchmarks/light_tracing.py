@@ -22,8 +22,8 @@ from optisense import OpticalModel
 from optisense.errors import RenderError
 from optisense.optics.backend.arrays import indices
 from optisense.optics.camera.projection import RayCamera
-from optisense.optics.imaging._density_estimation import build_grid, estimate_radiance
 from optisense.optics.imaging._film import Film
+from optisense.optics.imaging.sppm import build_grid, estimate_radiance
 from optisense.optics.scene.coating_bsdf import coating_of, evaluate_coating
 from optisense.optics.scene.emitters import EmitterTable
 from optisense.optics.scene.lamp_windows import LampWindows

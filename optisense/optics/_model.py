@@ -23,12 +23,11 @@ from optisense.optics._skin_view import VIEW_ACROSS, SkinView
 from optisense.optics.backend.interrupts import reraise_interrupts
 from optisense.optics.backend.memory import bound_memory
 from optisense.optics.backend.stages import Stage, StageCallback, fraction_done
-from optisense.optics.backend.versions import versions
+from optisense.optics.backend.variant import versions
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.estimators import RADIANCE_CACHE, SPPM
 from optisense.optics.imaging.cached import render_cached
-from optisense.optics.imaging.image_layers import ImageLayers
-from optisense.optics.imaging.known_view import KnownView
+from optisense.optics.imaging.image_layers import ImageLayers, KnownView
 from optisense.optics.imaging.lamp_images import LampImages
 from optisense.optics.imaging.markers import MarkerDots, MarkerPlaces, ink_factor, off_skin_notes
 from optisense.optics.imaging.sampling import PixelImportance, SamplingPlan
@@ -39,6 +38,7 @@ from optisense.optics.radiance_cache.tracing_limits import TracingLimits
 from optisense.optics.scene.contact_scenes import ContactScenes
 from optisense.optics.scene.sensor_scenes import SensorScenes
 from optisense.optics.scene.surface_cells import fineness
+from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.chief_rays import ChiefRays, sees_nothing, trace_chief_rays
 from optisense.optics.transport.emission_guide import EmissionGuide
 from optisense.optics.transport.photons import Emission
@@ -234,6 +234,7 @@ class OpticalModel(RayModel):
         built = time.perf_counter()
 
         if estimator == SPPM:
+            lit = built
             layers = self._render_sppm(view, number, seconds, seed, began, on_stage)
         else:
             target = None if noise is None else noise / 100
@@ -256,7 +257,6 @@ class OpticalModel(RayModel):
                 view.known if self.is_draft else None,
                 None if self.is_draft else self._lamp_images,
             )
-            layers.light_seconds = lit - built
         ended = time.perf_counter()
         on_stage(Stage.DONE, 1.0, layers.photons, layers.noise)
         image = self._image(layers, view, contacts)
@@ -283,8 +283,8 @@ class OpticalModel(RayModel):
             "presses": [] if view.pressed is None else view.pressed.in_numbers(),
             "seconds": {
                 "scene": round(built - began, 4),
-                "light": round(layers.light_seconds, 4),
-                "image": round(layers.image_seconds, 4),
+                "light": round(lit - built, 4),
+                "image": round(ended - lit, 4),
                 "total": round(ended - began, 4),
             },
             "versions": versions(self.variant),
@@ -296,9 +296,14 @@ class OpticalModel(RayModel):
     ) -> TactileImage:
         """Return the tactile image of an image's layers, with the markers of the skin."""
         units = dict(zip(self._traced_groups, layers.radiance, strict=True))
+        hit = view.rays.hit
+        points, normals = (
+            np.where(hit[..., None], each, np.nan).astype(np.float32)
+            for each in (view.rays.points, view.rays.normals)
+        )
         markers = None
         if self._design.markers is not None:
-            factor, markers = self._marked(layers, view.pressed, view.camera)
+            factor, markers = self._marked(points, normals, view.pressed, view.camera)
             units = {name: layer * factor for name, layer in units.items()}
         return TactileImage(
             layers={
@@ -306,9 +311,9 @@ class OpticalModel(RayModel):
                 for name, layer in units.items()
             },
             unit_layers=units,
-            normals=layers.normals,
-            contact_mask=layers.contact_mask,
-            points=layers.points,
+            normals=normals,
+            contact_mask=hit & (view.rays.region == Region.INDENTER),
+            points=points,
             interrupted=layers.interrupted,
             chain=self.picture_chain,
             indenters=_named(contacts, view.placed),
@@ -340,17 +345,21 @@ class OpticalModel(RayModel):
         return self.groups
 
     def _marked(
-        self, layers: ImageLayers, pressed: PressedSkin | None, camera: RayCamera
+        self,
+        seen: NDArray[np.float32],
+        normals: NDArray[np.float32],
+        pressed: PressedSkin | None,
+        camera: RayCamera,
     ) -> tuple[NDArray[np.float32], MarkerPlaces]:
         """Return the factors (h, w, 3) by which the markers darken each pixel, and the markers'
         positions.
         """
         markers = self._design.markers
         assert markers is not None
-        points = layers.points.astype(np.float64)
+        points = seen.astype(np.float64)
         moved = np.zeros_like(points)
         if pressed is not None:
-            moved = pressed.maps(points, layers.normals).displacement
+            moved = pressed.maps(points, normals).displacement
         material = points - moved
         dots = MarkerDots.on(markers, self.surface)
         share = dots.coverage(material)[..., None]
@@ -395,7 +404,17 @@ class OpticalModel(RayModel):
             radius=FIRST_RADIUS * fineness(self.scenes.opaque),
             stop=stop,
         )
-        return ImageLayers.from_sppm(result, view.rays, began)
+        difference = result.halves[0] - result.halves[1]
+        mean = float(result.layers.mean())
+        reached = float(np.sqrt((difference**2).mean()) / 2 / mean) if mean > 0 else 0.0
+        return ImageLayers(
+            radiance=result.layers,
+            photons=result.photons,
+            noise=reached if result.passes > 1 else float("inf"),
+            worst_noise=None,
+            samples=[result.passes, result.passes],
+            interrupted=False,
+        )
 
 
 def _stage_callback(

@@ -4,6 +4,10 @@ Preparing a changed design takes longer than tracing the light of a small pictur
 therefore keeps the shapes of cages that did not move, contacts and surface cells where the surface
 moved by little, and the emission guide, which stays unbiased when lights move (no direction is left
 out) and only becomes less efficient. Contacts are pressed in coarsely and get few camera samples.
+
+A coarse image, from which a search learns which designs are worth full scores, is as coarse as a
+draft, but reuses nothing of earlier designs: the score of a design does not depend on those scored
+before it.
 """
 
 from __future__ import annotations
@@ -21,12 +25,18 @@ from optisense.geometry import Contact, TriangleMesh
 from optisense.geometry.indenter_kinds import FACET_ERROR
 from optisense.mechanics import ELASTIC
 from optisense.optics._carried_contacts import PressedContacts
-from optisense.optics._draft_light import DraftCacheStore, KeptView
+from optisense.optics._draft_light import (
+    DRAFT_CELL_SCALE,
+    DRAFT_PILOT_PHOTONS,
+    DraftCacheStore,
+    KeptView,
+)
 from optisense.optics._model import ContactView, OpticalModel
 from optisense.optics._ray_model import RayModel
 from optisense.optics._skin_view import VIEW_ACROSS, SkinView
 from optisense.optics.imaging.tactile_image import TactileImage
 from optisense.optics.radiance_cache.lit_scene import LitScene
+from optisense.optics.radiance_cache.store import CELL_SIZE, CacheStore
 from optisense.optics.scene.assembly import assemble
 from optisense.optics.scene.media import same_faces
 from optisense.optics.scene.sensor_scenes import SensorScenes
@@ -318,3 +328,20 @@ def _moved(one: SensorDesign, other: SensorDesign) -> frozenset[int] | None:
         for k, (a, b) in enumerate(pairs)
         if (a.model, a.emitter, a.lights) != (b.model, b.emitter, b.lights)
     )
+
+
+class CoarseCacheStore(CacheStore):
+    """Store of radiance caches in wide cells."""
+
+    cell_size = DRAFT_CELL_SCALE * CELL_SIZE
+    thorough = False
+    uses_pilot = False
+    pilot_photons = DRAFT_PILOT_PHOTONS
+
+
+class CoarseModel(OpticalModel):
+    """An `OpticalModel` for coarse images, which take about a sixth of the time."""
+
+    is_draft = True
+    view_type = DraftView
+    store_type = CoarseCacheStore

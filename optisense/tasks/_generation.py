@@ -305,7 +305,7 @@ class _Maker:
 
     def _common(self) -> dict[str, Any]:
         """Return the values of all samples, which must not change when a dataset is continued."""
-        from optisense.optics.backend.versions import versions
+        from optisense.optics.backend.variant import versions
 
         values = asdict(self._settings)
         values["resolution"] = self._resolution

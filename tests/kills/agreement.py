@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 from PIL import Image
 
-from optisense.optics.backend.threads import threads_for_exr_files
+from optisense.optics.backend.variant import threads_for_exr_files
 
 TOLERANCE = 1e-3
 """Mean difference of two arrays, of the largest value, that rounding makes at most. Rays that it

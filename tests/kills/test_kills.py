@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from optisense.optics.backend.threads import threads_for_exr_files
+from optisense.optics.backend.variant import threads_for_exr_files
 
 from .agreement import agrees, same_values
 from .killing import kill_repeatedly

@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from optisense import Contact, OpticalModel, Plane, Sphere
 from optisense.optics.imaging import cached
-from optisense.optics.imaging._grain import grainy
+from optisense.optics.imaging.sampling import grainy
 from optisense.sensors import build
 
 

@@ -15,8 +15,7 @@ from optisense.design.responses import (
     FullWellResponse,
     PictureChain,
 )
-from optisense.optics.camera.response import picture
-from optisense.optics.imaging.tactile_image import TactileImage
+from optisense.optics.imaging.tactile_image import TactileImage, picture
 
 
 def test_eight_bits_are_the_transfer_curve_rounded() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from optisense.optics.imaging.sampling import FULL_SAMPLING, PixelRegions
+from optisense.optics.imaging.sampling import PixelRegions, SamplingPlan
 from optisense.optics.scene.surfaces import Region
 from optisense.optics.transport.chief_rays import ChiefRays, RayOutcome
 
@@ -35,8 +35,8 @@ def disc(radius: float) -> PixelRegions:
 @pytest.mark.parametrize("radius", [7.0, 9.0, 14.0])
 def test_averages_in_small_contacts_are_narrower_for_about_as_many_samples(radius: float) -> None:
     large, small = disc(40.0), disc(radius)
-    wide, narrow = (FULL_SAMPLING.interreflection_width(each) for each in (large, small))
-    usual, more = (FULL_SAMPLING.contact_samples(each)[0] for each in (large, small))
+    wide, narrow = (SamplingPlan().interreflection_width(each) for each in (large, small))
+    usual, more = (SamplingPlan().contact_samples(each)[0] for each in (large, small))
     assert wide == 3
     assert narrow <= radius / 4
     assert more * narrow**2 >= 0.5 * usual * wide**2

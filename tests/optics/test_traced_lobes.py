@@ -15,7 +15,7 @@ from optisense.mechanics import CONFORMING
 from optisense.optics import TactileImage
 from optisense.optics.imaging import _traced_light
 from optisense.optics.imaging.lamp_images import without_specks
-from optisense.optics.radiance_cache import _ray_resampling, traced_lobes
+from optisense.optics.radiance_cache import _lobe_branches, traced_lobes
 from optisense.optics.radiance_cache._lobe_guide import LobeGuide
 from optisense.optics.radiance_cache.lit_scene import TAIL_ROUGHNESS, LitScene
 from optisense.optics.scene.sensor_scenes import SensorScenes
@@ -157,7 +157,7 @@ def test_places_are_drawn_in_proportion_to_their_light() -> None:
     random = np.random.default_rng(0)
     wanted, weight = random.random(5000) < 0.8, random.random(5000).astype(np.float32)
     bits = mi.UInt32(random.integers(0, 2**32, 5000, dtype=np.uint32))
-    kept, times = _ray_resampling.drawn(mi.Bool(wanted), mi.Float(weight), bits, 1000)
+    kept, times = _lobe_branches.drawn(mi.Bool(wanted), mi.Float(weight), bits, 1000)
     kept, times = np.asarray(kept), np.asarray(times)
     assert len(kept) == 1000 and wanted[kept].all()
     assert (1 / times).sum() == pytest.approx(wanted.sum(), rel=0.1)

@@ -11,7 +11,7 @@ import pytest
 
 from optisense.errors import OutputError, TaskError
 from optisense.optics import OpticalModel
-from optisense.optics.backend.threads import threads_for_exr_files
+from optisense.optics.backend.variant import threads_for_exr_files
 from optisense.tasks import DatasetSettings, generate
 from optisense.tasks.dataset import Dataset
 

@@ -1,4 +1,4 @@
-"""Choose the renderer's variant: processor or GPU, checked before the first kernel.
+"""Choose the renderer's variant (processor or GPU, checked before the first kernel) and threads.
 
 Neither Mitsuba nor Dr.Jit is imported before libLLVM has been checked (see
 `optisense.optics.backend.llvm`), and not at all unless asked for a variant.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import json
+import platform
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ from typing import Any
 
 from optisense.errors import SetupError
 from optisense.optics.backend.llvm import MINIMUM_LLVM, PATH_VARIABLE, find_llvm, load_atomic
+from optisense.version import version_of
 
 VARIANTS = {"llvm": "llvm_ad_rgb", "cuda": "cuda_ad_rgb"}
 """Mitsuba's name for each variant that a user can request; ``auto`` selects one."""
@@ -266,3 +268,38 @@ def import_renderer(name: str) -> Any:
             where="set-up",
             hint="Install the package's dependencies: pip install optisense",
         ) from error
+
+
+def use_threads(count: int) -> None:
+    """Set the number of threads that Dr.Jit uses, for processes that share a machine.
+
+    Raises:
+        SetupError: the renderer can't run on this machine.
+    """
+    select_variant("auto")  # libLLVM is checked before Dr.Jit is imported
+    import_renderer("drjit").set_thread_count(count)
+
+
+@contextmanager
+def threads_for_exr_files() -> Iterator[None]:
+    """Give Dr.Jit a second thread, if it has only one, while Mitsuba writes or reads EXR files.
+
+    Mitsuba compresses and expands them in tasks for Dr.Jit's threads and waits for these without
+    working on them itself. On one processor Dr.Jit has no other thread than the waiting one.
+    """
+    dr = import_renderer("drjit")
+    count = dr.thread_count()
+    if count < 2:
+        dr.set_thread_count(2)
+    try:
+        yield
+    finally:
+        if count < 2:
+            dr.set_thread_count(count)
+
+
+def versions(variant: str) -> dict[str, str]:
+    """Return the versions of the packages that affect rendered values, for the record of a run."""
+    packages = ("optisense", "mitsuba", "drjit", "numpy")
+    installed = {name: version_of(name) for name in packages}
+    return {"python": platform.python_version(), "variant": variant, **installed}

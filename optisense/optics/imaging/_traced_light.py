@@ -14,9 +14,8 @@ from optisense.optics.backend.arrays import FEWEST_LANES
 from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._film import Film, average_pixels, repeated
-from optisense.optics.imaging._grain import OUTLINE_SAMPLES, outline
 from optisense.optics.imaging.lamp_images import without_specks
-from optisense.optics.imaging.sampling import PixelRegions, SamplingPlan
+from optisense.optics.imaging.sampling import OUTLINE_SAMPLES, PixelRegions, SamplingPlan, outline
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.traced_lobes import LobeRays, LobeTracer
 from optisense.optics.scene.coating_bsdf import (

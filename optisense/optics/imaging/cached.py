@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from functools import reduce
 
 import drjit as dr
@@ -15,13 +14,18 @@ from optisense.optics.backend.sequences import seed_of
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.imaging._contact_light import beside_layers
 from optisense.optics.imaging._film import Film, repeated
-from optisense.optics.imaging._grain import GRAIN_SAMPLES, OUTLINE_SAMPLES, grainy, outline
 from optisense.optics.imaging._pixel_interpolation import agreed, between_rays, fill
 from optisense.optics.imaging._traced_light import NEAR_WIDTH, traced_layers
-from optisense.optics.imaging.image_layers import ImageLayers, masked
-from optisense.optics.imaging.known_view import KnownView
+from optisense.optics.imaging.image_layers import ImageLayers, KnownView
 from optisense.optics.imaging.lamp_images import LampImages, without_specks
-from optisense.optics.imaging.sampling import FULL_SAMPLING, PixelRegions, SamplingPlan
+from optisense.optics.imaging.sampling import (
+    GRAIN_SAMPLES,
+    OUTLINE_SAMPLES,
+    PixelRegions,
+    SamplingPlan,
+    grainy,
+    outline,
+)
 from optisense.optics.radiance_cache.beams import cull_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.shading import (
@@ -66,9 +70,9 @@ def render_cached(
     rays: ChiefRays,
     windows: LampWindows,
     seed: int,
-    plan: SamplingPlan = FULL_SAMPLING,
-    known: KnownView | None = None,
-    lamps: LampImages | None = None,
+    plan: SamplingPlan,
+    known: KnownView | None,
+    lamps: LampImages | None,
 ) -> ImageLayers:
     """Shade an image from a radiance cache: one sample per pixel, more in and around contacts.
 
@@ -79,9 +83,8 @@ def render_cached(
         windows: the windows of the lights, which may be in view.
         plan: the pixels that are shaded, and their samples.
         known: parts of an earlier draft that are reused, to which those that are missing are added.
-        lamps: mirror images of lamps, which are added to the image; none by default.
+        lamps: mirror images of lamps, which are added to the image.
     """
-    began = time.perf_counter()
     cache, interrupted = light
     regions = PixelRegions.of(rays)
     image = _Shading(cache, scenes, camera, windows, regions, seed, plan, known)
@@ -116,16 +119,11 @@ def render_cached(
         )
     return ImageLayers(
         radiance=layers,
-        normals=masked(rays.normals, rays.hit),
-        points=masked(rays.points, rays.hit),
-        contact_mask=regions.contacts,
         photons=cache.photons,
         noise=cache.noise,
         worst_noise=cache.worst_noise,
         samples=samples,
         interrupted=interrupted,
-        light_seconds=0.0,
-        image_seconds=time.perf_counter() - began,
     )
 
 

@@ -10,6 +10,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from optisense.array_types import FloatingArray
 from optisense.optics.backend.arrays import floats
@@ -24,7 +25,6 @@ from optisense.optics.radiance_cache._direction_bins import (
     landing_bits,
 )
 from optisense.optics.radiance_cache._irradiance import irradiance_table
-from optisense.optics.radiance_cache._noise import noise_of_worst_places, relative_noise
 from optisense.optics.radiance_cache._power_rounding import PowerRounding
 from optisense.optics.radiance_cache._raised_plane import areas, crossings
 from optisense.optics.radiance_cache.beams import collect_beams
@@ -45,6 +45,16 @@ DENSE = 8000.0
 direction bin, where there is a raised plane; 8 million photons give GelSight Mini as much. With so
 many, the noise is so low that 1.2 times as much is a good price. In a contact near its lamps, the
 error with 10 million photons is then 1.9 instead of 2.9 %."""
+NOISIEST_SHARE = 0.05
+"""Share of the area in view that counts as the worst places when their noise is reported: small
+enough to find a dark corner, and large enough not to depend on a few cells."""
+PATCH_AVERAGES = 4
+"""Number of times that the squared noise is averaged with the smoothing kernel, which widens the
+kernel twofold. Without averaging it is the square of a single difference, and chance would decide
+which places are the worst."""
+DARKEST_JUDGED = 0.1
+"""Lower bound on the light to which a place's noise is relative, as a share of the mean light, so
+that very dark places do not decide the result."""
 
 
 class CacheTally:
@@ -285,3 +295,47 @@ class CacheTally:
             noise=self.noise(),
             worst_noise=self.worst_noise(),
         )
+
+
+def relative_noise(light: FloatingArray, square: FloatingArray) -> float:
+    """Return the relative RMS noise (1 = 100 %) over cells and light groups.
+
+    Args:
+        light: (cells, groups) irradiance, mW/mm^2.
+        square: (cells, groups) its squared standard deviation.
+    """
+    scale = light.mean(axis=0)
+    lit = scale > 0
+    if not lit.any():
+        return 0.0
+    return float(np.sqrt((square[:, lit] / scale[lit] ** 2).mean()))
+
+
+def noise_of_worst_places(
+    light: FloatingArray,
+    square: FloatingArray,
+    near: NDArray[np.bool_],
+    areas: FloatingArray,
+    kernel: csr_matrix,
+) -> float:
+    """Return the relative RMS noise (1 = 100 %) that the noisiest 5 % of the area have at least.
+
+    Args:
+        light: (cells, groups) irradiance, mW/mm^2.
+        square: (cells, groups) its squared standard deviation.
+        near: (cells,) mask of the cells that count.
+        areas: (cells,) areas, mm^2.
+        kernel: (cells, cells) the kernel that smooths the light.
+    """
+    scale = light[near].mean(axis=0)
+    lit = scale > 0
+    if not lit.any():
+        return 0.0
+    noise = (square[:, lit] / scale[lit] ** 2).mean(axis=1)
+    brightness = (light[:, lit] / scale[lit]).mean(axis=1)
+    for _ in range(PATCH_AVERAGES):
+        noise = kernel @ (noise * areas)
+    relative = np.sqrt(noise[near]) / np.maximum(brightness[near], DARKEST_JUDGED)
+    order = np.argsort(relative)
+    share = np.cumsum(areas[near][order]) / areas[near].sum()
+    return float(relative[order][np.searchsorted(share, 1.0 - NOISIEST_SHARE)])

@@ -23,14 +23,14 @@ from optisense.optics.backend.sequences import (
     unit_float,
 )
 from optisense.optics.radiance_cache._irradiance import irradiance
-from optisense.optics.radiance_cache._lobe_branches import follow_to_coating
-from optisense.optics.radiance_cache._lobe_guide import LobeGuide
-from optisense.optics.radiance_cache._ray_resampling import (
+from optisense.optics.radiance_cache._lobe_branches import (
     MOST_CACHED,
     MOST_GATHERED,
     drawn,
+    follow_to_coating,
     split,
 )
+from optisense.optics.radiance_cache._lobe_guide import LobeGuide
 from optisense.optics.radiance_cache.beam_sums import sum_beams
 from optisense.optics.radiance_cache.cache import RadianceCache
 from optisense.optics.radiance_cache.shading_points import (

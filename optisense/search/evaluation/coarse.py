@@ -64,7 +64,7 @@ def coarse_settings(
 
 
 class CoarseEvaluator(DesignEvaluator):
-    """Evaluator of coarse scores, whose images are coarse as well (`optisense.optics._coarse`)."""
+    """Evaluator of coarse scores, whose images are coarse as well (`optisense.optics.drafts`)."""
 
     coarse = True
 

@@ -23,7 +23,7 @@ class ModelCache(PickledWithoutCaches):
         """Store the variant; the model is built on first use.
 
         Args:
-            coarse: whether images are coarse (see `optisense.optics._coarse`).
+            coarse: whether images are coarse (see `optisense.optics.drafts`).
         """
         self.variant = variant
         self.coarse = coarse

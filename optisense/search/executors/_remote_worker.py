@@ -43,7 +43,7 @@ def score_trial(key: str, blob: bytes | None, vector: NDArray[np.float64], seed:
                 )
             evaluator = _unpacked(known)
             if getattr(evaluator, "renders", True):
-                from optisense.optics.backend.threads import use_threads
+                from optisense.optics.backend.variant import use_threads
 
                 use_threads(1)
             _evaluators.clear()

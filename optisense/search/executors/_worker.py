@@ -30,7 +30,7 @@ def main() -> None:
         blob, threads = messages.get()
         evaluator = pickle.loads(blob)
         if getattr(evaluator, "renders", True):
-            from optisense.optics.backend.threads import use_threads
+            from optisense.optics.backend.variant import use_threads
 
             use_threads(threads)
     except OptiSenseError as error:
