@@ -103,12 +103,16 @@ class Press:
             raise ObjectiveError(f"the untouched response of {self.name} is unknown")
         return self.respond_untouched()
 
+    @property
+    def shown(self) -> PictureWindow:
+        """The part of the picture that the images show, which is all of it without a `window`."""
+        return self.window or PictureWindow.whole(*self.mask.shape)
+
     @cached_property
     def picture_places(self) -> FloatArray:
         """Positions (h, w, 2) of the pixels in the picture, -1 to 1 across and down."""
-        window = self.window or PictureWindow.whole(*self.mask.shape)
-        y = np.linspace(-1.0, 1.0, window.height)[window.rows]
-        x = np.linspace(-1.0, 1.0, window.width)[window.columns]
+        y = np.linspace(-1.0, 1.0, self.shown.height)[self.shown.rows]
+        x = np.linspace(-1.0, 1.0, self.shown.width)[self.shown.columns]
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     @cached_property
@@ -120,10 +124,9 @@ class Press:
     @property
     def middle(self) -> tuple[float, float]:
         """Row and column of the middle of the contact in the whole picture."""
-        corner = (0, 0) if self.window is None else [each.start for each in self.window.box]
         row, column = (
-            start + (each.start + each.stop) / 2
-            for start, each in zip(corner, self.box, strict=True)
+            part.start + (each.start + each.stop) / 2
+            for part, each in zip(self.shown.box, self.box, strict=True)
         )
         return row, column
 
@@ -157,9 +160,8 @@ class Press:
             ObjectiveError: the camera does not see the press.
         """
         if not self.mask.any():
-            picture = self.window or PictureWindow.whole(*self.mask.shape)
-            where = f" in {picture.width} x {picture.height} pixels"
-            few = picture.width < FEW_ACROSS
+            where = f" in {self.shown.width} x {self.shown.height} pixels"
+            few = self.shown.width < FEW_ACROSS
             raise ObjectiveError(
                 f"the camera does not see {self.name}{where if few else ''}",
                 hint="Use a higher resolution" if few else None,

@@ -204,7 +204,7 @@ def _short_line(
             f"the middle of {press.name} is outside the camera's view or at its edge",
             hint="Move the place so that the camera sees the whole contact",
         )
-    height, width = press.mask.shape
+    height, width = press.shown.height, press.shown.width
     needed = width * (least_pixels + 1) / max(count, 1)  # a pixel more or less is chance
     finer = WIDTH_STEP * math.ceil(needed / WIDTH_STEP)
     return ObjectiveError(

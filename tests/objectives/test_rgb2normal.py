@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from optisense.design.lenses.film import PictureWindow
 from optisense.errors import ObjectiveError
 from optisense.objectives import Press
 from optisense.objectives.rgb2normal import dominant_colour, fit, line, rgb2normal, signed_angles
@@ -235,6 +236,18 @@ def test_too_few_pixels_say_where(
     width, height = (int(each) for each in str(told.value.hint).split()[-1].split("x"))
     assert width == height == 40 * (width // 40)
     assert rgb2normal(evaluation_of(make_press(lambda n: n, DEPTH, pixels=width + 1)))[0] > 0.8
+
+
+def test_the_resolution_for_a_part_of_a_picture_is_that_of_the_whole(
+    make_press: Callable[..., Press], evaluation_of: Callable[..., Any]
+) -> None:
+    cut = make_press(lambda n: n, DEPTH, pixels=9)
+    window = PictureWindow.part((60, 80), (slice(20, 29), slice(30, 39)))
+    with pytest.raises(ObjectiveError) as told:
+        rgb2normal(evaluation_of(replace(cut, window=window)))
+    width, height = (int(each) for each in str(told.value.hint).split()[-1].split("x"))
+    assert width > 80
+    assert 4 * height == 3 * width
 
 
 def test_a_press_whose_middle_is_not_seen_needs_another_place(
