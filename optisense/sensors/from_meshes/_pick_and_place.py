@@ -23,6 +23,7 @@ NAMES = {
     "y": ("posy", "midy", "centery", "centrey", "locationy", "y", "refy"),
     "rotation": ("rotation", "rot", "angle", "orientation"),
     "side": ("side", "layer", "tb", "boardside"),
+    "z": ("posz", "midz", "centerz", "centrez", "locationz", "z"),
 }
 """Names of columns in lower case, without units and signs; the first that a file has is used."""
 
@@ -66,8 +67,8 @@ def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, Boa
         units: unit of its lengths, if the file does not state it.
 
     Raises:
-        DesignError: the file is missing, lacks the columns or its unit, or a line has no numbers;
-            the message names the line.
+        DesignError: the file is missing, lacks the columns or its unit, or has positions in space;
+            or a line has no numbers. The message names the line.
     """
     lines = _lines(path)
     for number, line in enumerate(lines):
@@ -75,6 +76,7 @@ def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, Boa
             head = _cells(line.lstrip("#"), delimiter)
             columns = {key: _column(head, key) for key in NAMES}
             if all(columns[key] is not None for key in NEEDED):
+                _refuse_space(path, number + 1, head)
                 rows = [(n, _cells(text, delimiter))
                         for n, text in enumerate(lines[number + 1 :], start=number + 2)
                         if text.strip() and not text.lstrip().startswith("#")]  # fmt: skip
@@ -116,6 +118,23 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
 def _column(head: list[str], key: str) -> int | None:
     plain = [re.sub(r"\(.*?\)|_?(?:mm|mil)$|[^a-z]", "", cell.lower().strip()) for cell in head]
     return next((plain.index(name) for name in NAMES[key] if name in plain), None)
+
+
+def _refuse_space(path: Path, number: int, head: list[str]) -> None:
+    """Check that the head has no z.
+
+    Raises:
+        DesignError: it has one.
+    """
+    column = _column(head, "z")
+    if column is not None:
+        raise DesignError(
+            f"the column '{brief(head[column])}' says that these are positions in space, and "
+            "positions on a board are needed",
+            where=f"{path}:{number}",
+            hint="Give the table of one board, such as board-1.pos of 'optisense export', or "
+            "remove the column if it is 0 throughout",
+        )
 
 
 def _unit(head: list[str], columns: dict[str, int | None], before: list[str]) -> str | None:

@@ -20,6 +20,8 @@ from optisense.sensors.from_meshes._pick_and_place import BoardPart, read_pick_a
 from optisense.sensors.from_meshes._strips import along, from_table
 from optisense.sensors.from_meshes.recipe_lights import FromTable, LightsAlong
 from optisense.sensors.from_meshes.recipe_parts import PartChoice
+from optisense.workshop import placements
+from optisense.workshop._placement import placement_csv
 from tests.sensors.from_meshes.conftest import Cad
 
 BOX = TriangleMesh.box((0.0, 0.0, 0.0), (2.0, 4.0, 6.0))
@@ -238,6 +240,7 @@ def test_pick_and_place_files_of_all_programs(
         (ALTIUM.replace("-500.000", "here"), "'here' is no length"),
         (ALTIUM.split('"D1"')[0], "has no parts"),
         (ALTIUM.replace("-500.000", "1" * 31), "too large a number: at most 10,000 mm"),
+        (placement_csv(placements(sensors.gelsight360())), "'z_mm' .* positions in space"),
         ("[" * 200_000, "no pick-and-place file: the line has 200,000 characters"),
     ],
 )
