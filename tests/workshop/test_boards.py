@@ -67,7 +67,8 @@ def test_position_files_give_places_and_directions_back(name: str, tmp_path: Pat
         )
         own = [led for led in leds if led.board == board]
         for file in (f"board-{board}.pos", f"board-{board}-cpl.csv"):
-            table = read_pick_and_place(files[file])
+            table, notes = read_pick_and_place(files[file])
+            assert notes == []
             assert list(table) == [led.designator for led in own]
             for read, led in zip(from_table(frame, table), own, strict=True):
                 np.testing.assert_allclose(read.direction, led.direction, atol=1e-5)

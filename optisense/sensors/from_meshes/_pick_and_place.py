@@ -21,8 +21,8 @@ NAMES = {
     "designator": ("designator", "ref", "refdes", "reference", "partdesignator"),
     "x": ("posx", "midx", "centerx", "centrex", "locationx", "x", "refx"),
     "y": ("posy", "midy", "centery", "centrey", "locationy", "y", "refy"),
-    "rotation": ("rotation", "rot", "angle", "orientation"),
-    "side": ("side", "layer", "tb", "boardside"),
+    "rotation": ("rotation", "rot", "angle", "orientation", "theta"),
+    "side": ("side", "layer", "tb", "boardside", "mountside", "pcbside", "layername"),
     "z": ("posz", "midz", "centerz", "centrez", "locationz", "z"),
 }
 """Names of columns in lower case, without units and signs; the first that a file has is used."""
@@ -38,6 +38,10 @@ LARGEST = 10_000.0
 
 _UNIT = re.compile(r"\b(mm|mils?|inch(?:es)?|in|thou)\b", re.IGNORECASE)
 _NUMBER = re.compile(r"([-+]?\d*\.?\d+(?:[eE][-+]?\d+)?)\s*(mm|mils?|inch|in)?$", re.IGNORECASE)
+_ANGLE = re.compile(
+    r"([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:e[-+]?\d+)?)\s*(?:[°º]|deg(?:rees?)?)?$", re.IGNORECASE
+)
+_SIDE = re.compile(r"(t$|top|f$|f\.|front|component)|(b$|bot|back|b\.|solder)", re.IGNORECASE)
 _SAYS_UNIT = re.compile(r"unit", re.IGNORECASE)
 
 
@@ -59,8 +63,10 @@ class BoardPart:
     bottom: bool
 
 
-def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, BoardPart]:
-    """Return the parts of a pick-and-place file, by designator.
+def read_pick_and_place(
+    path: Path, units: Units | None = None
+) -> tuple[dict[str, BoardPart], list[str]]:
+    """Return the parts of a pick-and-place file, by designator, and notes on columns that it lacks.
 
     Args:
         path: table with commas, semicolons, tabs or blanks, as UTF-8 or UTF-16.
@@ -68,7 +74,8 @@ def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, Boa
 
     Raises:
         DesignError: the file is missing, lacks the columns or its unit, or has positions in space;
-            or a line has no numbers. The message names the line.
+            or a line has no numbers or an unknown side, or repeats a designator. The message names
+            the line.
     """
     lines = _lines(path)
     for number, line in enumerate(lines):
@@ -81,7 +88,7 @@ def read_pick_and_place(path: Path, units: Units | None = None) -> dict[str, Boa
                         for n, text in enumerate(lines[number + 1 :], start=number + 2)
                         if text.strip() and not text.lstrip().startswith("#")]  # fmt: skip
                 unit = _unit(head, columns, lines[: number + 1]) or units
-                return _placed(path, rows, columns, unit)
+                return _placed(path, rows, columns, unit), _without(path, columns)
     raise DesignError(
         "this is no pick-and-place file: no line names a designator, x and y",
         where=str(path),
@@ -116,7 +123,8 @@ def _cells(line: str, delimiter: str | None) -> list[str]:
 
 
 def _column(head: list[str], key: str) -> int | None:
-    plain = [re.sub(r"\(.*?\)|_?(?:mm|mil)$|[^a-z]", "", cell.lower().strip()) for cell in head]
+    extra = r"\(.*?\)|\[.*?\]|_?(?:mm|mil|deg|degrees)$|[^a-z]"
+    plain = [re.sub(extra, "", cell.lower().strip()) for cell in head]
     return next((plain.index(name) for name in NAMES[key] if name in plain), None)
 
 
@@ -146,10 +154,24 @@ def _unit(head: list[str], columns: dict[str, int | None], before: list[str]) ->
     return found[0] if found else None
 
 
+def _without(path: Path, columns: dict[str, int | None]) -> list[str]:
+    """Return notes on the columns that a file lacks and that have a default."""
+    defaults = {
+        "rotation": "so that its parts have the rotation 0",
+        "side": "so that its parts are on the top of the board",
+    }
+    return [
+        f"{path.name} has no column of a {key} ({', '.join(NAMES[key])}), {default}"
+        for key, default in defaults.items()
+        if columns[key] is None
+    ]
+
+
 def _placed(
     path: Path, rows: list[tuple[int, list[str]]], columns: dict[str, int | None], unit: str | None
 ) -> dict[str, BoardPart]:
     parts: dict[str, BoardPart] = {}
+    lines: dict[str, int] = {}
     for number, cells in rows:
 
         def cell(key: str, cells: list[str] = cells) -> str:
@@ -159,9 +181,15 @@ def _placed(
         name = cell("designator")
         if not name:
             continue
+        if name in parts:
+            raise DesignError(
+                f"'{brief(name)}' is also in line {lines[name]}",
+                where=f"{path}:{number}",
+                hint="Remove one of the two lines",
+            )
+        lines[name] = number
         x, y = (_length(cell(key), unit, path, number) for key in ("x", "y"))
-        turn = _NUMBER.match(cell("rotation"))
-        rotation = float(turn[1]) if turn else 0.0
+        rotation = _rotation(cell("rotation"), path, number)
         if not all(abs(value) <= LARGEST for value in (x, y, rotation)):
             raise DesignError(
                 f"the position or rotation of '{brief(name)}' is too large a number: at most "
@@ -169,10 +197,34 @@ def _placed(
                 where=f"{path}:{number}",
                 hint="Export the file again",
             )
-        parts[name] = BoardPart(name, x, y, rotation, cell("side").lower().startswith("b"))
+        parts[name] = BoardPart(name, x, y, rotation, _bottom(cell("side"), path, number))
     if not parts:
         raise DesignError("the pick-and-place file has no parts", where=str(path))
     return parts
+
+
+def _rotation(text: str, path: Path, number: int) -> float:
+    """Return a rotation in degrees; 0 of an empty cell."""
+    match = _ANGLE.match(text or "0")
+    if match is None:
+        raise DesignError(
+            f"'{brief(text)}' is no rotation",
+            where=f"{path}:{number}",
+            hint="Write the rotation as a number of degrees",
+        )
+    return float(match[1].replace(",", "."))
+
+
+def _bottom(text: str, path: Path, number: int) -> bool:
+    """Return whether a cell names the lower side of a board; an empty one names the upper side."""
+    match = _SIDE.match(text or "top")
+    if match is None:
+        raise DesignError(
+            f"'{brief(text)}' is no side of a board",
+            where=f"{path}:{number}",
+            hint="Write top or bottom",
+        )
+    return match[2] is not None
 
 
 def _length(text: str, unit: str | None, path: Path, number: int) -> float:
@@ -180,7 +232,9 @@ def _length(text: str, unit: str | None, path: Path, number: int) -> float:
     match = _NUMBER.match(text)
     if match is None:
         raise DesignError(
-            f"'{text[:40]}' is no length", where=f"{path}:{number}", hint="Export the file again"
+            f"'{text[:40]}' is no length",
+            where=f"{path}:{number}",
+            hint="Export the file again, with decimal points",
         )
     given = (match[2] or unit or "").lower()
     if not given:

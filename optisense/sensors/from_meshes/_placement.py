@@ -58,7 +58,8 @@ def place_lights(state: RecipeState, name: str, choice: LightChoice) -> LightGro
             lights = _strips.along(choice.along, state.meshes[choice.along.edge_of])
         elif choice.table is not None:
             file = state.recipe.folder / choice.table.file
-            table = read_pick_and_place(file, choice.table.units)
+            table, missing = read_pick_and_place(file, choice.table.units)
+            state.notes += [f"lights {name}: {note}" for note in missing]
             lights = _strips.from_table(choice.table, table)
             state.provenance[f"lights.{name}.lights"] = Provenance(
                 status=Status.SOURCED, source=f"pick-and-place file {choice.table.file}"

@@ -210,6 +210,12 @@ EASYEDA = (
 )
 
 
+OTHER = (
+    "Ref;X [mm];Y [mm];Rotation_deg;Mount side\n"
+    "D1;25.4;-12.7;90,00;component side\nD2;-25.4;12.7;180°;solder side\n"
+)
+
+
 @pytest.mark.parametrize(
     ("text", "coding", "units"),
     [
@@ -217,6 +223,7 @@ EASYEDA = (
         (KICAD_CSV, "utf-8-sig", "mm"),
         (ALTIUM, "latin-1", None),
         (EASYEDA, "utf-16", None),
+        (OTHER, "latin-1", None),
     ],
 )
 def test_pick_and_place_files_of_all_programs(
@@ -224,7 +231,8 @@ def test_pick_and_place_files_of_all_programs(
 ) -> None:
     file = tmp_path / "leds.txt"
     file.write_text(text, encoding=coding)
-    found = read_pick_and_place(file, units)
+    found, notes = read_pick_and_place(file, units)
+    assert notes == []
     assert list(found) == ["D1", "D2"]
     assert found["D1"].x == pytest.approx(25.4)
     assert found["D1"].y == pytest.approx(-12.7)
@@ -241,6 +249,9 @@ def test_pick_and_place_files_of_all_programs(
         (ALTIUM.split('"D1"')[0], "has no parts"),
         (ALTIUM.replace("-500.000", "1" * 31), "too large a number: at most 10,000 mm"),
         (placement_csv(placements(sensors.gelsight360())), "'z_mm' .* positions in space"),
+        (ALTIUM.replace('"180"', '"N/A"'), r"'N/A' is no rotation .*csv:8"),
+        (ALTIUM.replace("BottomLayer", "2"), r"'2' is no side of a board .*csv:8"),
+        (ALTIUM.replace("D2", "D1"), r"'D1' is also in line 7 .*csv:8"),
         ("[" * 200_000, "no pick-and-place file: the line has 200,000 characters"),
     ],
 )
@@ -249,6 +260,17 @@ def test_files_that_cannot_be_read(tmp_path: Path, text: str, words: str) -> Non
     file.write_text(text)
     with pytest.raises(DesignError, match=words):
         read_pick_and_place(file)
+
+
+def test_columns_that_a_table_lacks_are_noted(tmp_path: Path) -> None:
+    file = tmp_path / "leds.csv"
+    file.write_text("Ref,X_mm,Y_mm,Mirror\nD1,1.0,2.0,yes\n")
+    found, notes = read_pick_and_place(file)
+    assert found["D1"] == BoardPart("D1", 1.0, 2.0, 0.0, False)
+    assert [note.split(" (")[0] for note in notes] == [
+        "leds.csv has no column of a rotation",
+        "leds.csv has no column of a side",
+    ]
 
 
 TABLE = {
