@@ -25,6 +25,10 @@ WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Distances (mm) below which vertices are merged, tried in ascending order until the mesh is
 closed: from the rounding of single precision to a tenth of the usual tolerance of a part."""
 
+FLAT = 1e-9
+"""Volume of a shell, as a share of its area to the power of 1.5, below which it encloses none: a
+sphere has a tenth, and a square sheet as thin as a millionth of its side 4e-7."""
+
 _UNITE = (
     "In the CAD tool: combine the overlapping bodies into one (Boolean union), or export each to "
     "its own file"
@@ -71,9 +75,35 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
         mended = _closed(mended, where, notes)
         _refuse_crossings(mended, where)
         mended = _outward(mended, where, notes)
+    elif (_edges(mended)[1] == 2).all():
+        turned = outward(with_consistent_winding(mended))
+        _tell_of_turned((turned.faces != mended.faces).any(axis=1), notes)
+        mended = turned
     else:
         mended = _consistent(mended, notes)
     return (mended if notes or closed else mesh), notes
+
+
+def outward(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a closed mesh whose bodies all look outward.
+
+    A shell inside another one is a cavity if it is drawn contrary to the outermost shell around it,
+    and a body if it is drawn alike. Bodies may overlap.
+
+    Args:
+        mesh: closed mesh, whose faces agree with their neighbours.
+    """
+    labels = shells(mesh)
+    cones = np.einsum("ij,ij->i", mesh.triangles[:, 0], mesh.face_vectors) / 6.0
+    inward = np.bincount(labels, cones) < -FLAT * np.bincount(labels, mesh.face_areas) ** 1.5
+    if not inward.any():
+        return mesh
+    if not inward.all():
+        within = _within(_shapes_of(mesh, labels), None)
+        outermost = within & ~within.any(axis=1)
+        inward = np.where(outermost.any(axis=1), inward[outermost.argmax(axis=1)], inward)
+    over = inward[labels]
+    return mesh.with_faces(np.where(over[:, None], mesh.faces[:, ::-1], mesh.faces))
 
 
 def refuse_bad_sheet(mesh: TriangleMesh, name: str) -> None:
@@ -196,9 +226,9 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     """
     labels = shells(mesh)
     faces = with_consistent_winding(mesh).faces.copy()
-    bodies = [mesh.with_faces(faces[labels == k]).compacted() for k in range(labels.max() + 1)]
+    bodies = _shapes_of(mesh.with_faces(faces), labels)
     for body in bodies:
-        if not abs(body.volume) > 1e-9 * body.area**1.5:
+        if not abs(body.volume) > FLAT * body.area**1.5:
             raise MeshError(
                 f"the mesh encloses no volume near {_point(body.triangles[0].mean(axis=0))} mm",
                 where=where,
@@ -213,10 +243,7 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     # A shell was drawn inside out if most of its area had to be turned.
     area = np.bincount(labels, mesh.face_areas)
     over = 2.0 * np.bincount(labels, mesh.face_areas * turned) > area
-    if turned.all():
-        notes.append("it was inside out and has been turned over")
-        return mesh.with_faces(faces)
-    for label in np.flatnonzero(depths % 2 == 1).tolist():
+    for label in [] if turned.all() else np.flatnonzero(depths % 2 == 1).tolist():
         outermost = np.flatnonzero(within[label] & (depths == 0))[0]
         if over[label] != over[outermost]:
             turned[labels == label] = False
@@ -225,23 +252,36 @@ def _outward(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
                 f"another one, became a cavity of {abs(bodies[label].volume):.3g} mm^3; if the "
                 "part is solid there, delete the inner body in the CAD tool"
             )
-    if turned.any():
-        notes.append(
-            f"{turned.sum()} of {len(turned)} faces were inside out; they were turned over"
-        )
+    _tell_of_turned(turned, notes)
     return mesh.with_faces(faces)
 
 
-def _within(bodies: list[TriangleMesh], where: str) -> BoolArray:
+def _tell_of_turned(turned: BoolArray, notes: list[str]) -> None:
+    """Add a note on the faces (m,) of a closed mesh that were turned over."""
+    if turned.all():
+        notes.append("it was inside out and has been turned over")
+    elif turned.any():
+        notes.append(
+            f"{turned.sum()} of {len(turned)} faces were inside out; they were turned over"
+        )
+
+
+def _shapes_of(mesh: TriangleMesh, labels: NDArray[np.int64]) -> list[TriangleMesh]:
+    """Return each shell of a mesh by itself; `labels` are those of `shells`."""
+    return [mesh.with_faces(mesh.faces[labels == k]).compacted() for k in range(labels.max() + 1)]
+
+
+def _within(bodies: list[TriangleMesh], where: str | None) -> BoolArray:
     """Return a mask (n, n) of the bodies (rows) that lie inside others (columns); bodies may touch
     from outside.
 
     Args:
-        bodies: closed shells of either winding whose faces do not cut through each other.
+        bodies: closed shells of either winding.
+        where: part for messages; None if bodies may overlap.
 
     Raises:
-        MeshError: two bodies overlap in part, or have a part of their surfaces in common, so that
-            one is no cavity of the other.
+        MeshError: `where` is given, and two bodies overlap in part, or have a part of their
+            surfaces in common, so that one is no cavity of the other.
     """
     solids = [as_manifold(body if body.volume > 0.0 else body.flipped()) for body in bodies]
     result = np.zeros((len(bodies), len(bodies)), dtype=bool)
@@ -259,6 +299,8 @@ def _within(bodies: list[TriangleMesh], where: str) -> BoolArray:
                 continue
             result[one, two] = thick_place(solids[one] - solids[two], TOUCH) is None
             result[two, one] = thick_place(solids[two] - solids[one], TOUCH) is None
+            if where is None:
+                continue
             shared = len(find_coincident(body, other, TOUCH, facing=False).pairs) > 0
             if shared or result[one, two] == result[two, one]:
                 raise MeshError(

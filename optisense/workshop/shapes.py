@@ -9,6 +9,7 @@ from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.bodies import united
+from optisense.geometry.repair import outward
 from optisense.workshop._thickened import thickened
 
 AIR = 1.0
@@ -78,11 +79,11 @@ def shapes(design: SensorDesign) -> list[Shape]:
                 hint="Set design.meshes[name]",
             )
         mesh = meshes[name].welded()
-        if mesh.is_closed and mesh.volume < 0.0:
-            mesh = mesh.flipped()
         cage = next((each for each in design.cages.values() if name in each.parts), None)
-        if mesh.is_closed and (whole := united(mesh)) is not mesh:
-            mesh, cage = whole, None
+        if mesh.is_closed:
+            mesh = outward(mesh)
+            if (whole := united(mesh)) is not mesh:
+                mesh, cage = whole, None
         if part.role is Role.ELASTOMER:
             left = carved(design, meshes, name)
             if left is not meshes[name]:

@@ -75,6 +75,19 @@ def test_two_bodies_in_one_file_both_look_outward() -> None:
     assert shells(mesh).max() == 1
 
 
+def test_bodies_of_an_opaque_part_look_outward_and_its_cavities_inward() -> None:
+    """Unlike in transparent parts, bodies may overlap, and a body inside another one stays one."""
+    across = TriangleMesh.box((9, 1, 1), (21, 2, 2))
+    beside = TriangleMesh.box((20, 0, 0), (21, 1, 1)).flipped()
+    hollow = TriangleMesh.box((2, 2, 1), (4, 4, 2))
+    for drawn, inner in ((hollow, 4.0), (hollow.flipped(), -4.0)):
+        parts = [BLOCK, across, beside, drawn]
+        for sense in (parts, [each.flipped() for each in parts]):
+            mesh, notes = repaired(TriangleMesh.joined(sense), "housing", closed=False)
+            assert mesh.volume == pytest.approx(VOLUME + 12.0 + 1.0 + inner)
+            assert len(notes) == 1 and "faces were inside out; they were turned over" in notes[0]
+
+
 @pytest.mark.parametrize("at", [(10, 2, 1), (10, 8, 3), (10, 8, 4), (2, 2, 4 - 5e-5)])
 def test_bodies_may_touch_with_faces_edges_and_corners(at: tuple[float, float, float]) -> None:
     beside = TriangleMesh.box(at, np.add(at, (1, 1, 2))).flipped()

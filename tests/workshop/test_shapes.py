@@ -178,7 +178,8 @@ def test_a_cavity_belongs_to_the_body_that_contains_all_of_it() -> None:
 
 
 def test_overlapping_bodies_of_a_part_are_one(flat: SensorDesign) -> None:
-    """Their common space is counted once; bodies that touch, and cavities, stay as they are."""
+    """Their common space is counted once, also where one is inside out; bodies that touch, and
+    cavities, stay as they are."""
     cubes = [TriangleMesh.box((x, 0, 40), (x + 10, 10, 50)) for x in (0, 5, 30)]
     cubes.append(TriangleMesh.box((40, 1, 41), (41, 2, 42)))
     cubes.append(TriangleMesh.box((30, 0, 40), (35, 5, 60)))
@@ -187,6 +188,10 @@ def test_overlapping_bodies_of_a_part_are_one(flat: SensorDesign) -> None:
     flat.meshes["frame"] = TriangleMesh.joined(cubes)
     (frame,) = [each for each in shapes(flat) if each.name == "frame"]
     assert frame.volume == pytest.approx(1500.0 + 1250.0 + 1.0)
+    cubes[0] = cubes[0].flipped()
+    flat.meshes["frame"] = TriangleMesh.joined(cubes)
+    (mixed,) = [each for each in shapes(flat) if each.name == "frame"]
+    assert mixed.volume == pytest.approx(frame.volume)
     assert sorted(body[0].volume for body in bodies(frame.mesh)) == pytest.approx([1, 1250, 1500])
     apart = hollow_and_apart()
     assert united(apart) is apart
