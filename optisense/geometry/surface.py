@@ -16,6 +16,10 @@ _ARRIVED = 1e-9
 """Remaining distance (mm) below which a walk over the surface has arrived: far above the rounding
 of double precision (1e-14 mm)."""
 
+_AFAR = 1e6
+"""Length (mm) of a walk that ends at the edge of any surface, whose remaining part is known to
+1e-10 mm."""
+
 KEPT_POINTS = 256
 """Number of places that a surface keeps with their coordinates: a press asks for the same place
 several times, and the walk to it takes some milliseconds on a curved surface."""
@@ -149,6 +153,16 @@ class SensingSurface:
             )
         return self._surface_point(face, point)
 
+    def distance_to_edge(self, u: float, v: float) -> float:
+        """Return the distance (mm) along the surface from the origin to the edge of the surface in
+        the direction (u, v).
+
+        Raises:
+            MeshError: there is no edge in this direction.
+        """
+        way = (u * self.u_axis + v * self.v_axis) / np.hypot(u, v)
+        return _AFAR - self._walk(self._origin_face, self.origin, way, _AFAR)[2]
+
     def nearest(self, point: ArrayLike) -> SurfacePoint:
         """Return the place nearest to `point` (3,), mm."""
         return self._surface_point(*closest_place(self.mesh, point))
@@ -207,8 +221,8 @@ class SensingSurface:
             face = across[0]
             direction = self._unfolded(direction, ends, face)
         raise MeshError(
-            "the path to a place on the sensing surface does not end, as the mesh has degenerate "
-            "triangles",
+            "the path to a place on the sensing surface does not end, as it has no edge there, or "
+            "its mesh has degenerate triangles",
             hint="Export the mesh of the sensing surface again",
         )
 

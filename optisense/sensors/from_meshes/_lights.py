@@ -9,7 +9,7 @@ from optisense.array_types import FloatArray
 from optisense.design import Light
 from optisense.design.limits import refuse_far
 from optisense.errors import ContactError, DesignError
-from optisense.geometry import SensingSurface, TriangleMesh
+from optisense.geometry import SensingSurface, TriangleMesh, ray_hits
 from optisense.geometry.patches import Faces, mean_normal, middle
 from optisense.sensors.from_meshes.directions import Direction, axis_of, radial_vector, vector
 from optisense.sensors.from_meshes.recipe_lights import LightRow, LightsOver, Ring
@@ -96,8 +96,8 @@ def over(choice: LightsOver, mesh: TriangleMesh, patches: list[Faces], where: st
     """Return lights over a surface: one on the middle of each patch, or a row or grid on the
     largest.
 
-    A grid follows the longer side of the surface's outline; on a curved surface its pitch is
-    measured along the surface.
+    A grid follows the longer side of the surface's outline; on a curved surface its pitch is, and
+    without one the available length, measured along the surface.
 
     Args:
         mesh: reference surface, welded, mm.
@@ -162,11 +162,16 @@ def _grid(
     count = choice.count if isinstance(choice.count, tuple) else (choice.count or 1, 1)
     pitch = choice.pitch if isinstance(choice.pitch, tuple) else (choice.pitch, choice.pitch)
     centre, size = outline
-    columns, rows = evenly(count[0], pitch[0], size[0]), evenly(count[1], pitch[1], size[1])
     points = mesh.vertices[np.unique(mesh.faces[patch])]
     height = (points - centre) @ normal
     if np.ptp(height) > FLAT:
-        return _on_curve(mesh, patch, centre, along, across, columns, rows, where)
+        part = mesh.with_faces(mesh.faces[patch]).compacted()
+        place = _in_front(part, centre, normal)
+        if place is None:
+            raise _off(where, 0.0, 0.0)
+        surface = SensingSurface(part, place, along, across)
+        return _on_curve(surface, count, pitch, where)
+    columns, rows = evenly(count[0], pitch[0], size[0]), evenly(count[1], pitch[1], size[1])
     flat = shapely.union_all(
         shapely.polygons(
             np.stack([(mesh.triangles[patch] - centre) @ axis for axis in (along, across)], axis=2)
@@ -182,18 +187,33 @@ def _grid(
     return spots
 
 
+def _in_front(mesh: TriangleMesh, centre: FloatArray, normal: FloatArray) -> FloatArray | None:
+    """Return the point (3,) of a surface on the line through `centre` along its normal, mm: that
+    nearest to `centre`, or None in a hole.
+    """
+    back = float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
+    heights = ray_hits(mesh, centre - back * normal, normal).distance - back
+    if not len(heights):
+        return None
+    return np.asarray(centre + heights[np.abs(heights).argmin()] * normal)
+
+
 def _on_curve(
-    mesh: TriangleMesh,
-    patch: Faces,
-    centre: FloatArray,
-    along: FloatArray,
-    across: FloatArray,
-    columns: FloatArray,
-    rows: FloatArray,
+    surface: SensingSurface,
+    count: tuple[int, int],
+    pitch: tuple[float | None, float | None],
     where: str,
 ) -> list[tuple[FloatArray, FloatArray]]:
     """Return lights as on a flat surface, but with distances measured along the surface."""
-    surface = SensingSurface(mesh.with_faces(mesh.faces[patch]).compacted(), centre, along, across)
+
+    def places(number: int) -> FloatArray:
+        if pitch[number] is not None:
+            return evenly(count[number], pitch[number], 0.0)
+        u, v = np.eye(2)[number].tolist()
+        before, after = surface.distance_to_edge(-u, -v), surface.distance_to_edge(u, v)
+        return evenly(count[number], None, before + after) + 0.5 * (after - before)
+
+    columns, rows = places(0), places(1)
     spots = []
     for v in rows:
         for u in columns:

@@ -12,6 +12,7 @@ from optisense.design import Camera
 from optisense.design.camera_checks import lens_problems
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.mesh import grid_faces
 from optisense.sensors.from_meshes._camera import make_camera
 from optisense.sensors.from_meshes._lights import over, ring, row
 from optisense.sensors.from_meshes.recipe import CameraChoice
@@ -102,6 +103,16 @@ class TestOver:
         np.testing.assert_allclose(ways(lights), places(lights) / 10.5, atol=0.02)
         cosine = np.einsum("ij,ij->i", places(lights)[1:], places(lights)[:-1]) / 10.5**2
         np.testing.assert_allclose(np.arccos(cosine), 5.0 / 10.0, atol=0.01)
+
+    @pytest.mark.parametrize(("count", "angles"), [(5, [-72, -36, 0, 36, 72]), ([2, 1], [-45, 45])])
+    def test_lights_are_spread_over_the_whole_arc(self, count: Any, angles: list[float]) -> None:
+        """In a half pipe of 12 facets, in whose middle is an edge."""
+        turn = np.radians(np.linspace(-90.0, 90.0, 13))
+        arc = np.stack([np.zeros(13), 10.0 * np.sin(turn), -10.0 * np.cos(turn)], axis=1)
+        vertices = np.concatenate([arc - (8.0, 0.0, 0.0), arc + (8.0, 0.0, 0.0)])
+        lights = self.spots(TriangleMesh(vertices, grid_faces(2, 13)), count=count, within=85)
+        found = np.degrees(np.arctan2(places(lights)[:, 1], -places(lights)[:, 2]))
+        np.testing.assert_allclose(np.sort(found), angles, atol=0.2)
 
     def test_a_surface_that_looks_everywhere_is_refused(self) -> None:
         shape = LightsOver(file="b.stl", count=3)
