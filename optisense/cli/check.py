@@ -140,7 +140,8 @@ def _describe(design: SensorDesign) -> int:
         )
     lights = Table("lights", "model", "number", "flux each (mW)", box=None, pad_edge=False)
     for name, group in design.lights.items():
-        lights.add_row(name, group.model, f"{len(group.lights)}", f"{group.flux:g}")
+        model = group.model if group.emitter is None else f"{group.model} (own emitter)"
+        lights.add_row(name, model, f"{len(group.lights)}", f"{group.flux:g}")
     camera = design.camera
     for table in (parts, lights):
         output.print()

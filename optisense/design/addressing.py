@@ -13,6 +13,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from optisense.design.lights import of_model
 from optisense.design.sensor_design import SensorDesign, dotted, refuse_no_design, same_mesh
 from optisense.errors import DesignError
 from optisense.near import suggestion
@@ -41,7 +42,8 @@ def set_value(design: SensorDesign, path: str, value: object) -> SensorDesign:
     """Return a new, checked design with `value` at `path`; the given design is not changed.
 
     Sources of this value, of values in it and of values that hold it are dropped from the
-    provenance if they are other ones then.
+    provenance if they are other ones then. Another `model` of a light group replaces the group's
+    own `emitter`; to keep or change that, give it to `set_values` too.
 
     Raises:
         DesignError: the path names nothing, or the value does not fit there.
@@ -59,13 +61,21 @@ def set_values(design: SensorDesign, values: Mapping[str, object]) -> SensorDesi
     """
     refuse_no_design(design)
     data = design._data()
+    models = {
+        f"lights.{group}.model"
+        for group in design.lights
+        if not any(path.startswith(f"lights.{group}.emitter") for path in values)
+    }
     for path, value in values.items():
         get_value(design, path)  # raises an error that suggests a similar name
         target: Any = data
         *way, last = parse_path(path)
         for step in way:
             target = target[_key(target, step)]
-        target[_key(target, last)] = _plain(value)
+        plain, key = _plain(value), _key(target, last)
+        if path in models and target[key] != plain:
+            target.update(of_model(str(plain)))
+        target[key] = plain
     edited = design._replaced(data, where=", ".join(values))
     for path in changed_paths(design, edited, design.provenance):
         edited.provenance.pop(path, None)

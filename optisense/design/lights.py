@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,6 +63,13 @@ class LightGroup(Model):
         colour = np.array(self.colour)
         dies = self.flux * colour / colour.sum()
         return np.asarray(dies if self.spectrum is None else dies @ self.spectrum.spread())
+
+
+def of_model(model: str) -> dict[str, Any]:
+    """Return the fields of a light group that another model of its lights changes: an emitter of
+    its own describes the lights of the former model.
+    """
+    return {"model": model, "emitter": None}
 
 
 @lru_cache(maxsize=4096)

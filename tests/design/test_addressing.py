@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from optisense import sensors
-from optisense.design import Point, SensorDesign, get_value, set_value
+from optisense.design import Point, SensorDesign, SpotEmitter, get_value, set_value, set_values
 from optisense.errors import DesignError
 
 
@@ -69,6 +69,15 @@ def test_setting_numpy_values_vectors_and_sections(design: SensorDesign) -> None
     point = Point(x=1.0, y=2.0, z=3.0)
     assert set_value(design, "cages.skin.points[0]", point).cages["skin"].points[0] == point
     assert set_value(design, "cages.mirror.blend", 0.5).cages["mirror"].blend == 0.5
+
+
+def test_another_model_of_lights_replaces_their_own_emitter(design: SensorDesign) -> None:
+    own = set_value(design, "lights.red.emitter", {"kind": "spot", "beam": 10, "cutoff": 20})
+    before = own.lights["red"]
+    assert set_value(own, "lights.red.model", before.model).lights["red"] == before
+    assert set_value(own, "lights.red.model", "ws2812b").lights["red"].emitter is None
+    renamed = {"lights.red.emitter.beam": 5, "lights.red.model": "our-spot"}
+    assert set_values(own, renamed).lights["red"].emitter == SpotEmitter(beam=5, cutoff=20)
 
 
 @pytest.mark.parametrize(

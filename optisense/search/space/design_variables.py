@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 from optisense import library
 from optisense.design import SensorDesign
 from optisense.design.camera import ImagingModel
+from optisense.design.lights import of_model
 
 LONGEST_NAME = 64
 """Largest number of letters of the name of a light group that is made for lights of another type; a
@@ -149,8 +150,7 @@ class GroupType(DesignVariable):
         for name in self._groups(design):
             if lights[name].model != value:
                 library.light(str(value))
-                change = {"model": str(value), "emitter": None}
-                lights[name] = lights[name].model_copy(update=change)
+                lights[name] = lights[name].model_copy(update=of_model(str(value)))
         return design.model_copy(update={"lights": lights})
 
     def _groups(self, design: SensorDesign) -> list[str]:
@@ -196,7 +196,7 @@ def with_light_types(design: SensorDesign, types: dict[tuple[str, int], str]) ->
             change: dict[str, Any] = {"lights": chosen}
             if model != group.model:
                 library.light(model)
-                change |= {"model": model, "emitter": None}
+                change |= of_model(model)
             kept = name if model == wanted[0] else _free_name(f"{name}-{model}", design, groups)
             groups[kept] = group.model_copy(update=change)
     return design.model_copy(update={"lights": groups})
