@@ -11,9 +11,9 @@ from optisense.calibration import _camera_changes
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
 from optisense.design.kinds import KindModel
-from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design.lenses.shading import RadialShading
 from optisense.design.posing import with_camera_turned
-from optisense.design.responses.gamma_curve import GammaCurve
+from optisense.design.responses.tone_curve import GammaCurve
 
 MIX_RANGE = 0.5
 """Plausible range of an entry of the colour matrix off its diagonal; those of published camera

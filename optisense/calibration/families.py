@@ -10,7 +10,7 @@ from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign
 from optisense.design.materials import Coating, Dielectric
 from optisense.design.materials.coating import SMALLEST_ROUGHNESS
-from optisense.design.materials.gel_elasticity import MAX_POISSON_RATIO
+from optisense.design.materials.dielectric import MAX_POISSON_RATIO
 from optisense.design.parts import Role
 
 POWER_RANGE = 0.7

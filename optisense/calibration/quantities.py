@@ -19,9 +19,9 @@ from optisense.array_types import FloatArray
 from optisense.calibration.families import EXPOSURE, FAMILIES
 from optisense.calibration.quantity import FitQuantity
 from optisense.design import SensorDesign, get_value, set_value
-from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design.lenses.shading import RadialShading
 from optisense.design.responses import PictureChain
-from optisense.design.responses.gamma_curve import GammaCurve
+from optisense.design.responses.tone_curve import GammaCurve
 from optisense.errors import CalibrationError
 
 STARTS: dict[str, Any] = {

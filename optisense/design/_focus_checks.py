@@ -6,7 +6,7 @@ import numpy as np
 
 from optisense.array_types import FloatArray
 from optisense.design.arrangement import skin_distances, straight_rays
-from optisense.design.lenses.defocus import DISC_DEVIATION
+from optisense.design.lenses.blur import DISC_DEVIATION
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from optisense.design.materials.gel_elasticity import MAX_POISSON_RATIO
+from optisense.design.materials.dielectric import MAX_POISSON_RATIO
 from optisense.errors import ContactError
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.lenses.defocus import Defocus
+from optisense.design.lenses.blur import Defocus
 from optisense.optics.backend.arrays import floats
 from optisense.optics.camera.projection import RayCamera
 from optisense.quality import PICTURE_PHOTONS

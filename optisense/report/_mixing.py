@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from optisense.array_types import FloatingArray
+from optisense.design.responses.base import MAX_EXCESS, FullWellResponse
 from optisense.design.responses.chain import PictureChain
-from optisense.design.responses.full_well import MAX_EXCESS, FullWellResponse
 from optisense.report._pictures import data_uri
 
 CODES = 4096

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.design import Camera
-from optisense.design.lenses.brown_conrady import BrownConrady
+from optisense.design.lenses.distortion import BrownConrady
 
 if TYPE_CHECKING:
     from optisense.optics import ChiefRays

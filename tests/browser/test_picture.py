@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from optisense.design import SensorDesign
-from optisense.design.responses.gamma_curve import GammaCurve
+from optisense.design.responses.tone_curve import GammaCurve
 from optisense.geometry import Contact, Sphere
 from optisense.optics import OpticalModel, TactileImage
 from optisense.report import write_report

@@ -9,15 +9,10 @@ import pytest
 
 import optisense as ots
 from optisense.design import Camera, SensorDesign, check_design, projection
-from optisense.design.lenses._distortion import LensDistortion
-from optisense.design.lenses._gaussian_blur import GaussianBlur
-from optisense.design.lenses._kannala_brandt import KannalaBrandt
-from optisense.design.lenses._table_shading import TableShading
-from optisense.design.lenses.blur import blurred
-from optisense.design.lenses.brown_conrady import BrownConrady
-from optisense.design.lenses.defocus import Defocus
+from optisense.design.lenses.blur import Defocus, GaussianBlur, blurred
+from optisense.design.lenses.distortion import BrownConrady, KannalaBrandt, LensDistortion
 from optisense.design.lenses.film import film_places
-from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design.lenses.shading import RadialShading, TableShading
 from optisense.design.projection import directions, folding_angle, ideal_places, picture_places
 from optisense.errors import DesignError
 

@@ -10,19 +10,17 @@ import pytest
 
 import optisense as ots
 from optisense.design import load_design, save_design
-from optisense.design.lenses._gaussian_blur import GaussianBlur
+from optisense.design.lenses.blur import GaussianBlur
 from optisense.design.lenses.film import PictureWindow, film_places
-from optisense.design.lenses.radial_shading import RadialShading
+from optisense.design.lenses.shading import RadialShading
 from optisense.design.responses import (
     USUAL_RESPONSE,
     BlackLevel,
     PictureChain,
     SensorNoise,
 )
-from optisense.design.responses._points_curve import PointsCurve
-from optisense.design.responses._srgb_curve import SrgbCurve
 from optisense.design.responses.chain import SoftFocus
-from optisense.design.responses.gamma_curve import GammaCurve
+from optisense.design.responses.tone_curve import GammaCurve, PointsCurve, SrgbCurve
 from optisense.errors import DesignError
 
 HEIGHT, WIDTH = 60, 80

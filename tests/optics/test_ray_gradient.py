@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.design.lenses import LensDistortion
-from optisense.design.lenses._kannala_brandt import KannalaBrandt
-from optisense.design.lenses.brown_conrady import BrownConrady
+from optisense.design.lenses.distortion import BrownConrady, KannalaBrandt
 from optisense.errors import RenderError
 from optisense.geometry import TriangleMesh
 from optisense.optics.backend.variant import use_variant

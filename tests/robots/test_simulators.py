@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from optisense import sensors
 from optisense.design import Part, Role, SensorDesign
-from optisense.design.lenses.brown_conrady import BrownConrady
+from optisense.design.lenses.distortion import BrownConrady
 from optisense.design.projection import picture_places
 from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry import TriangleMesh

@@ -9,8 +9,7 @@ import pytest
 
 from optisense import OpticalModel, sensors
 from optisense.design import SensorDesign
-from optisense.design.lenses._kannala_brandt import KannalaBrandt
-from optisense.design.lenses.brown_conrady import BrownConrady
+from optisense.design.lenses.distortion import BrownConrady, KannalaBrandt
 from optisense.geometry import Contact, Sphere
 from optisense.tasks._camera_model import Pinhole, camera_model, fit_pinhole, ray_arrays
 

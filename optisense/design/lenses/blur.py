@@ -7,11 +7,13 @@ width, so that it does not depend on the resolution of a render.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Any, ClassVar, NamedTuple, Protocol
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
+from pydantic import Field
 
 from optisense.array_types import FloatingArray
+from optisense.design.fields import MILLIMETRES, NonNegative, Positive
 from optisense.design.kinds import KindModel, Limits, fills
 from optisense.errors import DesignError
 from optisense.registry import Registry
@@ -30,6 +32,9 @@ interpolated.
 
 LARGEST = 0.25
 """Largest standard deviation of a blur, as a share of the picture's width; it leaves no detail."""
+
+DISC_DEVIATION = 0.25
+"""Standard deviation along an axis of a uniformly lit disc, divided by its diameter."""
 
 
 class LensView(Protocol):
@@ -59,8 +64,8 @@ class LensBlur(KindModel):
         "optisense.blurs",
         DesignError,
         {
-            "gaussian": "optisense.design.lenses._gaussian_blur:GaussianBlur",
-            "defocus": "optisense.design.lenses.defocus:Defocus",
+            "gaussian": "optisense.design.lenses.blur:GaussianBlur",
+            "defocus": "optisense.design.lenses.blur:Defocus",
         },
     )
 
@@ -88,6 +93,66 @@ class LensBlur(KindModel):
             vergence: inverse (...) of the apparent distance of the point that a pixel sees, 1/mm; a
                 single 0 if `by_depth` is false.
         """
+
+
+class GaussianBlur(LensBlur):
+    """Blur of the same width everywhere."""
+
+    title: ClassVar[str] = "Gaussian"
+
+    kind: Literal["gaussian"] = "gaussian"
+    width: Annotated[NonNegative, Field(le=1000.0)] = Field(
+        description="standard deviation in pixels of the camera's own resolution",
+        examples=[0.7],
+        json_schema_extra={"unit": "pixels"},
+    )
+
+    def deviation(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
+        """Return the width over the number of pixels across, in the shape of `vergence`."""
+        return np.asarray(self.width / camera.resolution[0]) + 0.0 * vergence
+
+
+class Defocus(LensBlur):
+    """Blur of a thin lens: a point nearer or farther than the focus is spread over a disc.
+
+    A point at the distance z from the entrance pupil is seen under the angle A |1/z - 1/z_f|, with
+    A the diameter of the entrance pupil and z_f the distance in focus: the circle of confusion. The
+    disc is replaced by a normal distribution of the same variance.
+    """
+
+    title: ClassVar[str] = "Defocus"
+    by_depth: ClassVar[bool] = True
+
+    kind: Literal["defocus"] = "defocus"
+    focal_length: Positive = Field(
+        description="focal length of the lens", examples=[3.04], json_schema_extra=MILLIMETRES
+    )
+    f_number: Positive = Field(
+        description="focal length over the diameter of the entrance pupil", examples=[2.0]
+    )
+    focus_distance: Positive = Field(
+        description="distance in focus, from the entrance pupil, in air",
+        examples=[25.0],
+        json_schema_extra=MILLIMETRES,
+    )
+
+    def circle(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
+        """Return the diameter (...) of the circle of confusion, as a share of the picture's width.
+
+        Args:
+            vergence: inverse (...) of the apparent distance, 1/mm.
+        """
+        pupil = self.focal_length / self.f_number
+        angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
+        return np.asarray(angle * camera.angle_scale)
+
+    def deviation(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
+        """Return the standard deviation (...) of the disc: a quarter of the circle's diameter.
+
+        Args:
+            vergence: inverse (...) of the apparent distance, 1/mm.
+        """
+        return DISC_DEVIATION * self.circle(camera, vergence)
 
 
 def reach_of(deviation: float, width: int) -> int:

@@ -1,11 +1,9 @@
-"""Materials of parts and coatings of the sensing surface, one file for each kind.
+"""Materials of parts and coatings of the sensing surface.
 
 `Material` stands for any material of a part, `CoatingModel` for any coating.
 """
 
-from optisense.design.materials._absorber import Absorber
-from optisense.design.materials._conductor import Conductor
-from optisense.design.materials._diffuse import Diffuse
+from optisense.design.materials._opaque import Absorber, Conductor, Diffuse
 from optisense.design.materials.base import (
     CoatingModel,
     Material,

@@ -164,9 +164,9 @@ class Material(KindModel):
         DesignError,
         {
             "dielectric": "optisense.design.materials.dielectric:Dielectric",
-            "conductor": "optisense.design.materials._conductor:Conductor",
-            "diffuse": "optisense.design.materials._diffuse:Diffuse",
-            "absorber": "optisense.design.materials._absorber:Absorber",
+            "conductor": "optisense.design.materials._opaque:Conductor",
+            "diffuse": "optisense.design.materials._opaque:Diffuse",
+            "absorber": "optisense.design.materials._opaque:Absorber",
         },
     )
     roles: ClassVar[tuple[Role, ...]] = (Role.MIRROR, Role.BLOCKER, Role.INDENTER)

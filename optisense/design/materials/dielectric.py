@@ -12,13 +12,14 @@ from optisense.design.fields import (
     Colour,
     Fraction,
     InconsistentValueError,
+    Model,
+    NonNegative,
     NonNegativeRGB,
     Number,
     Positive,
     is_left_out,
 )
 from optisense.design.materials.base import RGB, Material, Medium
-from optisense.design.materials.gel_elasticity import GelElasticity
 from optisense.design.materials.optical_constants import (
     CHANNEL_WAVELENGTHS,
     SODIUM_LINE,
@@ -45,6 +46,25 @@ ROUNDING = 1e-9
 
 ABSORPTIONS = ("absorption", "extinction", "transmittance")
 """Fields that determine the absorption; a material gives at most one of them."""
+
+MAX_POISSON_RATIO = 0.4999
+"""Largest Poisson ratio of a material. At 0.5 it would be incompressible and its bulk modulus
+infinite; measured values of silicones are 0.48 to 0.4999.
+"""
+
+
+class GelElasticity(Model):
+    """Constants of linear isotropic elasticity of a gel, and its friction."""
+
+    youngs_modulus: Positive = Field(
+        description="Young's modulus", examples=[0.435], json_schema_extra={"unit": "MPa"}
+    )
+    poisson_ratio: Annotated[Number, Field(ge=0.0, le=MAX_POISSON_RATIO)] = Field(
+        default=0.49, description="Poisson ratio; near 0.5 for silicones"
+    )
+    friction: NonNegative = Field(
+        default=1.0, description="coefficient of friction of the coated skin"
+    )
 
 
 class Dielectric(Material):

@@ -26,8 +26,7 @@ from optisense.design.fields import Colour, PositiveRGB
 from optisense.design.lenses.blur import LEAST_WIDTH, LensBlur, LensView, blurred, reach_of
 from optisense.design.lenses.film import PictureWindow, film_coordinates, film_places
 from optisense.design.lenses.shading import LensShading
-from optisense.design.responses._tone_curve import ToneCurve
-from optisense.design.responses.base import EXPOSURE_TARGET, CameraResponse
+from optisense.design.responses.base import EXPOSURE_TARGET, CameraResponse, FullWellResponse
 from optisense.design.responses.electronics import (
     BlackLevel,
     ChannelMatrix,
@@ -36,7 +35,7 @@ from optisense.design.responses.electronics import (
     mixed,
     normal_numbers,
 )
-from optisense.design.responses.full_well import FullWellResponse
+from optisense.design.responses.tone_curve import ToneCurve
 
 LEAST_ROOM = 0.2
 """Smallest share of its target that automatic exposure gives to the light, where stray light and

@@ -1,4 +1,4 @@
-"""A metal."""
+"""Opaque materials: metals, matt and black surfaces."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import ClassVar, Literal
 
 from pydantic import Field
 
-from optisense.design.fields import Fraction, NonNegativeRGB, PositiveRGB
+from optisense.design.fields import Colour, Fraction, NonNegativeRGB, PositiveRGB
 from optisense.design.materials.base import Material, Reflection
+from optisense.design.parts import Role
 
 
 class Conductor(Material):
@@ -40,3 +41,31 @@ class Conductor(Material):
         """Return its reflectance in each colour, one per line."""
         share = 100 * self.reflection().normal_reflectance()
         return ["reflects {:.1f}, {:.1f}, {:.1f} % of R, G, B in air".format(*share)]
+
+
+class Diffuse(Material):
+    """An opaque Lambertian surface."""
+
+    title: ClassVar[str] = "Diffuse"
+
+    kind: Literal["diffuse"] = "diffuse"
+    reflectance: Colour = Field(
+        description="reflectance at R, G, B, 0 to 1", examples=[(0.5, 0.5, 0.5)]
+    )
+
+    def reflection(self) -> Reflection:
+        """Return the reflection of the diffuse lobe alone."""
+        return Reflection(reflectance=self.reflectance)
+
+
+class Absorber(Material):
+    """An opaque surface that absorbs all light."""
+
+    title: ClassVar[str] = "Absorber"
+    roles: ClassVar[tuple[Role, ...]] = (Role.BLOCKER, Role.INDENTER)
+
+    kind: Literal["absorber"] = "absorber"
+
+    def in_words(self) -> str:
+        """Return the text that the material is black."""
+        return "reflects nothing"
