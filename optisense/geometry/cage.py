@@ -10,11 +10,8 @@ the middle one has weight 1/2 at its own place.
 
 from __future__ import annotations
 
-import hashlib
 import math
-import threading
 import weakref
-from collections import OrderedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,19 +30,14 @@ MOST_KEPT_WEIGHTS = 4_000_000
 """Number of weights (vertices times control points) of a mesh above which they are computed again
 instead of being kept: 32 MB, as for a mesh of 25,000 vertices in a cage of 160 points."""
 
-KEPT_WEIGHTS = 32_000_000
-"""Total number of weights that are kept (256 MB), those of eight such meshes; the least recently
-used are dropped first."""
-
 _VALUES_AT_ONCE = 4_000_000
 """Number of products of basis functions that are computed together, which bounds the memory of the
 arrays to 32 MB."""
 
-_digests: weakref.WeakKeyDictionary[TriangleMesh, bytes] = weakref.WeakKeyDictionary()
-_kept: OrderedDict[tuple[bytes, bytes, Resolution], FloatArray] = OrderedDict()
+_weights: weakref.WeakKeyDictionary[TriangleMesh, tuple[object, FloatArray]]
+_weights = weakref.WeakKeyDictionary()
 _last: weakref.WeakKeyDictionary[TriangleMesh, tuple[object, TriangleMesh]]
 _last = weakref.WeakKeyDictionary()
-_lock = threading.Lock()
 
 
 def cage_points(box: ArrayLike, resolution: Resolution) -> FloatArray:
@@ -98,9 +90,8 @@ def deformed(
     Two successive calls with the same arguments return the same object, so that its cached
     properties are reused.
 
-    The weights are kept for the next call with a mesh of the same vertices, even if it is another
-    object. For a fine cage around a large mesh there are too many weights, and each call computes
-    them. `mesh.vertices` must not be changed in place.
+    The weights are kept for the next call with the same mesh. For a fine cage around a large mesh
+    there are too many weights, and each call computes them.
 
     Args:
         mesh: the mesh at rest, mm, all inside the box.
@@ -113,14 +104,10 @@ def deformed(
     """
     controls = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     key = np.asarray(box, dtype=np.float64).tobytes(), resolution, controls.tobytes()
-    with _lock:
-        last = _last.get(mesh)
-    if last is not None and last[0] == key:
-        return last[1]
-    bent = _bent(mesh, box, resolution, controls)
-    with _lock:
-        _last[mesh] = key, bent
-    return bent
+    last = _last.get(mesh)
+    if last is None or last[0] != key:
+        last = _last[mesh] = key, _bent(mesh, box, resolution, controls)
+    return last[1]
 
 
 def _bent(
@@ -134,35 +121,19 @@ def _bent(
 
 
 def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """Return the read-only `cage_weights` (n, nx * ny * nz) of a mesh's n vertices, cached by their
-    content.
-
-    Args:
-        mesh: the mesh at rest, mm.
-        box: (2, 3) lower and upper corner, mm.
-        resolution: number of points along x, y, z.
+    """Return the read-only `cage_weights` (n, nx * ny * nz) of a mesh's n vertices at rest; they are
+    kept for the next call with the same mesh.
 
     Raises:
         DesignError: a vertex lies outside the box.
     """
-    with _lock:
-        digest = _digests.get(mesh)
-    if digest is None:
-        digest = hashlib.blake2b(mesh.vertices.tobytes(), digest_size=16).digest()
-        with _lock:
-            _digests[mesh] = digest
-    key = (digest, np.asarray(box, dtype=np.float64).tobytes(), resolution)
-    with _lock:
-        if key in _kept:
-            _kept.move_to_end(key)
-            return _kept[key]
-    weights = np.asfortranarray(cage_weights(mesh.vertices, box, resolution))
-    weights.flags.writeable = False
-    with _lock:
-        _kept[key] = weights
-        while sum(kept.size for kept in _kept.values()) > KEPT_WEIGHTS and len(_kept) > 1:
-            _kept.popitem(last=False)
-    return weights
+    key = np.asarray(box, dtype=np.float64).tobytes(), resolution
+    kept = _weights.get(mesh)
+    if kept is None or kept[0] != key:
+        weights = np.asfortranarray(cage_weights(mesh.vertices, box, resolution))
+        weights.flags.writeable = False
+        kept = _weights[mesh] = key, weights
+    return kept[1]
 
 
 def box_coordinates(vertices: ArrayLike, box: ArrayLike) -> FloatArray:
