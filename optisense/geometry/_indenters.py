@@ -23,6 +23,7 @@ from optisense.geometry.indenter_kinds import (
     LARGEST,
     SMALLEST,
     IndenterKind,
+    lowest_at_zero,
     quantity,
 )
 from optisense.geometry.mesh import TriangleMesh, grid_faces
@@ -125,7 +126,7 @@ class Cylinder(IndenterKind):
             )
             normals = np.tile([sign, 0.0, 0.0], (len(vertices), 1))
             ends.append(TriangleMesh(vertices, fan, normals).with_winding_from_normals())
-        return TriangleMesh.joined([side, *ends]).transformed(_turn_z(self.angle))
+        return TriangleMesh.joined([side, *ends]).transformed(turn_about_axes(0.0, 0.0, self.angle))
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,7 @@ class Plane(IndenterKind):
         """Return the whole plate, as thick as it is wide; see `Indenter.mesh`."""
         half = 0.5 * self.size
         block = TriangleMesh.box((-half, -half, 0.0), (half, half, self.size)).vertex_normals()
-        return _lowest_at_zero(block.transformed(turn_about_axes(self.tilt_x, self.tilt_y)))
+        return lowest_at_zero(block.transformed(turn_about_axes(self.tilt_x, self.tilt_y)))
 
 
 @dataclass(frozen=True)
@@ -225,7 +226,7 @@ class MeshIndenter(IndenterKind):
         mesh = mesh.validate(name, closed=False)
         if mesh.normals is None:
             mesh = mesh.welded().vertex_normals()
-        mesh = _lowest_at_zero(mesh.transformed(np.eye(3) * self.scale))
+        mesh = lowest_at_zero(mesh.transformed(np.eye(3) * self.scale))
         size = np.ptp(mesh.bounds, axis=0).max()
         if not SMALLEST <= size <= LARGEST:
             raise ContactError(
@@ -234,7 +235,7 @@ class MeshIndenter(IndenterKind):
             )
         lowest = mesh.vertices[mesh.vertices[:, 2] <= 1e-6 * size]
         x, y = 0.5 * (lowest.min(axis=0) + lowest.max(axis=0))[:2]
-        return _moved(mesh, (-x, -y, 0.0))
+        return TriangleMesh(mesh.vertices - (x, y, 0.0), mesh.faces, mesh.normals)
 
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """Return the whole mesh with its own triangles; see `Indenter.mesh`."""
@@ -260,17 +261,3 @@ def _between_rings(inner: int, outer: int) -> NDArray[np.int64]:
 def _arc(radius: float, reach: float) -> float:
     """Return the angle (radians) from the lowest point of a circle to height `reach`."""
     return math.acos(max(-1.0, 1.0 - reach / radius))
-
-
-def _turn_z(angle: float) -> NDArray[np.float64]:
-    """Return the rotation matrix (3, 3) by an angle (degrees) about z."""
-    a = math.radians(angle)
-    return np.array([[math.cos(a), -math.sin(a), 0], [math.sin(a), math.cos(a), 0], [0, 0, 1]])
-
-
-def _moved(mesh: TriangleMesh, shift: tuple[float, float, float]) -> TriangleMesh:
-    return TriangleMesh(mesh.vertices + shift, mesh.faces, mesh.normals)
-
-
-def _lowest_at_zero(mesh: TriangleMesh) -> TriangleMesh:
-    return _moved(mesh, (0.0, 0.0, -float(mesh.bounds[0, 2])))

@@ -218,9 +218,12 @@ class Tilted:
     def mesh(self, reach: float, facet_error: float = FACET_ERROR) -> TriangleMesh:
         """Return the mesh of the whole rotated indenter; see `Indenter.mesh`."""
         whole = self.indenter.mesh(np.inf, facet_error)
-        turned = whole.transformed(turn_about_axes(self.tilt_x, self.tilt_y))
-        lowest = np.array([0.0, 0.0, turned.bounds[0, 2]])
-        return TriangleMesh(turned.vertices - lowest, turned.faces, turned.normals)
+        return lowest_at_zero(whole.transformed(turn_about_axes(self.tilt_x, self.tilt_y)))
+
+
+def lowest_at_zero(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a mesh moved along z so that its lowest point is at z = 0."""
+    return TriangleMesh(mesh.vertices - (0.0, 0.0, mesh.bounds[0, 2]), mesh.faces, mesh.normals)
 
 
 def tilted(indenter: Indenter, tilt_x: float, tilt_y: float) -> Indenter:
