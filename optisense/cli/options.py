@@ -85,7 +85,7 @@ def print_small_indenters(contacts: Sequence[Contact]) -> int:
     number.
     """
     from optisense.cli.console import output
-    from optisense.geometry.indenter_sizes import size_warning
+    from optisense.geometry.contact import size_warning
 
     warnings = list(filter(None, map(size_warning, contacts)))
     for warning in warnings:

@@ -17,9 +17,9 @@ from optisense.design.projection import directions, picture_places, within_view
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import sample_seam
-from optisense.geometry.common_space import common_space
 from optisense.geometry.containment import inside
 from optisense.geometry.rays import ray_hits
+from optisense.geometry.solids import common_space
 
 EQUAL_INDEX = 1e-6
 """Largest difference of refractive indices for which solids count as one medium; it covers rounding

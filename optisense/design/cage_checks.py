@@ -14,10 +14,9 @@ from optisense.design.problems import Diagnostic
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_weights
-from optisense.geometry.carving import without
-from optisense.geometry.coarseness import chord_error
 from optisense.geometry.containment import inside
-from optisense.geometry.folds import find_fold
+from optisense.geometry.folds import chord_error, find_fold
+from optisense.geometry.mesh_points import distance_within
 from optisense.geometry.overlaps import (
     CONTACT,
     find_overlap,
@@ -26,7 +25,7 @@ from optisense.geometry.overlaps import (
     touching_vertices,
 )
 from optisense.geometry.rays import ray_hits
-from optisense.geometry.surface import distance_within
+from optisense.geometry.solids import without
 
 AT_REST = 1e-9
 """Largest displacement of a control point that counts as rest, mm; a margin for rounding."""

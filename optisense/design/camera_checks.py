@@ -19,9 +19,8 @@ from optisense.design.projection import angle_across, folding_angle
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
+from optisense.geometry.mesh_points import distance_within, surface_samples
 from optisense.geometry.rays import ray_hits
-from optisense.geometry.surface import distance_within
-from optisense.geometry.surface_samples import surface_samples
 
 WIDEST_PERSPECTIVE = 135.0
 """Angle from corner to corner of the widest lens that keeps straight lines straight, degrees.

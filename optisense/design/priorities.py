@@ -5,7 +5,7 @@ from __future__ import annotations
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.sensor_design import SensorDesign
 from optisense.geometry import TriangleMesh
-from optisense.geometry.carving import without
+from optisense.geometry.solids import without
 
 
 def carved(design: SensorDesign, meshes: dict[str, TriangleMesh], name: str) -> TriangleMesh:

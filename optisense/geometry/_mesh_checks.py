@@ -48,11 +48,11 @@ def validate(mesh: TriangleMesh, name: str, closed: bool) -> TriangleMesh:
 def _closed_and_outward(mesh: TriangleMesh, name: str) -> TriangleMesh:
     welded = mesh.welded()
     edges = unmatched_edges(welded)
-    if len(edges) and len(_leaky_edges(welded)) == 0:
+    leaky = welded.edges[0][welded.edges[1] % 2 == 1]
+    if len(edges) and len(leaky) == 0:
         mesh = welded = with_consistent_winding(welded)
         edges = unmatched_edges(welded)
     if len(edges):
-        leaky = _leaky_edges(welded)
         edge = leaky[0] if len(leaky) else edges[0]
         x, y, z = welded.vertices[edge].mean(axis=0)
         raise MeshError(
@@ -72,7 +72,7 @@ def _closed_and_outward(mesh: TriangleMesh, name: str) -> TriangleMesh:
 
 
 def unmatched_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Return directed edges (k, 2) of the welded mesh that occur more often than their reverse."""
+    """Return directed edges (k, 2) of a welded mesh that occur more often than their reverse."""
     forward, size = _directed_edges(mesh)
     keys, counts = np.unique(forward, return_counts=True)
     backward = (keys % size) * size + keys // size
@@ -82,19 +82,8 @@ def unmatched_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
     return np.column_stack([bad // size, bad % size])
 
 
-def _leaky_edges(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Return the edges (k, 2) with an odd number of faces of any winding."""
-    forward, size = _directed_edges(mesh)
-    first, second = forward // size, forward % size
-    keys, counts = np.unique(
-        np.minimum(first, second) * size + np.maximum(first, second), return_counts=True
-    )
-    bad = keys[counts % 2 == 1]
-    return np.column_stack([bad // size, bad % size])
-
-
 def _directed_edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], int]:
-    faces = mesh.welded().faces.astype(np.int64)
+    faces = mesh.faces.astype(np.int64)
     size = int(faces.max(initial=0)) + 1
     starts, ends = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     return starts * size + ends, size

@@ -121,8 +121,8 @@ def _bent(
 
 
 def kept_weights(mesh: TriangleMesh, box: ArrayLike, resolution: Resolution) -> FloatArray:
-    """Return the read-only `cage_weights` (n, nx * ny * nz) of a mesh's n vertices at rest; they are
-    kept for the next call with the same mesh.
+    """Return the read-only `cage_weights` (n, nx * ny * nz) of the n vertices of a mesh at rest,
+    which are kept for the next call with the same mesh.
 
     Raises:
         DesignError: a vertex lies outside the box.

@@ -15,7 +15,6 @@ import shapely
 from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
-from optisense.geometry._box_pairs import overlapping_boxes
 from optisense.geometry._flat_polygons import (
     THINNEST,
     area_and_length,
@@ -26,6 +25,7 @@ from optisense.geometry._flat_polygons import (
     is_shape,
     lie_apart,
 )
+from optisense.geometry.crossings import overlapping_boxes
 from optisense.geometry.mesh import TriangleMesh
 
 PARALLEL = float(np.cos(np.radians(10.0)))

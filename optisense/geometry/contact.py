@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.errors import ContactError
-from optisense.geometry.exits import exits
-from optisense.geometry.indenter_kinds import FACET_ERROR, Indenter
+from optisense.geometry._indenters import MeshIndenter
+from optisense.geometry.indenter_kinds import FACET_ERROR, Indenter, Tilted
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.rays import exits
 from optisense.geometry.surface import SensingSurface, SurfacePoint
 from optisense.text import brief
 
@@ -32,6 +33,17 @@ of double precision, and far below any distance that matters."""
 ON_SURFACE = 0.5
 """Largest distance (mm) from the sensing surface of a contact point given as x, y, z: points picked
 on another tessellation of a curved surface are nearer, and a mistyped number is farther."""
+
+SMALL = 0.1
+"""Largest extent, mm, below which an indenter is probably in another unit: two to three pixels of
+the built-in sensors.
+"""
+
+COARSE = 0.01
+"""Error of facets, mm, with which the extent is measured: a tenth of `SMALL`."""
+
+PER_METRE = 1000.0
+"""Factor from metres, the unit of robot models, to mm."""
 
 
 @dataclass(frozen=True)
@@ -250,3 +262,35 @@ def _axes(
     return np.column_stack(
         [math.cos(a) * x + math.sin(a) * y, math.cos(a) * y - math.sin(a) * x, z]
     )
+
+
+def size_warning(contact: Contact) -> str | None:
+    """Return a sentence about an indenter that is smaller than `SMALL` or than the depth of its
+    contact, with the scale that a mesh file may need, or None.
+
+    Raises:
+        MeshError, ContactError: the mesh of the indenter can't be read.
+    """
+    reach = contact.depth
+    mesh = contact.indenter.mesh(reach, COARSE)
+    size = float(np.ptp(mesh.bounds, axis=0).max())
+    if contact.force is None and size < reach:
+        said = f"an indenter {size:.2g} mm large is pressed {reach:g} mm deep"
+    elif size < SMALL:
+        said = f"an indenter is {size:.2g} mm large, too small for the camera"
+    else:
+        return None
+    file = _file(contact.indenter)
+    if file is None:
+        return said
+    scaled = f"mesh:{file.source},{PER_METRE * file.scale:g}"
+    return f"{said}; if its file is in metres, write {scaled}"
+
+
+def _file(indenter: Indenter) -> MeshIndenter | None:
+    """Return an indenter that is a mesh file, without its tilt, or None."""
+    if isinstance(indenter, Tilted):
+        return _file(indenter.indenter)
+    if isinstance(indenter, MeshIndenter) and not isinstance(indenter.source, TriangleMesh):
+        return indenter
+    return None

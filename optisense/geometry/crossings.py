@@ -1,4 +1,4 @@
-"""Intersections of the faces of meshes."""
+"""Intersections of the faces of meshes, and of boxes around them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.array_types import FloatArray
-from optisense.geometry._box_pairs import overlapping_boxes, overlapping_pairs
+from optisense.array_types import FloatArray, IntArray
 from optisense.geometry.mesh import TriangleMesh
 
 TOUCH = 1e-4
@@ -82,10 +81,10 @@ def _crossings(
     pairs, places, count = [np.zeros((0, 2), dtype=np.int64)], [np.zeros((0, 3))], 0
     for start in range(0, len(one), _PAIRS_AT_ONCE):
         a, b = one[start : start + _PAIRS_AT_ONCE], other[start : start + _PAIRS_AT_ONCE]
-        heights_a = _heights(first, a, second, b)
+        heights_a = heights(first, a, second, b)
         through = _reach_through(heights_a)
         a, b, heights_a = a[through], b[through], heights_a[through]
-        heights_b = _heights(second, b, first, a)
+        heights_b = heights(second, b, first, a)
         through = _reach_through(heights_b)
         a, b, heights_a, heights_b = a[through], b[through], heights_a[through], heights_b[through]
         line = np.cross(first.face_normals[a], second.face_normals[b])
@@ -103,7 +102,7 @@ def _crossings(
     return Crossings(np.concatenate(pairs)[:limit], np.concatenate(places)[:limit])
 
 
-def _heights(
+def heights(
     of: TriangleMesh, faces: NDArray[np.int64], planes: TriangleMesh, against: NDArray[np.int64]
 ) -> FloatArray:
     """Return the heights (k, 3), mm, of the corners of faces above the planes of others."""
@@ -135,3 +134,61 @@ def _cut_out(
         ends.append(apex + share[:, None] * (triangles[rows, corner] - apex))
     along = np.stack([np.einsum("ki,ki->k", end, line) for end in ends], axis=1)
     return along.min(axis=1), along.max(axis=1), ends[0]
+
+
+def overlapping_boxes(
+    low_1: FloatArray, high_1: FloatArray, low_2: FloatArray, high_2: FloatArray
+) -> tuple[IntArray, IntArray]:
+    """Return the pairs of boxes of two sets that overlap or touch, in no particular order.
+
+    A tree of rectangles finds the pairs that overlap when seen along the axis over which the boxes
+    extend least, and few of these lie behind one another.
+
+    Args:
+        low_1, high_1: (n, 3) lower and upper corners of the first set.
+        low_2, high_2: (k, 3) lower and upper corners of the second set.
+
+    Returns:
+        The numbers (p,) in the first set and (p,) in the second set.
+    """
+    from shapely import STRtree, box
+
+    reached_1 = _in_reach(low_1, high_1, low_2, high_2)
+    reached_2 = _in_reach(low_2, high_2, low_1, high_1)
+    if not (len(reached_1) and len(reached_2)):
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    low_1, high_1, low_2, high_2 = (
+        low_1[reached_1], high_1[reached_1], low_2[reached_2], high_2[reached_2],
+    )  # fmt: skip
+    extent = np.maximum(high_1.max(axis=0), high_2.max(axis=0)) - np.minimum(
+        low_1.min(axis=0), low_2.min(axis=0)
+    )
+    along, *across = np.argsort(extent)
+    tree = STRtree(box(*low_2[:, across].T, *high_2[:, across].T))
+    one, other = tree.query(box(*low_1[:, across].T, *high_1[:, across].T))
+    meet = (low_1[one, along] <= high_2[other, along]) & (high_1[one, along] >= low_2[other, along])
+    return reached_1[one[meet]], reached_2[other[meet]]
+
+
+def overlapping_pairs(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return the pairs of boxes of one set that overlap or touch; each pair once.
+
+    Args:
+        low, high: (n, 3) lower and upper corners.
+
+    Returns:
+        The smaller (p,) and the larger number (p,) of each pair.
+    """
+    one, other = overlapping_boxes(low, high, low, high)
+    ordered = one < other
+    return one[ordered], other[ordered]
+
+
+def _in_reach(
+    low: FloatArray, high: FloatArray, other_low: FloatArray, other_high: FloatArray
+) -> IntArray:
+    """Return the boxes that overlap the box around all others."""
+    if not len(other_low):
+        return np.zeros(0, dtype=np.int64)
+    reach = (low <= other_high.max(axis=0)) & (high >= other_low.min(axis=0))
+    return np.flatnonzero(reach.all(axis=1)).astype(np.int64)

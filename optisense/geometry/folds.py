@@ -1,4 +1,4 @@
-"""Detection of bent meshes that are folded, turned inside out or pushed through themselves."""
+"""Defects of bent meshes: folds, faces that cut through each other, and too large triangles."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.array_types import FloatArray
-from optisense.geometry.cage import Resolution
+from optisense.geometry.cage import Resolution, cage_weights, deform
 from optisense.geometry.cage_map import is_one_to_one, jacobians
 from optisense.geometry.crossings import self_crossings
 from optisense.geometry.mesh import TriangleMesh
@@ -19,6 +19,11 @@ COLLAPSED = 1e-6
 """Share of its area at rest below which a face has collapsed: its sides are then a thousandth of
 what they were, or its corners lie on one line."""
 
+LONGEST_EDGES = 64
+"""Number of edges whose deviation is measured: the longest ones of a mesh, as the deviation grows
+as the square of the length."""
+
+_longest: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int32]] = weakref.WeakKeyDictionary()
 _outlines: weakref.WeakKeyDictionary[TriangleMesh, NDArray[np.int64]] = weakref.WeakKeyDictionary()
 
 
@@ -156,3 +161,49 @@ def _single_outline(mesh: TriangleMesh) -> NDArray[np.int64]:
         if len(outline) > len(follow):
             return none
     return np.array(outline, dtype=np.int64) if len(outline) == len(follow) else none
+
+
+class ChordError(NamedTuple):
+    """The largest distance of a bent mesh from the exact shape that its cage gives.
+
+    Attributes:
+        distance: distance at the middle of the worst edge, mm.
+        place: (3,) this place in the bent shape, mm.
+    """
+
+    distance: float
+    place: FloatArray
+
+
+def chord_error(
+    mesh: TriangleMesh,
+    bent: TriangleMesh,
+    box: ArrayLike,
+    resolution: Resolution,
+    points: ArrayLike,
+) -> ChordError:
+    """Return the largest distance of the middles of long edges from their exact deformed positions.
+
+    The cage moves vertices only; between them a mesh stays straight.
+
+    Args:
+        mesh: the mesh at rest, mm, with faces.
+        box: (2, 3) lower and upper corner of the cage, mm.
+        resolution: number of its points along x, y, z.
+        points: (nx * ny * nz, 3) its control points, mm.
+    """
+    edges = _longest.get(mesh)
+    if edges is None:
+        edges = _longest.setdefault(mesh, _longest_edges(mesh))
+    middles = mesh.vertices[edges].mean(axis=1)
+    wanted = deform(cage_weights(middles, box, resolution), points)
+    off = np.linalg.norm(bent.vertices[edges].mean(axis=1) - wanted, axis=1)
+    worst = int(np.argmax(off))
+    return ChordError(float(off[worst]), wanted[worst])
+
+
+def _longest_edges(mesh: TriangleMesh) -> NDArray[np.int32]:
+    ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    squares = ((mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]]) ** 2).sum(axis=1)
+    count = min(LONGEST_EDGES, len(ends))
+    return np.asarray(ends[np.argpartition(-squares, count - 1)[:count]])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from optisense.array_types import FloatArray
 from optisense.geometry.coincidence import find_coincident
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.mesh_points import closest_on_triangles
 from optisense.geometry.patches import Faces, mean_normal, middle, patches, smoothly_joined
 
 EXACT = 0.001
@@ -163,21 +164,3 @@ def _curved_moves(
     vertices[chosen[reached]] = (nearest[best] - distance * normals)[reached]
     height = np.einsum("ij,ij->i", points[best] - nearest[best], normals)[reached]
     return vertices, float(height[np.abs(height).argmax()]) if len(height) else 0.0
-
-
-def closest_on_triangles(points: FloatArray, triangles: FloatArray) -> FloatArray:
-    """Return the point (k, 3), mm, of each triangle (k, 3, 3) nearest to its point (k, 3)."""
-    edges = np.roll(triangles, -1, axis=1) - triangles
-    squares = np.maximum(np.einsum("kei,kei->ke", edges, edges), 1e-300)
-    way = points[:, None] - triangles
-    along = (np.einsum("kei,kei->ke", way, edges) / squares).clip(0.0, 1.0)
-    on_edges = triangles + along[:, :, None] * edges
-    rows = np.arange(len(points))
-    rim = on_edges[rows, np.linalg.norm(on_edges - points[:, None], axis=2).argmin(axis=1)]
-    vector = np.cross(edges[:, 0], edges[:, 1])
-    normal = vector / np.maximum(np.linalg.norm(vector, axis=1, keepdims=True), 1e-300)
-    foot = points - np.einsum("ki,ki->k", way[:, 0], normal)[:, None] * normal
-    inward = np.cross(normal[:, None], edges)
-    within = (np.einsum("kei,kei->ke", inward, foot[:, None] - triangles) >= 0.0).all(axis=1)
-    within &= np.linalg.norm(vector, axis=1) > 0.0
-    return np.where(within[:, None], foot, rim)

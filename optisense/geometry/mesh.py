@@ -188,18 +188,26 @@ class TriangleMesh:
         return float(np.einsum("ij,ij->", corners[:, 0], self.face_vectors) / 6.0)
 
     @cached_property
+    def edges(self) -> tuple[IntArray, NDArray[np.int64]]:
+        """The edges (n, 2) by their vertices, ascending, and the number (n,) of faces of each."""
+        ends = np.sort(self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64), axis=1)
+        # Pairs are coded as single numbers, which sort ten times faster.
+        size = len(self.vertices)
+        keys, times = np.unique(ends[:, 0] * size + ends[:, 1], return_counts=True)
+        return np.column_stack([keys // size, keys % size]).astype(np.int32), times
+
+    @cached_property
     def open_edges(self) -> IntArray:
         """The edges (n, 2) that belong to a single face, by their vertices."""
-        ends = np.sort(self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges, times = np.unique(ends, axis=0, return_counts=True)
-        return np.asarray(edges[times == 1])
+        edges, times = self.edges
+        return edges[times == 1]
 
     @cached_property
     def is_closed(self) -> bool:
         """Whether each edge is traversed equally often in both directions."""
         from optisense.geometry._mesh_checks import unmatched_edges
 
-        return len(self.faces) > 0 and len(unmatched_edges(self)) == 0
+        return len(self.faces) > 0 and len(unmatched_edges(self.welded())) == 0
 
     def equals(self, other: TriangleMesh) -> bool:
         """Return whether two meshes have equal arrays; `==` asks whether they are one object."""

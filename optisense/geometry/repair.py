@@ -15,11 +15,12 @@ from optisense.errors import MeshError
 from optisense.geometry._mesh_checks import with_consistent_winding
 from optisense.geometry._welding import merged_vertices
 from optisense.geometry.coincidence import boxes_overlap, find_coincident
-from optisense.geometry.common_space import as_manifold, thick_place
 from optisense.geometry.connected import connected_components
 from optisense.geometry.containment import inside
 from optisense.geometry.crossings import TOUCH, near_pairs, self_crossings
-from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.mesh import IntArray, TriangleMesh
+from optisense.geometry.patches import inner_edges
+from optisense.geometry.solids import as_manifold, thick_place
 
 WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Distances (mm) below which vertices are merged, tried in ascending order until the mesh is
@@ -119,11 +120,7 @@ def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
 
     Bodies that only share corners are different shells.
     """
-    _, edge = np.unique(_keys(mesh), return_inverse=True)
-    order = np.argsort(edge.reshape(-1), kind="stable")
-    same = np.diff(edge.reshape(-1)[order]) == 0
-    face = order // 3
-    return connected_components(len(mesh.faces), face[:-1][same], face[1:][same])
+    return connected_components(len(mesh.faces), *inner_edges(mesh)[1].T)
 
 
 def _without_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
@@ -142,19 +139,16 @@ def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
     """Weld as far as needed to close the mesh."""
     for distance in WELDS:
         welded = merged_vertices(mesh, distance)
-        edges, count = _edges(welded)
-        if not (count == 1).any():
+        if not len(welded.open_edges):
             if distance > WELDS[0]:
                 notes.append(f"vertices up to {distance:g} mm apart were joined")
             _refuse_crowded_edges(welded, where)
             return welded
     welded = merged_vertices(mesh, WELDS[0])
-    edges, count = _edges(welded)
-    open_edges = edges[count == 1]
-    raise _hole(welded, open_edges, where)
+    raise _hole(welded, welded.open_edges, where)
 
 
-def _hole(mesh: TriangleMesh, edges: NDArray[np.int64], where: str) -> MeshError:
+def _hole(mesh: TriangleMesh, edges: IntArray, where: str) -> MeshError:
     """Return the error for open edges, with the number of holes and the place of the widest one."""
     group = connected_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
     rims = np.unique(group[edges[:, 0]])
@@ -175,7 +169,7 @@ def _hole(mesh: TriangleMesh, edges: NDArray[np.int64], where: str) -> MeshError
 
 
 def _refuse_crowded_edges(mesh: TriangleMesh, where: str) -> None:
-    edges, count = _edges(mesh)
+    edges, count = mesh.edges
     crowded = edges[count > 2]
     if len(crowded) == 0:
         return
@@ -310,19 +304,6 @@ def _within(bodies: list[TriangleMesh], where: str | None) -> BoolArray:
                     hint=_UNITE,
                 )
     return result
-
-
-def _edges(mesh: TriangleMesh) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the undirected edges (k, 2) and the number (k,) of faces of each."""
-    size = len(mesh.vertices)
-    keys, count = np.unique(_keys(mesh), return_counts=True)
-    return np.column_stack([keys // size, keys % size]), count
-
-
-def _keys(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Return a number (3 m,) for each edge of each face, equal for the same two vertices."""
-    ends = mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
-    return np.asarray(ends.min(axis=1) * len(mesh.vertices) + ends.max(axis=1))
 
 
 def _point(place: FloatArray) -> str:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from optisense.array_types import FloatArray
 from optisense.errors import ContactError, MeshError
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.mesh_points import closest_place
 
 _ARRIVED = 1e-9
 """Remaining distance (mm) below which a walk over the surface has arrived: far above the rounding
@@ -238,57 +239,6 @@ class SensingSurface:
         along = float(direction @ edge)
         turned: FloatArray = along * edge + np.sqrt(max(0.0, 1.0 - along * along)) * into
         return turned
-
-
-def closest_place(mesh: TriangleMesh, point: ArrayLike) -> tuple[int, FloatArray]:
-    """Return the place of a mesh that is nearest to a point: the face, and its point (3,), mm.
-
-    Args:
-        point: (3,) the point, mm.
-
-    Raises:
-        ContactError: a coordinate is not a finite number.
-    """
-    where = np.asarray(point, dtype=np.float64).reshape(3)
-    if not np.isfinite(where).all():
-        raise ContactError(
-            "a coordinate of a contact point is not a finite number",
-            hint="Give x, y, z in mm",
-        )
-    middle, square = mesh.face_spheres
-    away, radius = np.linalg.norm(middle - where, axis=1), np.sqrt(square)
-    near = np.flatnonzero(away - radius <= (away + radius).min())
-    on_faces = closest_points(TriangleMesh(mesh.vertices, mesh.faces[near]), where)
-    distance = np.linalg.norm(on_faces - where, axis=1)
-    face = int(np.argmin(np.where(np.isfinite(distance), distance, np.inf)))
-    return int(near[face]), np.asarray(on_faces[face], dtype=np.float64)
-
-
-def closest_points(mesh: TriangleMesh, point: FloatArray) -> FloatArray:
-    """Return the point (m, 3), mm, of each face that is nearest to `point` (3,), mm."""
-    corners = mesh.triangles
-    edges = np.roll(corners, -1, axis=1) - corners
-    squares = np.maximum(np.einsum("mei,mei->me", edges, edges), 1e-300)
-    along = (np.einsum("mei,mei->me", point - corners, edges) / squares).clip(0.0, 1.0)
-    on_edges = corners + along[:, :, None] * edges
-    nearest = np.linalg.norm(on_edges - point, axis=2).argmin(axis=1)
-    normals = mesh.face_normals
-    height = np.einsum("mi,mi->m", point - corners[:, 0], normals)
-    foot = point - height[:, None] * normals
-    inward = np.cross(normals[:, None], edges)
-    inside = (np.einsum("mei,mei->me", inward, foot[:, None] - corners) >= 0.0).all(axis=1)
-    inside &= mesh.face_areas > 0.0
-    return np.where(inside[:, None], foot, on_edges[np.arange(len(corners)), nearest])
-
-
-def distance_within(mesh: TriangleMesh, point: FloatArray, reach: float) -> float:
-    """Return the distance (mm) of a point (3,) from a mesh; infinite beyond about `reach` (mm)."""
-    low, high = mesh.face_bounds
-    near = ((low < point + reach) & (high > point - reach)).all(axis=1)
-    if not near.any():
-        return float("inf")
-    part = mesh.with_faces(mesh.faces[near])
-    return float(np.linalg.norm(closest_points(part, point) - point, axis=1).min())
 
 
 def _barycentric(triangle: FloatArray, point: FloatArray) -> FloatArray:

@@ -9,8 +9,8 @@ from optisense.design.parts import Role
 from optisense.errors import ContactError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import boxes_overlap, find_coincident
-from optisense.geometry.exits import GLUE
 from optisense.geometry.overlaps import find_overlap, touching_vertices
+from optisense.geometry.rays import GLUE
 
 
 def is_attached(design: SensorDesign) -> bool:

@@ -12,8 +12,8 @@ from scipy import ndimage
 
 from optisense.array_types import BoolArray, FloatArray, IntArray
 from optisense.geometry import TriangleMesh
-from optisense.geometry.exits import exits
 from optisense.geometry.patches import sides_of_faces
+from optisense.geometry.rays import exits
 from optisense.mechanics._footprint import Footprint, outer_faces
 from optisense.mechanics._height_map import heights
 

@@ -11,7 +11,7 @@ from optisense.array_types import FloatArray
 from optisense.design import SensorDesign
 from optisense.design.parts import Role
 from optisense.geometry import TriangleMesh
-from optisense.geometry.surface import closest_points
+from optisense.geometry.mesh_points import closest_points
 from optisense.mechanics._footprint import Footprint
 from optisense.mechanics._gel_columns import LEAST_UPRIGHT
 from optisense.mechanics._gel_patch import GelPatch

@@ -14,7 +14,7 @@ from scipy.spatial.distance import cdist
 from optisense.design import Role, SensorDesign
 from optisense.errors import ObjectiveError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.surface import closest_points
+from optisense.geometry.mesh_points import closest_points
 from optisense.objectives.registry import objective
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from optisense.array_types import FloatArray, FloatingArray
 from optisense.geometry import TriangleMesh
-from optisense.geometry.surface_samples import surface_samples
+from optisense.geometry.mesh_points import surface_samples
 from optisense.objectives._pixel_edges import JUMP, discontinuous_edges
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from optisense.geometry import Contact, TriangleMesh
-from optisense.geometry.anchors import anchored
+from optisense.geometry.mesh_points import anchored
 from optisense.optics.scene.media import same_faces
 
 ON_SKIN = 1e-3

@@ -16,7 +16,7 @@ from optisense.errors import RenderError
 from optisense.geometry import Contact, Indenter, SensingSurface, Sphere, TriangleMesh, nine_places
 from optisense.geometry.contact import place
 from optisense.geometry.indenter_kinds import FACET_ERROR
-from optisense.geometry.surface import closest_place
+from optisense.geometry.mesh_points import closest_place
 from optisense.mechanics import Gel, elasticity_of, refuse_loose_gel
 from optisense.optics.camera.projection import RayCamera
 from optisense.optics.scene.sensor_scenes import SensorScenes

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import RenderError
-from optisense.geometry.surface_samples import surface_samples
+from optisense.geometry.mesh_points import surface_samples
 from optisense.optics.ledger import cells_in_view
 from optisense.optics.transport.light_ledger import BATCHES
 from optisense.optics.transport.photons import TargetCells

@@ -15,10 +15,9 @@ from optisense.design.looks import ROLE_LOOKS
 from optisense.design.projection import image_edges
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.bodies import united
-from optisense.geometry.common_space import as_manifold, of_manifold, thick_place
+from optisense.geometry.mesh_points import closest_points
 from optisense.geometry.overlaps import CONTACT
-from optisense.geometry.surface import closest_points
+from optisense.geometry.solids import as_manifold, of_manifold, thick_place, united
 from optisense.robots._collision import COVERED, depth_in, free_hulls, gel_hulls
 from optisense.robots._densities import density_of
 from optisense.workshop.export import file_name

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from optisense.array_types import FloatArray
-from optisense.geometry.common_space import of_manifold
+from optisense.geometry.solids import of_manifold
 
 COVERED = 0.05
 """Depth (mm) in a hull from which on a point of the skin counts as covered: more than the gap

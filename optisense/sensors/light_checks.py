@@ -20,8 +20,8 @@ from optisense.design.material_checks import is_gas
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
+from optisense.geometry.mesh_points import closest_points, distance_within
 from optisense.geometry.rays import ray_hits
-from optisense.geometry.surface import closest_points, distance_within
 
 FLUSH = 0.1
 """Largest depth in a part of the window of a light that lies against its face, mm. A flat window

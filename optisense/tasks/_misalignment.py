@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, TriangleMesh, available_depth
-from optisense.geometry.exits import NEAREST
+from optisense.geometry.rays import NEAREST
 from optisense.geometry.rotations import turn_about_axes
 from optisense.mechanics import CONFORMING
 

@@ -14,8 +14,8 @@ from scipy.spatial import cKDTree
 from optisense.array_types import FloatArray
 from optisense.errors import ContactError, TaskError
 from optisense.geometry import Contact, TriangleMesh
+from optisense.geometry.mesh_points import closest_points
 from optisense.geometry.objects import OBJECTS, ObjectIndenter
-from optisense.geometry.surface import closest_points
 from optisense.tasks._draws import rays_of_places
 
 if TYPE_CHECKING:

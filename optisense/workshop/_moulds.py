@@ -18,8 +18,8 @@ from optisense.array_types import FloatArray
 from optisense.design import Role
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.common_space import as_manifold, of_manifold
 from optisense.geometry.patches import mean_normal, patches
+from optisense.geometry.solids import as_manifold, of_manifold
 from optisense.workshop._thickened import body_between
 from optisense.workshop.shapes import Shape
 

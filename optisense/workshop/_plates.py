@@ -10,7 +10,7 @@ import numpy as np
 from optisense.array_types import FloatArray
 from optisense.design import Role
 from optisense.geometry import TriangleMesh
-from optisense.geometry.bodies import bodies
+from optisense.geometry.solids import bodies
 from optisense.workshop._profiles import OutlinePiece, pieces
 from optisense.workshop._recognised import extruded_along
 from optisense.workshop.shapes import Shape

@@ -15,7 +15,7 @@ from typing import Any
 from optisense.design.looks import ROLE_LOOKS
 from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.bodies import bodies
+from optisense.geometry.solids import bodies
 from optisense.geometry.step import no_step
 from optisense.version import __version__
 from optisense.workshop._exact_shapes import WORTH_IT, exact_body

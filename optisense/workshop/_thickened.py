@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from optisense.array_types import FloatArray
 from optisense.geometry import TriangleMesh
-from optisense.geometry.common_space import as_manifold, of_manifold
 from optisense.geometry.connected import connected_components
+from optisense.geometry.solids import as_manifold, of_manifold
 
 LONGEST_MITRE = 3.0
 """Largest distance of a corner of the far face from the near one, in thicknesses; the mitre of two

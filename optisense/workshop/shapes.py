@@ -8,8 +8,8 @@ from optisense.design import Cage, Role, SensorDesign
 from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.bodies import united
 from optisense.geometry.repair import outward
+from optisense.geometry.solids import united
 from optisense.workshop._thickened import thickened
 
 AIR = 1.0

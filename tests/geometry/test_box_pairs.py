@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from optisense.array_types import FloatArray
-from optisense.geometry._box_pairs import overlapping_boxes, overlapping_pairs
+from optisense.geometry.crossings import overlapping_boxes, overlapping_pairs
 
 
 def boxes(count: int, size: float, seed: int) -> tuple[FloatArray, FloatArray]:

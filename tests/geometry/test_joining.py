@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from optisense.geometry import TriangleMesh
-from optisense.geometry.joining import closest_on_triangles, join, touching_area
+from optisense.geometry.joining import join, touching_area
+from optisense.geometry.mesh_points import closest_on_triangles
 from optisense.optics.scene.media import Media, Solid
 from optisense.sensors._shapes import arc, revolve
 

@@ -93,7 +93,7 @@ def test_light_on_a_top_is_not_averaged_with_the_dark_wall_beside_it() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from optisense.geometry.surface_samples import surface_samples
+    from optisense.geometry.mesh_points import surface_samples
     from optisense.optics.radiance_cache.smoothing import Kernels
     from optisense.optics.scene.surface_cells import build_cells, cell_at
 

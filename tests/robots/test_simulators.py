@@ -15,7 +15,7 @@ from optisense.design.lenses.distortion import BrownConrady
 from optisense.design.projection import picture_places
 from optisense.errors import DesignError, OwnCodeError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.common_space import as_manifold
+from optisense.geometry.solids import as_manifold
 from optisense.robots import RobotFormat, SensorBody, export_robot, sensor_body
 from optisense.robots._body import KILOGRAMS, _skin_frame, mass_properties
 from optisense.workshop.shapes import shapes

@@ -16,7 +16,7 @@ from optisense.cli import app
 from optisense.design import Role, SensorDesign
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.common_space import as_manifold
+from optisense.geometry.solids import as_manifold
 from optisense.workshop._moulds import (
     CLEARANCE,
     FUNNEL,

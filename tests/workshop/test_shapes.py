@@ -15,7 +15,7 @@ from optisense import sensors
 from optisense.design import Part, Point, Role, SensorDesign
 from optisense.errors import DesignError, OutputError, SetupError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.bodies import bodies, united
+from optisense.geometry.solids import bodies, united
 from optisense.workshop import bill_of_materials, export
 from optisense.workshop._step_format import write_step
 from optisense.workshop.mesh_formats import NAMESPACE, three_mf_bytes

@@ -17,17 +17,26 @@ from optisense.array_types import FloatArray
 from optisense.errors import ContactError
 from optisense.geometry.indenter_kinds import FACET_ERROR, IndenterKind, quantity
 from optisense.geometry.mesh import TriangleMesh
-from optisense.geometry.objects import _outlines
-from optisense.geometry.objects._relief import Relief
+from optisense.geometry.objects._relief import (
+    Relief,
+    disc,
+    dome,
+    hexagon,
+    raised,
+    rectangle,
+    star,
+    strokes,
+    wall,
+)
 from optisense.near import suggestion
 
 
 def _screw_head(x: FloatArray, y: FloatArray) -> FloatArray:
     radius = np.hypot(x, y)
     head = 5.0 - np.sqrt(np.maximum(25.0 - radius**2, 0.0))
-    cross = np.minimum(_outlines.rectangle(x, y, 3.2, 0.8), _outlines.rectangle(x, y, 0.8, 3.2))
+    cross = np.minimum(rectangle(x, y, 3.2, 0.8), rectangle(x, y, 0.8, 3.2))
     recess = np.clip(-2.75 * cross, 0.0, 1.0)  # a flank of 70 degrees
-    return head + recess + _outlines.wall(_outlines.disc(x, y, 2.8))
+    return head + recess + wall(disc(x, y, 2.8))
 
 
 def _screw_thread(x: FloatArray, y: FloatArray) -> FloatArray:
@@ -37,23 +46,23 @@ def _screw_thread(x: FloatArray, y: FloatArray) -> FloatArray:
     zigzag = np.abs(np.mod(x / pitch + turn, 1.0) - 0.5) * 2.0
     local = radius - np.clip(1.25 * zigzag - 0.125, 0.0, 1.0) * depth
     side = radius - np.sqrt(np.maximum(local**2 - y**2, 0.0))
-    return side + _outlines.wall(np.abs(x) - 3.5)
+    return side + wall(np.abs(x) - 3.5)
 
 
 def _coin(x: FloatArray, y: FloatArray) -> FloatArray:
     radius, angle = np.hypot(x, y), np.arctan2(y, x)
     rim = np.clip(2.0 * (radius - 3.85), 0.0, 0.25)
-    star = 0.25 * np.minimum(1.0, 1.6 * _outlines.star(x, y, 5, 2.7, 1.1))
+    figure = 0.25 * np.minimum(1.0, 1.6 * star(x, y, 5, 2.7, 1.1))
     step = 2.0 * np.pi / 30.0
     aside = np.mod(angle + 0.5 * step, step) - 0.5 * step
-    beads = _outlines.dome(np.hypot(radius - 3.35, 3.35 * aside), 0.26, 0.18)
-    return -rim - star - beads + _outlines.wall(radius - 4.5)
+    beads = dome(np.hypot(radius - 3.35, 3.35 * aside), 0.26, 0.18)
+    return -rim - figure - beads + wall(radius - 4.5)
 
 
 def _brick(x: FloatArray, y: FloatArray) -> FloatArray:
     pitch, stud = 4.0, 1.2
     studs = np.hypot(np.abs(x) - 0.5 * pitch, np.abs(y) - 0.5 * pitch) - stud
-    return -_outlines.raised(studs, 0.9) + _outlines.wall(_outlines.rectangle(x, y, 8.0, 8.0))
+    return -raised(studs, 0.9) + wall(rectangle(x, y, 8.0, 8.0))
 
 
 def _cable(x: FloatArray, y: FloatArray) -> FloatArray:
@@ -65,12 +74,12 @@ def _cable(x: FloatArray, y: FloatArray) -> FloatArray:
         inside = radius**2 - (y - middle) ** 2
         wire = 2.0 * radius + height - np.sqrt(np.maximum(inside, 0.0))
         lowest = np.where(inside > 0.0, np.minimum(lowest, wire), lowest)
-    return lowest + _outlines.wall(np.abs(x) - 4.0)
+    return lowest + wall(np.abs(x) - 4.0)
 
 
 def _wedge(x: FloatArray, y: FloatArray) -> FloatArray:
     flanks = np.maximum(-np.tan(np.radians(20.0)) * x, np.tan(np.radians(35.0)) * x)
-    return flanks + _outlines.wall(np.abs(y) - 3.0)
+    return flanks + wall(np.abs(y) - 3.0)
 
 
 _LETTERS: list[tuple[float, list[list[tuple[float, float]]]]] = [
@@ -102,23 +111,21 @@ def _letters(x: FloatArray, y: FloatArray) -> FloatArray:
     ]
     # The letters read correctly from the back of the object, so they are mirrored on its face, like
     # a printer's types.
-    return -_outlines.raised(_outlines.strokes(x, y, lines) - 0.2, 0.5) + _outlines.wall(
-        _outlines.rectangle(x, y, 7.8, 3.4)
-    )
+    return -raised(strokes(x, y, lines) - 0.2, 0.5) + wall(rectangle(x, y, 7.8, 3.4))
 
 
 def _nut(x: FloatArray, y: FloatArray) -> FloatArray:
     radius = np.hypot(x, y)
     chamfer = np.tan(np.radians(30.0)) * np.maximum(radius - 2.65, 0.0)
-    hole = np.maximum(1.75 - radius, 0.0) + _outlines.wall(1.5 - radius)
-    return np.maximum(chamfer, hole) + _outlines.wall(_outlines.hexagon(x, y, 5.5))
+    hole = np.maximum(1.75 - radius, 0.0) + wall(1.5 - radius)
+    return np.maximum(chamfer, hole) + wall(hexagon(x, y, 5.5))
 
 
 def _weave(x: FloatArray, y: FloatArray) -> FloatArray:
     pitch = 1.3
     threads = np.sin(np.pi * x / pitch) ** 2 * np.cos(np.pi * y / pitch) ** 2
     threads += np.cos(np.pi * x / pitch) ** 2 * np.sin(np.pi * y / pitch) ** 2
-    return -0.35 * threads + _outlines.wall(_outlines.disc(x, y, 3.5))
+    return -0.35 * threads + wall(disc(x, y, 3.5))
 
 
 def _key(x: FloatArray, y: FloatArray) -> FloatArray:
@@ -126,7 +133,7 @@ def _key(x: FloatArray, y: FloatArray) -> FloatArray:
     for middle, depth in zip((-3.2, -1.6, 0.0, 1.6, 3.2), (0.35, 0.8, 0.5, 0.95, 0.2), strict=True):
         cut = depth - np.maximum(np.abs(x - middle) - 0.25, 0.0)  # flanks of 45 degrees
         edge = np.maximum(edge, cut)
-    return edge + _outlines.wall(_outlines.rectangle(x, y, 8.4, 2.0))
+    return edge + wall(rectangle(x, y, 8.4, 2.0))
 
 
 def _bean(x: FloatArray, y: FloatArray) -> FloatArray:
@@ -141,8 +148,8 @@ def _braille(x: FloatArray, y: FloatArray) -> FloatArray:
     dots = np.zeros(x.shape)
     for column, row in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 0)):
         away = np.hypot(x - (column - 0.5) * pitch, y - (row - 1.0) * pitch)
-        dots = np.maximum(dots, _outlines.dome(away, 0.75, 0.48))
-    return -dots + _outlines.wall(_outlines.rectangle(x, y, 5.0, 7.4))
+        dots = np.maximum(dots, dome(away, 0.75, 0.48))
+    return -dots + wall(rectangle(x, y, 5.0, 7.4))
 
 
 OBJECTS: dict[str, Relief] = {

@@ -16,8 +16,8 @@ from optisense.design.arrangement import COINCIDENCE_TOLERANCE
 from optisense.design.part_faces import finished_faces
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
-from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import cut, find_coincident
+from optisense.geometry.mesh_points import Anchors, anchored
 from optisense.optics.scene._solids import Interface, Sheet, Solid
 from optisense.optics.scene.media import same_faces
 

@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from optisense.design.arrangement import COINCIDENCE_TOLERANCE, EQUAL_INDEX
 from optisense.errors import DesignError, MeshError
-from optisense.geometry.anchors import Anchors, anchored
 from optisense.geometry.coincidence import Overlay, boxes_overlap, cut, find_coincident
-from optisense.geometry.common_space import as_manifold, of_manifold, thick_place
 from optisense.geometry.connected import connected_components
 from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.mesh_points import Anchors, anchored
+from optisense.geometry.solids import as_manifold, of_manifold, thick_place
 from optisense.optics.scene._solids import AROUND, Interface, Sheet, Solid
 
 CUT_CLEARANCE = 2e-5

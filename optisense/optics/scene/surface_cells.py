@@ -13,7 +13,7 @@ from scipy.ndimage import distance_transform_edt
 from scipy.spatial import cKDTree
 
 from optisense.array_types import FloatingArray
-from optisense.geometry.surface_samples import surface_samples
+from optisense.geometry.mesh_points import surface_samples
 from optisense.optics.backend.arrays import floats, indices
 from optisense.optics.scene.ray_scene import Piece
 from optisense.optics.scene.surfaces import Region

@@ -15,8 +15,8 @@ from optisense.design import Role, SensorDesign
 from optisense.design.material_checks import is_gas
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import find_coincident
+from optisense.geometry.mesh_points import closest_points
 from optisense.geometry.overlaps import CONTACT, near_surface
-from optisense.geometry.surface import closest_points
 from optisense.search.space.constraints import same_shape
 from optisense.sensors.light_checks import FLUSH, windows_in
 

@@ -12,9 +12,9 @@ from optisense.design.check import solids_beside
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import cut, find_coincident
-from optisense.geometry.common_space import as_manifold
 from optisense.geometry.joining import EXACT, join, touching_area
 from optisense.geometry.overlaps import find_overlap
+from optisense.geometry.solids import as_manifold
 from optisense.sensors.from_meshes.recipe import Recipe
 
 WIDE_GAP = 0.5
@@ -190,7 +190,7 @@ def refuse_contact_with_lamps(
     Raises:
         DesignError: a light or camera lies in a face.
     """
-    from optisense.geometry.surface import closest_points
+    from optisense.geometry.mesh_points import closest_points
 
     for label, place in places:
         for name, mesh in meshes.items():

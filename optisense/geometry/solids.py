@@ -1,0 +1,158 @@
+"""Closed meshes as solids: the space that two share, what one leaves of another, and bodies."""
+
+from __future__ import annotations
+
+import weakref
+from typing import Any
+
+import numpy as np
+
+from optisense.array_types import FloatArray
+from optisense.geometry.coincidence import boxes_overlap
+from optisense.geometry.containment import inside
+from optisense.geometry.mesh import TriangleMesh
+from optisense.geometry.overlaps import CONTACT, find_overlap
+from optisense.geometry.patches import patches
+
+Places = weakref.WeakKeyDictionary[TriangleMesh, FloatArray | None]
+Rests = weakref.WeakKeyDictionary[TriangleMesh, TriangleMesh | None]
+
+_places: weakref.WeakKeyDictionary[TriangleMesh, Places] = weakref.WeakKeyDictionary()
+_rests: weakref.WeakKeyDictionary[TriangleMesh, Rests] = weakref.WeakKeyDictionary()
+
+
+def common_space(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
+    """Return the middle of a space that two solids share; cached for the next call with the same
+    solids.
+
+    Facets of two parts that touch overlap slightly. A common space counts if its mean thickness,
+    twice its volume over its surface, is larger than `CONTACT`.
+
+    Args:
+        first, second: closed meshes, mm.
+
+    Returns:
+        The middle (3,), mm; None if they share no space, or if a mesh is not a valid volume.
+    """
+    beside = _places.setdefault(first, weakref.WeakKeyDictionary())
+    if second not in beside:
+        beside[second] = _found(first, second)
+    return beside[second]
+
+
+def _found(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
+    if find_overlap(first, second) is None:
+        return None
+    return thick_place(as_manifold(first) ^ as_manifold(second), CONTACT)
+
+
+def thick_place(common: Any, thinnest: float) -> FloatArray | None:
+    """Return the middle of a piece of a common space that is thicker than a contact.
+
+    Args:
+        common: the common space, a manifold3d object.
+        thinnest: smallest mean thickness (twice the volume over the surface), mm.
+
+    Returns:
+        The middle (3,), mm; None if all pieces are thinner.
+    """
+    for piece in common.decompose():
+        if 2.0 * piece.volume() > thinnest * piece.surface_area():
+            box = np.array(piece.bounding_box(), dtype=np.float64)
+            return 0.5 * (box[:3] + box[3:])
+    return None
+
+
+def as_manifold(mesh: TriangleMesh) -> Any:
+    """Return a mesh as a manifold3d object; empty with a status if it is not a valid volume."""
+    import manifold3d
+
+    welded = mesh.welded()
+    # manifold3d refuses arrays that are read-only, so both are copies.
+    vertices = welded.vertices.copy()
+    faces = welded.faces.astype(np.uint64)
+    return manifold3d.Manifold(manifold3d.Mesh64(vertices, faces))
+
+
+def of_manifold(solid: Any) -> TriangleMesh:
+    """Return a manifold3d object as a mesh."""
+    mesh = solid.to_mesh64()
+    return TriangleMesh(np.asarray(mesh.vert_properties)[:, :3], np.asarray(mesh.tri_verts))
+
+
+def without(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh:
+    """Return a solid without the space that it shares with another one, or the solid itself if they
+    share none or nothing would be left; cached for the next call with the same solids.
+
+    Unlike `common_space`, this also finds solids that share space without crossing each other's
+    surfaces, as those with sides in one plane. Bodies of one solid may overlap.
+
+    Args:
+        first, second: closed meshes, mm.
+    """
+    beside = _rests.setdefault(first, weakref.WeakKeyDictionary())
+    if second not in beside:
+        beside[second] = _carved(first, second)
+    rest = beside[second]
+    return first if rest is None else rest
+
+
+def _carved(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh | None:
+    if ((first.bounds[0] >= second.bounds[1]) | (first.bounds[1] <= second.bounds[0])).any():
+        return None
+    if thick_place(as_manifold(first) ^ as_manifold(second), CONTACT) is None:
+        return None
+    # A difference of solids that overlap themselves counts the space of two bodies twice.
+    rest = as_manifold(united(first)) - as_manifold(united(second))
+    return None if rest.is_empty() else of_manifold(rest)
+
+
+def bodies(mesh: TriangleMesh) -> list[list[TriangleMesh]]:
+    """Return the bodies of a closed mesh: for each its outside first, then its cavities.
+
+    A cavity's normals point inward, so that its volume is subtracted from its body's; it belongs to
+    the smallest body that contains all of it. Where its corners touch the outside of its body, this
+    is the smallest one that contains the most of its vertices.
+    """
+    everything = np.arange(len(mesh.faces))
+    pieces = [mesh.with_faces(mesh.faces[faces]).compacted() for faces in patches(mesh, everything)]
+    return _grouped(pieces)
+
+
+def _grouped(pieces: list[TriangleMesh]) -> list[list[TriangleMesh]]:
+    """Return the bodies of closed pieces of a surface; see `bodies`."""
+    found = [[piece] for piece in sorted(pieces, key=lambda p: p.volume) if piece.volume > 0.0]
+    for cavity in (piece for piece in pieces if piece.volume <= 0.0):
+        contained = [int(inside(cavity.vertices, body[0]).sum()) for body in found]
+        if any(contained):
+            found[int(np.argmax(contained))].append(cavity)
+    return found
+
+
+def united(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a closed mesh in which bodies that share space are one body.
+
+    Bodies that only touch stay apart. The mesh itself is returned if none share space.
+
+    Args:
+        mesh: closed mesh whose bodies have outward normals, mm.
+    """
+    # Other than patches, pieces of a manifold are apart where bodies meet in an edge.
+    pieces = [of_manifold(piece) for piece in as_manifold(mesh).decompose()]
+    found = [TriangleMesh.joined(body) for body in _grouped(pieces)]
+    pairs = [(one, other) for k, one in enumerate(found) for other in found[:k]]
+    if not any(boxes_overlap(one, other, CONTACT) for one, other in pairs):
+        return mesh
+    solids = [as_manifold(body) for body in found]
+    apart: list[Any] = []
+    for solid in solids:
+        others, apart = apart, []
+        for other in others:
+            if thick_place(solid ^ other, CONTACT) is None:
+                apart.append(other)
+            else:
+                solid += other
+        apart.append(solid)
+    if len(apart) == len(solids):
+        return mesh
+    return TriangleMesh.joined([of_manifold(solid) for solid in apart]).welded()
