@@ -97,6 +97,26 @@ class ImagingModel(Model):
         return values
 
 
+def check_projection(projection: str, fov: float, distortion: LensDistortion | None) -> None:
+    """Refuse a field of view and a distortion that do not suit the projection of a lens.
+
+    Raises:
+        InconsistentValueError: a perspective lens sees 180 degrees (`fov`) or more, or the
+            distortion is for another projection.
+    """
+    if projection == "perspective" and fov >= 180.0:
+        raise InconsistentValueError(
+            "a perspective camera sees less than 180 degrees", ("fov",), "Use equidistant"
+        )
+    if distortion is not None and distortion.projection != projection:
+        raise InconsistentValueError(
+            f"a lens distortion of kind '{distortion.kind}' is for {distortion.projection} lenses, "
+            f"but this lens is {projection}",
+            ("distortion", "kind"),
+            f"Use 'projection: {distortion.projection}', or another kind of distortion",
+        )
+
+
 class Viewpoint(Model):
     """Position and orientation of a camera, and the size of its picture."""
 
@@ -157,19 +177,11 @@ class Camera(ImagingModel, Viewpoint):
 
     @model_validator(mode="after")
     def _check_consistent(self) -> Camera:
-        if self.projection == "perspective" and self.fov >= 180.0:
-            raise ValueError("a perspective camera sees less than 180 degrees; use equidistant")
+        check_projection(self.projection, self.fov, self.distortion)
         direction, up = np.array(self.direction), np.array(self.up)
         across = np.linalg.norm(np.cross(direction, up))
         if across < 1e-6 * np.linalg.norm(direction) * np.linalg.norm(up):
             raise ValueError("direction and up are parallel; up must point to the picture's top")
-        if self.distortion is not None and self.distortion.projection != self.projection:
-            raise InconsistentValueError(
-                f"a lens distortion of kind '{self.distortion.kind}' is for "
-                f"{self.distortion.projection} lenses, but this lens is {self.projection}",
-                ("distortion", "kind"),
-                f"Use 'projection: {self.distortion.projection}', or another kind of distortion",
-            )
         return self
 
     def size_at(self, width: int, shape: tuple[int, int] | None = None) -> tuple[int, int]:

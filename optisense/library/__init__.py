@@ -1,6 +1,14 @@
 """Materials, coatings, lights and cameras that designs can name, each number with its source."""
 
 from optisense.design.materials import flake_lobe, specularity_to_roughness
+from optisense.library._designs import (
+    OVERDRIVEN,
+    typical_colour,
+    unused_imaging,
+    unusual_fluxes,
+    with_imaging,
+    with_own_lights,
+)
 from optisense.library._entries import (
     AnyEntry,
     CameraModel,
@@ -9,9 +17,6 @@ from optisense.library._entries import (
     Source,
     TypicalLight,
 )
-from optisense.library._imaging import unused_imaging, with_imaging
-from optisense.library._portable import with_own_lights
-from optisense.library._typical import OVERDRIVEN, typical_colour, unusual_fluxes
 from optisense.library.adding import Added, add_file, add_ies, add_tuning, parse_colour
 from optisense.library.loader import (
     camera,

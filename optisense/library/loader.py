@@ -14,7 +14,7 @@ from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.library._entries import AnyEntry, CameraModel
 from optisense.library.own_parts import own_files
-from optisense.library.reading import KINDS, Kind, inside, make_entry, read_entry
+from optisense.library.reading import KINDS, Kind, make_entry, read_entry
 from optisense.near import suggestion
 
 FOLDER = Path(__file__).parent
@@ -146,7 +146,8 @@ def _built_in(kind: Kind) -> dict[str, AnyEntry]:
         return {file.stem: read_entry(kind, file) for file in files}
     file = FOLDER / f"{kind}s.yaml"
     data, lines = read_yaml(file, LibraryError)
-    return {
-        name: make_entry(kind, name, value, inside(lines, name), str(file))
-        for name, value in data.items()
-    }
+    entries = {}
+    for name, value in data.items():
+        own = {path[1:]: line for path, line in lines.items() if path[:1] == (name,)}
+        entries[name] = make_entry(kind, name, value, own, str(file))
+    return entries

@@ -12,7 +12,7 @@ from optisense.design.fields import Model
 from optisense.design.kinds import KindModel
 from optisense.design.materials import CoatingModel, Material
 from optisense.design.problems import design_error
-from optisense.design.yaml_reader import Lines, Steps, read_yaml
+from optisense.design.yaml_reader import Lines, read_yaml
 from optisense.errors import LibraryError
 from optisense.library._entries import (
     AnyEntry,
@@ -72,15 +72,6 @@ def make_entry(kind: Kind, name: str, data: Any, lines: Lines, source: str) -> A
         found = design_error(error, data, where=source, lines=lines, model=KINDS[kind])
         message = f"{kind} '{name}': {found.message}"
         raise LibraryError(message, where=found.where, hint=found.hint) from None
-
-
-def inside(lines: Lines, key: str) -> Lines:
-    """Return the lines of values under a key, by their paths from there."""
-    rest: dict[Steps, int] = {}
-    for path, line in lines.items():
-        if path[:1] == (key,):
-            rest[path[1:]] = line
-    return rest
 
 
 def kind_of(data: dict[str, Any]) -> Kind | None:
