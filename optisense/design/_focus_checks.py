@@ -9,8 +9,7 @@ from optisense.design.arrangement import skin_distances, straight_rays
 from optisense.design.lenses.blur import DISC_DEVIATION
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
-from optisense.design.sensor_design import SensorDesign
-from optisense.geometry import TriangleMesh
+from optisense.design.sensor_design import Meshes, SensorDesign
 from optisense.geometry.containment import inside
 from optisense.geometry.rays import ray_hits
 
@@ -21,16 +20,13 @@ pixels wide has a standard deviation of half a pixel, little more than that of a
 """
 
 
-def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
+def focus_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Return a warning if the sensing surface is out of focus.
 
     Cameras whose blur does not depend on depth are not checked.
     Gel and other solids on the way make objects appear nearer: the apparent thickness of a layer is
     its thickness divided by its index. Rays are not refracted here, so this is only a warning.
     Designs with mirrors are not checked.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
     """
     camera = design.camera
     if camera.blur is None or not camera.blur.by_depth or design.parts_of(Role.MIRROR):
@@ -58,14 +54,11 @@ def focus_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
     ]
 
 
-def apparent_distances(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> FloatArray:
+def apparent_distances(design: SensorDesign, meshes: Meshes) -> FloatArray:
     """Return the apparent distances of the sensing surface along straight rays.
 
     Distances are measured along the axis for perspective lenses, whose field of focus is flat, and
     along the ray for others.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
 
     Returns:
         Distances (k,), mm, of the rays that meet the surface before any blocker.
@@ -85,7 +78,7 @@ def apparent_distances(design: SensorDesign, meshes: dict[str, TriangleMesh]) ->
 
 def _reduced(
     design: SensorDesign,
-    meshes: dict[str, TriangleMesh],
+    meshes: Meshes,
     origin: FloatArray,
     rays: FloatArray,
     length: FloatArray,
@@ -93,7 +86,6 @@ def _reduced(
     """Return the apparent lengths (k,) of rays, mm: each piece is divided by its medium's index.
 
     Args:
-        meshes: deformed meshes, mm, by part.
         origin: start (3,) of all rays, mm.
         rays: unit directions (k, 3).
         length: geometric lengths (k,), mm.

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from optisense.design.yaml_reader import LOADER, Lines, Steps, parse_yaml
+from optisense.design.fields import Steps
+from optisense.design.yaml_reader import LOADER, Lines, parse_yaml
 
 _COMMENT = re.compile(r"#[^\r\n]*")
 

@@ -8,11 +8,12 @@ Grammar: names and list indices, as in `coating.specularity`, `lights.red.flux`,
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pydantic import BaseModel
 
+from optisense.design.fields import Steps
 from optisense.design.lights import of_model
 from optisense.design.sensor_design import SensorDesign, dotted, refuse_no_design, same_mesh
 from optisense.errors import DesignError
@@ -21,8 +22,6 @@ from optisense.near import suggestion
 _STEP = re.compile(r"(?:^|\.)(?P<name>[A-Za-z0-9_][A-Za-z0-9_-]*)|\[(?P<index>\d{1,9})\]")
 _LETTERS = {"x": 0, "y": 1, "z": 2, "r": 0, "g": 1, "b": 2}
 """Index of a coordinate or colour channel, by the letter that may stand for it in a path."""
-
-Steps = tuple[str | int, ...]
 
 
 def get_value(design: SensorDesign, path: str) -> Any:
@@ -33,8 +32,9 @@ def get_value(design: SensorDesign, path: str) -> Any:
     """
     refuse_no_design(design)
     value: Any = design
-    for done, step in _walk(path):
-        value = _child(value, step, path, done)
+    steps = parse_path(path)
+    for count, step in enumerate(steps):
+        value = _child(value, step, path, steps[:count])
     return value
 
 
@@ -127,12 +127,6 @@ def parse_path(path: str) -> Steps:
             hint="Write it like lights.red.flux or cages.skin.points[13].z",
         )
     return tuple(steps)
-
-
-def _walk(path: str) -> Iterator[tuple[Steps, str | int]]:
-    steps = parse_path(path)
-    for count, step in enumerate(steps):
-        yield steps[:count], step
 
 
 def _child(value: Any, step: str | int, path: str, done: Steps) -> Any:

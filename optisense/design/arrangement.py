@@ -1,5 +1,5 @@
-"""Checks of the arrangement: solids that overlap or leave a film of air, and the picture along
-straight rays.
+"""The arrangement of parts: overlaps and films of air between solids, what solids of higher
+priority leave of others, and the picture along straight rays.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from optisense.design.material_checks import is_gas
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.projection import directions, picture_places, within_view
-from optisense.design.sensor_design import SensorDesign
+from optisense.design.sensor_design import Meshes, SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coincidence import sample_seam
 from optisense.geometry.containment import inside
 from optisense.geometry.rays import ray_hits
-from optisense.geometry.solids import common_space
+from optisense.geometry.solids import common_space, without
 
 EQUAL_INDEX = 1e-6
 """Largest difference of refractive indices for which solids count as one medium; it covers rounding
@@ -67,12 +67,8 @@ def may_overlap(design: SensorDesign, name: str, other: str) -> bool:
     return solid and (parts[0].priority != parts[1].priority or one_medium(design, name, other))
 
 
-def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
-    """Return problems of solids of different index that overlap without a priority between them.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
-    """
+def overlaps(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
+    """Return problems of solids of different index that overlap without a priority between them."""
     problems: list[Diagnostic] = []
     solids = [n for n in meshes if design.parts[n].role in TRANSPARENT_SOLIDS]
     for name, other in combinations(solids, 2):
@@ -93,12 +89,9 @@ def overlaps(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diag
     return problems
 
 
-def films(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
+def films(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Return warnings about solids that touch over a part of a common face and leave a film of air
     over the rest, as two tessellations of one curved face do.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
     """
     problems = []
     solids = {n: mesh for n, mesh in meshes.items() if design.parts[n].role in TRANSPARENT_SOLIDS}
@@ -149,7 +142,7 @@ def straight_rays(camera: Camera) -> NDArray[np.float64]:
 
 
 def skin_distances(
-    design: SensorDesign, meshes: dict[str, TriangleMesh], rays: NDArray[np.float64]
+    design: SensorDesign, meshes: Meshes, rays: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the distances (k,), mm, at which rays (k, 3) from the camera meet the sensing surface;
     infinite if they miss it, or meet a blocker or the outside of its coating first.
@@ -166,3 +159,19 @@ def skin_distances(
         np.minimum.at(skin, hits.ray[inside], hits.distance[inside])
         np.minimum.at(blocker, hits.ray[~inside], hits.distance[~inside])
     return np.where(skin < blocker, skin, np.inf)
+
+
+def carved(design: SensorDesign, meshes: Meshes, name: str) -> TriangleMesh:
+    """Return the mesh of a transparent solid without its overlaps with those of higher priority.
+
+    It is the mesh itself if there are none, as where parts only touch.
+    """
+    mesh = meshes[name]
+    for other, part in design.parts.items():
+        if (
+            part.role in TRANSPARENT_SOLIDS
+            and part.priority > design.parts[name].priority
+            and other in meshes
+        ):
+            mesh = without(mesh, meshes[other])
+    return mesh

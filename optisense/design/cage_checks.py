@@ -11,7 +11,7 @@ from optisense.design.arrangement import may_overlap, one_medium
 from optisense.design.cage import Cage
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
-from optisense.design.sensor_design import SensorDesign
+from optisense.design.sensor_design import Meshes, SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.cage import cage_weights
 from optisense.geometry.containment import inside
@@ -21,7 +21,6 @@ from optisense.geometry.overlaps import (
     CONTACT,
     find_overlap,
     near_surface,
-    touching,
     touching_vertices,
 )
 from optisense.geometry.rays import ray_hits
@@ -51,7 +50,6 @@ FOLDS = {
     "through itself": "is bent through itself by cage '{cage}' near {place}",
 }
 
-Meshes = dict[str, TriangleMesh]
 Overlap = Literal["no", "odd", "yes"]
 
 
@@ -133,9 +131,6 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
 
     The same holds for the solid without the surface: deforming one of them tears the two apart.
     Cages that have moved are left to `cage_problems`.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
     """
     solids = [name for name in meshes if design.parts[name].role in TRANSPARENT_SOLIDS]
     problems: list[Diagnostic] = []
@@ -163,9 +158,6 @@ def half_caged(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
 def left_lights(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Return warnings about lights that stay in place while a cage moves parts away from them or
     across them, one for each cage and group.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
     """
     problems: list[Diagnostic] = []
     moved, bent = _moved_cages(design, meshes)
@@ -267,13 +259,15 @@ def _coarse(
     design: SensorDesign, cage_name: str, name: str, bent: TriangleMesh
 ) -> list[Diagnostic]:
     cage = design.cages[cage_name]
-    off = chord_error(design.meshes[name], bent, cage.box, cage.resolution, cage.current_points())
-    if off.distance <= COARSE:
+    distance, place = chord_error(
+        design.meshes[name], bent, cage.box, cage.resolution, cage.current_points()
+    )
+    if distance <= COARSE:
         return []
     return [
         Diagnostic(
             f"part '{name}' has too large triangles to follow cage '{cage_name}': near "
-            f"{_text(off.place)} it is {off.distance:.2g} mm off the shape that the cage gives",
+            f"{_text(place)} it is {distance:.2g} mm off the shape that the cage gives",
             design.where("parts", name, "mesh"),
             "Give the part a finer mesh (Subdivide in Blender, cut_every: 1 in a recipe): only "
             "vertices are bent, and between them it stays straight",
@@ -317,7 +311,7 @@ def _partings(
     rows = touching_vertices(mesh, rest)
     if bent[other] is rest:
         rows = rows[change[rows] > CONTACT]
-    off = rows[np.isinf(touching(bent[name], rows, bent[other]))]
+    off = rows[np.isinf(near_surface(bent[name].vertices[rows], bent[other]))]
     if len(off) == 0:
         return []
     worst = int(off[np.argmax(change[off])])

@@ -16,7 +16,7 @@ from optisense.design.camera import Camera
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic
 from optisense.design.projection import angle_across, folding_angle
-from optisense.design.sensor_design import SensorDesign
+from optisense.design.sensor_design import Meshes, SensorDesign
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.geometry.mesh_points import distance_within, surface_samples
@@ -121,15 +121,12 @@ def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
     ]
 
 
-def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
+def place_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Return the problem of a camera whose lens is inside a transparent solid or another part.
 
     Cameras inside opaque solids are found together with the lights. A camera that is cast into a
     solid needs a cavity in it: a sphere about the pupil bends no ray, as the lens is made for that
     medium.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
     """
     position = np.array(design.camera.position)
     at = "({:g}, {:g}, {:g})".format(*design.camera.position)
@@ -159,12 +156,8 @@ def place_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> lis
     return []
 
 
-def camera_fault(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> Diagnostic | None:
-    """Return the first reason why the camera can't exist, or None.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
-    """
+def camera_fault(design: SensorDesign, meshes: Meshes) -> Diagnostic | None:
+    """Return the first reason why the camera can't exist, or None."""
     found = lens_problems(design.camera, design.where("camera", "fov"))
     found = found or uniqueness_problems(design)
     found = found or place_problems(design, meshes)
@@ -190,14 +183,11 @@ class ViewShares(NamedTuple):
     hidden: dict[str, float]
 
 
-def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
+def view_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Return a warning if too little of the sensing surface is in the camera's straight view.
 
     Refraction is ignored, so this is only a warning; scores use refracted rays. Designs with
     mirrors are not checked.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
     """
     shares = view_shares(design, meshes)
     if shares is None:
@@ -247,11 +237,8 @@ def view_problems(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list
     return [_small(f"{100 * shares.skin:.0f} % of the sensing surface is in the picture", where)]
 
 
-def view_shares(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> ViewShares | None:
+def view_shares(design: SensorDesign, meshes: Meshes) -> ViewShares | None:
     """Return the shares of the camera's view along straight rays.
-
-    Args:
-        meshes: deformed meshes, mm, by part.
 
     Returns:
         The shares; None if there is no sensing surface, or a mirror.

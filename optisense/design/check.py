@@ -22,13 +22,11 @@ from optisense.design.material_checks import absorption_problems, index_problems
 from optisense.design.part_faces import finished_faces
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
 from optisense.design.problems import Diagnostic, invalid_values, kind_problems
-from optisense.design.sensor_design import SensorDesign
+from optisense.design.sensor_design import Meshes, SensorDesign
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.containment import inside
 from optisense.near import suggestion
-
-__all__ = ["check_design", "inside"]
 
 OPAQUE_ROLES = frozenset({Role.BLOCKER, Role.MIRROR, Role.INDENTER})
 
@@ -67,7 +65,7 @@ def check_design(
     problems = invalid_values(design)
     if problems:  # the other checks rely on valid values
         return problems
-    meshes: dict[str, TriangleMesh] = {}
+    meshes: Meshes = {}
     for name in design.parts:
         problems += _check_mesh(design, name, meshes)
     problems += unit_slips(design, meshes)
@@ -103,9 +101,7 @@ def check_design(
     return problems
 
 
-def _check_mesh(
-    design: SensorDesign, name: str, meshes: dict[str, TriangleMesh]
-) -> list[Diagnostic]:
+def _check_mesh(design: SensorDesign, name: str, meshes: Meshes) -> list[Diagnostic]:
     """Put the part's mesh into `meshes` unless it has a problem."""
     part = design.parts[name]
     place = design.where("parts", name, "mesh")
@@ -173,7 +169,7 @@ def unknown_light_hint(model: str, light_names: Collection[str]) -> str:
     )
 
 
-def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[Diagnostic]:
+def _check_poses(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Check that no light and no camera is inside an opaque solid."""
     opaque = {
         name: mesh
@@ -200,9 +196,7 @@ def _check_poses(design: SensorDesign, meshes: dict[str, TriangleMesh]) -> list[
     return problems
 
 
-def _check_sensing_surfaces(
-    design: SensorDesign, meshes: dict[str, TriangleMesh]
-) -> list[Diagnostic]:
+def _check_sensing_surfaces(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Check that normals of a sensing surface point into the medium behind it."""
     solids = [mesh for n, mesh in meshes.items() if design.parts[n].role in TRANSPARENT_SOLIDS]
     problems: list[Diagnostic] = []

@@ -1,4 +1,4 @@
-"""Named colours, and the sRGB transfer curve (IEC 61966-2-1)."""
+"""Named colours, colours of parts in drawings, and the sRGB transfer curve (IEC 61966-2-1)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,17 @@ NAMED_COLOURS = {
     "white": (1.0, 1.0, 1.0),
 }
 """R, G and B of the named colours."""
+
+ROLE_LOOKS: dict[str, tuple[str, float]] = {
+    "sensing_surface": ("#8d99a6", 0.55),
+    "elastomer": ("#f2a65a", 0.28),
+    "support": ("#6fb7e9", 0.24),
+    "mirror": ("#cfd8e3", 0.75),
+    "blocker": ("#3b3f46", 1.0),
+    "interface": ("#b7a6f2", 0.3),
+    "indenter": ("#b9a44c", 1.0),
+}
+"""Colour and opacity (0 to 1) of each role: transparent parts show what is behind them."""
 
 WAVELENGTHS = 200.0, 2000.0
 """Range of dominant wavelengths of lights, nm: from the shortest of LEDs to beyond what sensors of

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from optisense.design import SensorDesign
+from optisense.design.fields import Steps
 from optisense.design.sensor_design import dotted
 from optisense.geometry import TriangleMesh
 
@@ -102,7 +103,7 @@ def listed(changed: list[str]) -> str:
     return shown + (f"\n  and {more} more" if more > 0 else "")
 
 
-def _compare(old: Any, new: Any, path: tuple[str | int, ...], found: list[str]) -> None:
+def _compare(old: Any, new: Any, path: Steps, found: list[str]) -> None:
     if isinstance(old, dict) and isinstance(new, dict):
         for key in [*old, *(key for key in new if key not in old)]:
             if key not in new:

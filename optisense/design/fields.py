@@ -17,6 +17,9 @@ from pydantic_core import CoreSchema
 
 from optisense.errors import DesignError
 
+Steps = tuple[str | int, ...]
+"""Path of a value in a design: keys and indices."""
+
 LARGEST_NUMBER = 1e12
 """Largest magnitude of a number in a design, in any unit. No meaningful number comes near, and its
 cube is still far from the largest floating-point number.
@@ -142,7 +145,7 @@ class InconsistentValueError(ValueError):
         hint: remedy.
     """
 
-    def __init__(self, message: str, path: tuple[str | int, ...], hint: str | None = None) -> None:
+    def __init__(self, message: str, path: Steps, hint: str | None = None) -> None:
         super().__init__(message)
         self.path = path
         self.hint = hint

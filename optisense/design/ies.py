@@ -102,7 +102,10 @@ def parse_ies(text: str, source: str) -> IesProfile:
     candela = values.array("intensities", n_vertical * n_horizontal)
     values.expect_end()
 
-    _check_vertical(vertical, values)
+    if (np.diff(vertical) <= 0.0).any():
+        values.fail("vertical angles must ascend")
+    if vertical[0] not in (0.0, 90.0) or vertical[-1] not in (90.0, 180.0):
+        values.fail("vertical angles of type C run over 0-90, 90-180 or 0-180 degrees")
     scale = multiplier * ballast * tilt
     if not np.isfinite(scale) or scale <= 0.0:
         values.fail("multiplier and ballast factor must be above 0")
@@ -212,13 +215,6 @@ def _tilt_factor(tilt: str, values: _Values, line: int, source: str) -> float:
     return float(np.interp(0.0, angles, factors))
 
 
-def _check_vertical(vertical: FloatArray, values: _Values) -> None:
-    if (np.diff(vertical) <= 0.0).any():
-        values.fail("vertical angles must ascend")
-    if vertical[0] not in (0.0, 90.0) or vertical[-1] not in (90.0, 180.0):
-        values.fail("vertical angles of type C run over 0-90, 90-180 or 0-180 degrees")
-
-
 def _expanded(
     horizontal: FloatArray, table: FloatArray, values: _Values
 ) -> tuple[FloatArray, FloatArray]:
@@ -233,7 +229,7 @@ def _expanded(
         # Angles are now 90..450: move the part beyond 360 to the front.
         turned = horizontal >= 360.0
         kept = (horizontal <= 360.0) & (horizontal > 90.0)
-        first_row = _row_at(360.0, horizontal, table)
+        first_row = np.array([np.interp(360.0, horizontal, column) for column in table.T])
         angles = np.concatenate([horizontal[turned] - 360.0, horizontal[kept]])
         rows = np.concatenate([table[turned], table[kept]])
         return _with_ends(angles, rows, first_row)
@@ -254,10 +250,6 @@ def _mirrored(
 ) -> tuple[FloatArray, FloatArray]:
     angles = np.concatenate([horizontal, 2.0 * at - horizontal[-2::-1]])
     return angles, np.concatenate([table, table[-2::-1]])
-
-
-def _row_at(angle: float, horizontal: FloatArray, table: FloatArray) -> FloatArray:
-    return np.array([np.interp(angle, horizontal, column) for column in table.T])
 
 
 def _with_ends(

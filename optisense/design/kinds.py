@@ -27,10 +27,13 @@ ROUNDING = 1e-6
 
 
 class Limits(NamedTuple):
-    """Limits of a value; see `are_numbers`.
+    """Limits of a number, or of all numbers of an array.
 
     Attributes:
         words: the limits as text.
+        shape: shape of the array; () for a single number.
+        low, high: smallest and largest allowed number.
+        above: number that all must exceed.
     """
 
     words: str
@@ -40,8 +43,15 @@ class Limits(NamedTuple):
     above: float = -math.inf
 
     def allow(self, value: object) -> bool:
-        """Return whether a value is within the limits."""
-        return are_numbers(value, self.shape, self.low, self.high, above=self.above)
+        """Return whether a value is an array of finite numbers, or can become one, within them."""
+        try:
+            array = np.asarray(value)
+        except ValueError:  # rows of different lengths
+            return False
+        if array.shape != self.shape or array.dtype.kind not in "iuf":
+            return False
+        within = (array >= self.low) & (array <= self.high) & (array > self.above)
+        return bool((np.isfinite(array) & within).all())
 
 
 class KindModel(Model):
@@ -252,28 +262,3 @@ def fills(value: object, shape: tuple[int, ...]) -> bool:
         return np.broadcast_shapes(value.shape, shape) == shape
     except ValueError:
         return False
-
-
-def are_numbers(
-    value: object,
-    shape: tuple[int, ...] = (),
-    low: float = -math.inf,
-    high: float = math.inf,
-    *,
-    above: float = -math.inf,
-) -> bool:
-    """Return whether a value is an array of finite numbers, or can become one, within limits.
-
-    Args:
-        shape: shape of the array; () for a single number.
-        low, high: smallest and largest allowed number.
-        above: number that all must exceed.
-    """
-    try:
-        array = np.asarray(value)
-    except ValueError:  # rows of different lengths
-        return False
-    if array.shape != shape or array.dtype.kind not in "iuf":
-        return False
-    within = (array >= low) & (array <= high) & (array > above)
-    return bool((np.isfinite(array) & within).all())

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from optisense.design.fields import Steps
 from optisense.design.problems import Diagnostic
-from optisense.design.sensor_design import SensorDesign
+from optisense.design.sensor_design import Meshes, SensorDesign
 from optisense.errors import DesignError
-from optisense.geometry import TriangleMesh
 
 LARGEST = 1000.0
 """Largest size of a part, and largest distance of a light or camera from the origin, mm; larger
@@ -24,12 +22,8 @@ SMALLEST = 0.5
 """Smallest size of a part in its largest dimension, mm; thin parts are larger in the others."""
 
 
-def unit_slips(design: SensorDesign, meshes: Mapping[str, TriangleMesh]) -> list[Diagnostic]:
-    """Return problems of parts, lights and camera whose sizes or distances suggest another unit.
-
-    Args:
-        meshes: valid meshes of parts, by name.
-    """
+def unit_slips(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
+    """Return problems of parts, lights and camera whose sizes or distances suggest another unit."""
     problems: list[Diagnostic] = []
     for name, mesh in meshes.items():
         place = design.where("parts", name, "mesh")
@@ -98,9 +92,9 @@ def place_slip(position: ArrayLike) -> str | None:
 
 def placed_things(
     design: SensorDesign,
-) -> list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]]:
+) -> list[tuple[str, tuple[float, float, float], Steps]]:
     """Return the camera and all lights: name in words, position (mm) and its path in the design."""
-    found: list[tuple[str, tuple[float, float, float], tuple[str | int, ...]]] = [
+    found: list[tuple[str, tuple[float, float, float], Steps]] = [
         ("the camera", design.camera.position, ("camera", "position"))
     ]
     for name, group in design.lights.items():

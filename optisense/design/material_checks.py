@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
 from optisense.design.materials import Medium
 from optisense.design.parts import TRANSPARENT_SOLIDS, Part, Role
 from optisense.design.problems import Diagnostic
-from optisense.design.sensor_design import SensorDesign
-from optisense.geometry import TriangleMesh
+from optisense.design.sensor_design import Meshes, SensorDesign
 
 MOST_OF_A_GAS = 1.002
 """Largest refractive index of a gas: at atmospheric pressure none has more; air has 1.0003."""
@@ -73,14 +72,9 @@ def index_problems(design: SensorDesign) -> list[Diagnostic]:
     return list(problems.values())
 
 
-def absorption_problems(
-    design: SensorDesign, meshes: Mapping[str, TriangleMesh]
-) -> list[Diagnostic]:
+def absorption_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
     """Return warnings about gels that absorb more than images are accurate for, and transparent
     solids that absorb practically all light, each material once.
-
-    Args:
-        meshes: meshes of the design's parts, mm, by part.
     """
     problems: dict[str, Diagnostic] = {}
     for name, part, material, medium in _solids(design):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from optisense.design.fields import InconsistentValueError
+from optisense.design.fields import InconsistentValueError, Steps
 from optisense.design.materials import Material, kinds_for
 from optisense.design.parts import TRANSPARENT_SOLIDS, FaceFinish, Part, Role
 from optisense.errors import DesignError
@@ -26,7 +26,7 @@ def check_finishes(name: str, part: Part, materials: Mapping[str, Material]) -> 
         InconsistentValueError: the part is no transparent solid, or a paint unknown or transparent.
     """
     for label, finish in (part.faces or {}).items():
-        path: tuple[str | int, ...] = ("parts", name, "faces", label)
+        path: Steps = ("parts", name, "faces", label)
         if part.role is Role.SENSING_SURFACE:
             raise InconsistentValueError(
                 f"part '{name}' is a sensing_surface: it has the coating, and can't be frosted "

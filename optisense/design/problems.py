@@ -8,9 +8,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from optisense.design.fields import InconsistentValueError, Model
+from optisense.design.fields import InconsistentValueError, Model, Steps
 from optisense.design.kinds import KindModel
-from optisense.design.sensor_design import SensorDesign, dotted
+from optisense.design.sensor_design import SensorDesign, dotted, place_of
+from optisense.design.yaml_reader import Lines
 from optisense.errors import DesignError, OptiSenseError
 from optisense.near import near_match, suggestion
 from optisense.text import brief
@@ -25,9 +26,6 @@ of thousands.
 
 NOT_INSTALLED = "It may be a kind of a package that is not installed here"
 """Last sentence of the hint about an unknown kind."""
-
-Path = tuple[str | int, ...]
-Lines = dict[Path, int]
 
 
 @dataclass(frozen=True)
@@ -52,24 +50,27 @@ class Diagnostic:
         return f"{text}. {self.hint}" if self.hint else text
 
 
-def raise_problems(problems: list[Diagnostic], source: str, unseen: int = 0) -> None:
+def raise_problems(problems: list[Diagnostic], source: str) -> None:
     """Raise one DesignError for all problems of severity "error"; return if there are none.
 
     Args:
         source: file, or other source of the problems.
-        unseen: number of further problems.
     """
     errors = [problem for problem in problems if problem.severity == "error"]
-    if not errors:
-        return
+    if errors:
+        raise _in_one(errors, source)
+
+
+def _in_one(errors: list[Diagnostic], source: str, unseen: int = 0) -> DesignError:
+    """Return one DesignError for one or more problems, and for the number of further ones."""
     if len(errors) == 1 and not unseen:
         only = errors[0]
-        raise DesignError(only.message, where=only.where, hint=only.hint)
+        return DesignError(only.message, where=only.where, hint=only.hint)
     shown = "\n".join(f"  {problem}" for problem in errors[:MAX_SHOWN])
     count = len(errors) + unseen
     more = count - min(len(errors), MAX_SHOWN)
     shown += f"\n  and {more} more" if more > 0 else ""
-    raise DesignError(f"{source} has {count} problems:\n{shown}")
+    return DesignError(f"{source} has {count} problems:\n{shown}")
 
 
 def design_error(
@@ -87,13 +88,8 @@ def design_error(
         lines: line of each path in the file, if there is one.
     """
     problems = _problems(error, data, where, lines or {}, model)
-    try:
-        raise_problems(
-            problems, where or "the design", unseen=max(error.error_count() - MAX_EXAMINED, 0)
-        )
-    except DesignError as found:
-        return found
-    raise AssertionError("pydantic reported no problem")  # it always reports one
+    unseen = max(error.error_count() - MAX_EXAMINED, 0)
+    return _in_one(problems, where or "the design", unseen)
 
 
 Model.error_in_words = staticmethod(design_error)
@@ -138,7 +134,7 @@ def _problems(
 ) -> list[Diagnostic]:
     reports = error.errors(include_url=False)[:MAX_EXAMINED]
     found: list[Diagnostic] = []
-    explained: set[Path] = set()  # missing fields that a misspelt one stands for
+    explained: set[Steps] = set()  # missing fields that a misspelt one stands for
     for report in reports:
         if report["type"] == "extra_forbidden":
             path = _path_in(data, report["loc"])
@@ -148,7 +144,7 @@ def _problems(
                 explained.add((*path[:-1], match))
             hint = suggestion(str(path[-1]), fields, limit=20)
             found.append(
-                Diagnostic(f"unknown field '{dotted(path)}'", _place(path, where, lines), hint)
+                Diagnostic(f"unknown field '{dotted(path)}'", place_of(path, where, lines), hint)
             )
     for report in reports:
         kind, location = report["type"], report["loc"]
@@ -159,9 +155,8 @@ def _problems(
         if kind == "missing":
             path = (*path, location[-1])
             if path not in explained:
-                found.append(
-                    Diagnostic(f"'{dotted(path)}' is missing", _place(path, where, lines), "Add it")
-                )
+                place = place_of(path, where, lines)
+                found.append(Diagnostic(f"'{dotted(path)}' is missing", place, "Add it"))
             continue
         if kind in ("union_tag_invalid", "union_tag_not_found"):
             path = (*path, "kind")
@@ -173,12 +168,12 @@ def _problems(
             hint = suggestion(tag, known) if known[0] else None
             if tag and not (hint or "").endswith("?"):
                 hint = ". ".join(filter(None, (hint, NOT_INSTALLED)))
-            found.append(Diagnostic(message, _place(path, where, lines), hint))
+            found.append(Diagnostic(message, place_of(path, where, lines), hint))
             continue
         cause = context.get("error")
         if isinstance(cause, InconsistentValueError):
             path = (*path, *cause.path)
-            found.append(Diagnostic(str(cause), _place(path, where, lines), cause.hint))
+            found.append(Diagnostic(str(cause), place_of(path, where, lines), cause.hint))
             continue
         text = str(cause) if cause is not None else _sentence(report["msg"])
         given = report.get("input")
@@ -189,7 +184,7 @@ def _problems(
             words = str(context.get("expected", "")).replace(" or ", ", ").replace("'", "")
             hint = suggestion(given, words.split(", "))
         named = f"'{dotted(path)}'{shown}: " if path else ""  # no path: the whole value
-        found.append(Diagnostic(f"{named}{text}", _place(path, where, lines), hint))
+        found.append(Diagnostic(f"{named}{text}", place_of(path, where, lines), hint))
     return found
 
 
@@ -204,7 +199,7 @@ def _sentence(message: str) -> str:
     return text
 
 
-def _path_in(data: Any, location: tuple[str | int, ...]) -> Path:
+def _path_in(data: Any, location: Steps) -> Steps:
     """Return the location without the union members and '[key]' marks that pydantic adds to it."""
     path: list[str | int] = []
     for step in location:
@@ -217,18 +212,7 @@ def _path_in(data: Any, location: tuple[str | int, ...]) -> Path:
     return tuple(path)
 
 
-def _place(path: Path, where: str, lines: Lines) -> str:
-    if not lines:
-        return where or dotted(path)
-    for length in range(len(path), -1, -1):
-        if path[:length] in lines:
-            return f"{where}:{lines[path[:length]]}"
-    return where
-
-
-def _fields_at(
-    model: type[BaseModel], location: tuple[str | int, ...], data: Any = None
-) -> list[str]:
+def _fields_at(model: type[BaseModel], location: Steps, data: Any = None) -> list[str]:
     """Return the fields of the model at a location inside `model`, for the given `data`."""
     kind: Any = model
     for step in location:

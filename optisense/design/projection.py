@@ -5,9 +5,6 @@ A position in the picture is given by shares: 0 to 1 across from the left and do
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -145,23 +142,7 @@ def folding_angle(camera: Camera) -> float | None:
     """
     if camera.distortion is None:
         return None
-    data = camera.model_dump_json(include={"fov", "projection", "resolution", "distortion"})
-    return _folding_angle(_Lens(camera, data))
-
-
-@dataclass(frozen=True)
-class _Lens:
-    """Camera that is compared by the values that decide where its lens folds."""
-
-    camera: Camera = field(compare=False)
-    data: str
-
-
-@lru_cache(maxsize=16)
-def _folding_angle(distorted: _Lens) -> float | None:
-    camera = distorted.camera
     lens = camera.distortion
-    assert lens is not None
     along = np.linspace(0.0, 1.0, FOLD_PLACES)
     across, down = np.meshgrid(along, along)
     shown = shown_places(camera, across, down)
@@ -174,22 +155,13 @@ def _folding_angle(distorted: _Lens) -> float | None:
         a, b, c, d = lens.jacobian(way * ideal[0], way * ideal[1], numbers)
         unfolded = (a * d - b * c > 0.0).all(axis=0)
     bad = ~(found & unfolded)
-    return _first_fold(camera, shown[:, bad]) if bad.any() else None
-
-
-def _first_fold(camera: Camera, shown: FloatArray) -> float:
-    """Return the smallest angle off the axis, degrees, at which the lens folds.
-
-    Args:
-        shown: positions (2, k) on the image plane, up to the farthest of which folds are searched.
-    """
-    lens = camera.distortion
-    assert lens is not None
-    farthest = shown[:, np.argmax(np.hypot(*shown))]
+    if not bad.any():
+        return None
+    farthest = shown[:, bad][:, np.argmax(np.hypot(*shown[:, bad]))]
     way = farthest / np.hypot(*farthest)
     limit = np.pi if camera.projection == "equidistant" else np.tan(np.radians(89.9))
     height = np.geomspace(1e-3, limit, 4000)
-    a, b, c, d = lens.jacobian(way[0] * height, way[1] * height, lens.coefficients())
+    a, b, c, d = lens.jacobian(way[0] * height, way[1] * height, numbers)
     folds = np.flatnonzero(a * d - b * c <= 0.0)
     at = float(height[folds[0]] if len(folds) else limit)
     return float(np.degrees(at if camera.projection == "equidistant" else np.arctan(at)))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from optisense.array_types import FloatArray
-from optisense.design.looks import ROLE_LOOKS
+from optisense.design.colour import ROLE_LOOKS
 from optisense.design.parts import Role
 from optisense.design.section import Section, section
 from optisense.text import to_html

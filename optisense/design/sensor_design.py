@@ -23,7 +23,7 @@ from pydantic_core import PydanticSerializationError
 from optisense.design._components import Components
 from optisense.design.cage import Cage
 from optisense.design.camera import Camera
-from optisense.design.fields import InconsistentValueError, Model, Name, is_left_out
+from optisense.design.fields import InconsistentValueError, Model, Name, Steps, is_left_out
 from optisense.design.kinds import KindModel
 from optisense.design.lights import LightGroup
 from optisense.design.markers import Markers
@@ -48,6 +48,9 @@ MOST_NOTES = 20_000
 """Largest number of values of one design with a source, each in three lines of the file."""
 
 MATERIAL_REQUIRED = frozenset({Role.ELASTOMER, Role.SUPPORT, Role.INTERFACE, Role.MIRROR})
+
+Meshes = dict[str, TriangleMesh]
+"""Meshes of a design's parts, mm, by part. Checks of a design get them as its cages deform them."""
 
 
 class Status(StrEnum):
@@ -113,7 +116,7 @@ class SensorDesign(Model):
 
     _meshes: dict[str, TriangleMesh] = PrivateAttr(default_factory=dict)
     _source: Path | None = PrivateAttr(default=None)
-    _lines: dict[tuple[str | int, ...], int] = PrivateAttr(default_factory=dict)
+    _lines: dict[Steps, int] = PrivateAttr(default_factory=dict)
 
     @field_validator("materials", "parts", "lights", "cages")
     @classmethod
@@ -251,11 +254,11 @@ class SensorDesign(Model):
                         raise DesignError(message, where=where, hint=error.hint) from error
         return result
 
-    def values_of_kinds(self) -> dict[tuple[str | int, ...], KindModel]:
+    def values_of_kinds(self) -> dict[Steps, KindModel]:
         """Return all components that come in kinds and may name files, by path: coating, materials,
         emitters, and the effects of the camera's lens and sensor.
         """
-        found: dict[tuple[str | int, ...], KindModel] = {("coating",): self.coating}
+        found: dict[Steps, KindModel] = {("coating",): self.coating}
         for name, material in self.materials.items():
             found["materials", name] = material
         for name, group in self.lights.items():
@@ -333,12 +336,7 @@ class SensorDesign(Model):
 
     def where(self, *path: str | int) -> str:
         """Return file and line of a value of a design read from a file, else its dotted path."""
-        if self._source is None:
-            return dotted(path)
-        for length in range(len(path), -1, -1):
-            if path[:length] in self._lines:
-                return f"{self._source}:{self._lines[path[:length]]}"
-        return f"{self._source}: {dotted(path)}"
+        return place_of(path, "" if self._source is None else str(self._source), self._lines)
 
     def _data(self) -> dict[str, Any]:
         """Return the values as in a design file; they are not checked.
@@ -399,7 +397,22 @@ def refuse_no_design(given: object) -> None:
     )
 
 
-def dotted(path: tuple[str | int, ...]) -> str:
+def place_of(path: Steps, source: str, lines: Mapping[Steps, int]) -> str:
+    """Return file and line of a value, or of the innermost one around it that has a line.
+
+    Args:
+        source: the file, or another source of the values; empty for the dotted path.
+        lines: line of each path in the file, if there is one.
+    """
+    if not lines:
+        return source or dotted(path)
+    for length in range(len(path), -1, -1):
+        if path[:length] in lines:
+            return f"{source}:{lines[path[:length]]}"
+    return source
+
+
+def dotted(path: Steps) -> str:
     """Return keys and indices as a dotted path such as 'lights.red.lights[0].position'."""
     text = ""
     for step in path:

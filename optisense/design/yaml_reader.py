@@ -14,6 +14,7 @@ from typing import Any
 
 import yaml
 
+from optisense.design.fields import Steps
 from optisense.errors import DesignError, OptiSenseError
 from optisense.text import brief
 from optisense.untrusted_files import COPY_AGAIN, MOST_TEXT, read_text
@@ -38,8 +39,8 @@ _WORDS: dict[str, Any] = {
     **dict.fromkeys((".nan", ".NaN", ".NAN"), float("nan")),
 }
 
-Steps = tuple[str | int, ...]
 Lines = dict[Steps, int]
+"""Line of each value of a file, from 1."""
 
 
 def read_yaml(

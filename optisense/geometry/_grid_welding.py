@@ -1,4 +1,4 @@
-"""Merging of the vertices of a mesh that round to the same place of a fine grid."""
+"""Vertices of a mesh that round to the same place of a fine grid, and faces that occur twice."""
 
 from __future__ import annotations
 
@@ -13,15 +13,8 @@ coordinates in mesh files of single precision."""
 def welded(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], distance: float
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
-    """Merge vertices that agree to a distance, and drop faces that collapse.
-
-    Args:
-        vertices: (n, 3) vertices, mm.
-        faces: (m, 3) rows of `vertices`.
-        distance: side of the grid's cells, mm.
-
-    Returns:
-        The remaining vertices, in their old order, and the remaining faces.
+    """Merge vertices (n, 3) that agree to a distance, the side of the grid's cells, and drop faces
+    (m, 3) that collapse; return the remaining vertices, in their old order, and faces.
     """
     cells = np.round(vertices / distance).astype(np.int64)
     order = np.lexsort(cells.T)  # several times faster than sorting whole rows
@@ -32,9 +25,17 @@ def welded(
     number = np.empty(len(cells), dtype=np.int32)
     number[order] = rank[np.cumsum(begins) - 1]
     merged = number[faces]
-    whole = (
-        (merged[:, 0] != merged[:, 1])
-        & (merged[:, 1] != merged[:, 2])
-        & (merged[:, 2] != merged[:, 0])
-    )
+    whole = (merged != np.roll(merged, 1, axis=1)).all(axis=1)
     return vertices[np.sort(first)], merged[whole]
+
+
+def first_faces(faces: NDArray[np.integer], count: int) -> NDArray[np.int64]:
+    """Return the faces (k,), of (m, 3) over `count` vertices, that do not repeat the corners and
+    the winding of an earlier one.
+    """
+    start = faces.argmin(axis=1)  # a face may start at any of its corners
+    turned = np.take_along_axis(faces, (start[:, None] + np.arange(3)) % 3, axis=1).astype(np.int64)
+    # Rows are coded as single numbers, which sort ten times faster.
+    _, ends = np.unique(turned[:, 0] * count + turned[:, 1], return_inverse=True)
+    _, first = np.unique(ends * count + turned[:, 2], return_index=True)
+    return np.sort(first)

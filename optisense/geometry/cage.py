@@ -60,8 +60,7 @@ def cage_weights(vertices: ArrayLike, box: ArrayLike, resolution: Resolution) ->
 
     Args:
         vertices: (n, 3) undeformed vertices, mm, all inside the box.
-        box: (2, 3) mm, lower and upper corner.
-        resolution: number of points along x, y, z, at least 2 each.
+        box, resolution: the cage at rest; see `cage_points`.
 
     Returns:
         The weights (n, nx * ny * nz) float64; each row adds up to 1.
@@ -95,8 +94,7 @@ def deformed(
 
     Args:
         mesh: the mesh at rest, mm, all inside the box.
-        box: (2, 3) mm, lower and upper corner.
-        resolution: number of points along x, y, z, at least 2 each.
+        box, resolution: the cage at rest; see `cage_points`.
         points: (nx * ny * nz, 3) control points, mm.
 
     Raises:

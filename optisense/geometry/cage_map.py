@@ -22,9 +22,7 @@ def jacobians(
 
     Args:
         vertices: (n, 3) vertices at rest, mm, inside the box.
-        box: (2, 3) lower and upper corner, mm.
-        resolution: number of points along x, y, z.
-        points: (nx * ny * nz, 3) control points, mm.
+        box, resolution, points: the cage; see `deformed`.
 
     Returns:
         The derivatives (n, 3, 3) of deformed coordinates (row) by coordinates at rest (column). The
@@ -34,17 +32,22 @@ def jacobians(
         DesignError: a vertex lies outside the box.
     """
     share = box_coordinates(vertices, box)
-    lower, upper = np.asarray(box, dtype=np.float64)
-    lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
     result = np.empty((len(share), 3, 3))
-    for axis in range(3):
-        # The derivative of a Bernstein sum is the sum of one degree less over the differences.
-        size = upper[axis] - lower[axis]
-        slopes = np.diff(lattice, axis=axis) * (resolution[axis] - 1) / size
+    for axis, slopes in enumerate(_slopes(box, resolution, points)):
         nx, ny, nz = slopes.shape[:3]
         bases = [bernstein(share[:, k], slopes.shape[k]) for k in range(3)]
         result[:, :, axis] = contract(bases, slopes.reshape(-1, 3), (nx, ny, nz))
     return result
+
+
+def _slopes(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> list[FloatArray]:
+    """Return the differences of control points along x, y and z, over their distances at rest.
+
+    The derivative of a Bernstein sum is the sum of one degree less over these differences.
+    """
+    size = np.diff(np.asarray(box, dtype=np.float64), axis=0)[0]
+    lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
+    return [np.diff(lattice, axis=k) * (resolution[k] - 1) / size[k] for k in range(3)]
 
 
 def is_one_to_one(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> bool:
@@ -56,22 +59,9 @@ def is_one_to_one(box: ArrayLike, resolution: Resolution, points: ArrayLike) -> 
     column of the derivative is a mean of the differences of control points along its axis, and
     positive definite matrices form a convex set, so that only combinations of these differences
     need to be tested. They are taken relative to the mean derivative, so that a rotation of the
-    whole lattice has no effect.
-
-    Args:
-        box: (2, 3) lower and upper corner, mm.
-        resolution: number of points along x, y, z.
-        points: (nx * ny * nz, 3) control points, mm.
-
-    Returns:
-        True if the map is certainly one to one; False if it is unknown.
+    whole lattice has no effect. False means that it is unknown.
     """
-    lower, upper = np.asarray(box, dtype=np.float64)
-    lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
-    columns = []
-    for axis in range(3):
-        slopes = np.diff(lattice, axis=axis) * (resolution[axis] - 1) / (upper - lower)[axis]
-        columns.append(slopes.reshape(-1, 3))
+    columns = [slopes.reshape(-1, 3) for slopes in _slopes(box, resolution, points)]
     mean = np.column_stack([column.mean(axis=0) for column in columns])
     if not np.isfinite(mean).all() or np.linalg.det(mean) <= 0.0:
         return False
@@ -106,17 +96,9 @@ def refined_points(points: ArrayLike, resolution: Resolution, finer: Resolution)
 
     Returns:
         The control points (fx * fy * fz, 3) float64, mm.
-
-    Raises:
-        ValueError: `finer` has fewer points along an axis.
     """
     lattice = np.asarray(points, dtype=np.float64).reshape(*resolution, 3)
     for axis in range(3):
-        if finer[axis] < resolution[axis]:
-            raise ValueError(
-                f"the finer lattice has {finer[axis]} points along axis {axis}, and the given one "
-                f"{resolution[axis]}"
-            )
         lattice = np.moveaxis(lattice, axis, 0)
         while len(lattice) < finer[axis]:
             count = len(lattice)

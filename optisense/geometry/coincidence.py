@@ -122,10 +122,8 @@ def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
         one, other: closed meshes, mm, whose normals point outward.
         reach: largest absolute height, mm.
     """
-    near, facing = (
-        _in_reach(one, other, reach).nonzero()[0],
-        _in_reach(other, one, reach).nonzero()[0],
-    )
+    near = np.flatnonzero(_in_reach(one, other, reach))
+    facing = np.flatnonzero(_in_reach(other, one, reach))
     if len(near) == 0 or len(facing) == 0:
         return Seam(np.zeros(0), np.zeros((0, 3)), 0.0)
     if one.face_areas[near].sum() > other.face_areas[facing].sum():
@@ -177,11 +175,7 @@ def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:
         Together they form `mesh`; completely covered or free faces are kept, others are cut.
     """
     state = _Remainder(mesh)
-    parts = []
-    for overlay in overlays:
-        parts.append(state.take(overlay))
-    parts.append(state.rest())
-    return parts
+    return [*(state.take(overlay) for overlay in overlays), state.rest()]
 
 
 class _Remainder:
@@ -302,14 +296,10 @@ def _near_pairs(
 def _united(
     faces: NDArray[np.int32], corners: FloatArray, group: NDArray[np.int64]
 ) -> NDArray[np.object_]:
-    """Return the union of the flat triangles of each group.
+    """Return the union of the flat triangles (g, 3, 2), of vertices (g, 3), of each group (g,),
+    which are numbered from 0.
 
     Edges between two of the faces of a group cancel, so that only their outline needs an overlay.
-
-    Args:
-        faces: (g, 3) numbers of the triangles' vertices.
-        corners: (g, 3, 2) the triangles.
-        group: (g,) number of each triangle's group, ascending from 0.
     """
     size = np.int64(faces.max(initial=0)) + 1
     starts, ends = faces.astype(np.int64), np.roll(faces, -1, axis=1).astype(np.int64)

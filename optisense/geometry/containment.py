@@ -57,11 +57,8 @@ def inside(points: ArrayLike, mesh: TriangleMesh) -> NDArray[np.bool_]:
 def _beside(
     lowest: FloatArray, highest: FloatArray, low: FloatArray, high: FloatArray
 ) -> NDArray[np.bool_]:
-    """Return a mask (m,) or (n, m) of the faces that rays along +z from a box or points may meet.
-
-    Args:
-        lowest, highest: bounds (3, m) or (3, 1, m) of the faces.
-        low, high: bounds (3,) of the box, or points (3, n, 1).
+    """Return a mask (m,) or (n, m) of the faces, with bounds (3, m) or (3, 1, m), that rays along
+    +z from a box with bounds (3,), or from points (3, n, 1), may meet.
     """
     beside: NDArray[np.bool_] = (lowest[0] <= high[0]) & (highest[0] >= low[0])
     beside &= (lowest[1] <= high[1]) & (highest[1] >= low[1])
@@ -80,12 +77,8 @@ def _frame() -> FloatArray:
 def _crossings(
     corners: FloatArray, owner: NDArray[np.integer], count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Return the exits minus entries (count,) of rays along +z, and whether they are uncertain.
-
-    Args:
-        corners: corners (m, 3, 3) of faces, relative to the origin of a ray.
-        owner: number (m,) of the ray that may meet each face.
-        count: number of rays.
+    """Return the exits minus entries (count,) of rays along +z, and whether they are uncertain, for
+    corners (m, 3, 3) of faces relative to the origin of the ray, `owner` (m,), that may meet them.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     edges = np.stack([_cross(b, c), _cross(c, a), _cross(a, b)], axis=1)
@@ -110,10 +103,8 @@ def _cross(one: FloatArray, other: FloatArray) -> FloatArray:
 
 
 def _turns(mesh: TriangleMesh, point: FloatArray) -> int:
-    """Return the winding number of a mesh around a point.
-
-    It is computed from the solid angle (Van Oosterom and Strackee, "The solid angle of a plane
-    triangle", IEEE Trans. Biomed. Eng. 30, 1983).
+    """Return the winding number of a mesh around a point from its solid angle (Van Oosterom and
+    Strackee, "The solid angle of a plane triangle", IEEE Trans. Biomed. Eng. 30, 1983).
     """
     corners = mesh.triangles - point
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]

@@ -51,10 +51,8 @@ def merge_coplanar(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def _patches(mesh: TriangleMesh, room: float) -> NDArray[np.int64]:
-    """Return the number (m,) of the coplanar, connected patch that each face belongs to.
-
-    ``room`` is the distance (mm) of a neighbour's vertices from the plane of a face up to which
-    both are coplanar.
+    """Return the number (m,) of the connected patch, whose neighbours' vertices lie within ``room``
+    (mm) of each other's planes, that each face belongs to.
     """
     normals = mesh.face_normals
     one, other = inner_edges(mesh)[1].T

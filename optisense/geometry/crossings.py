@@ -32,12 +32,8 @@ class Crossings(NamedTuple):
 
 
 def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
-    """Find the faces of one mesh that cut through each other; neighbours that only meet do not
-    count.
-
-    Args:
-        mesh: a mesh whose neighbours share vertices (see `TriangleMesh.welded`).
-        limit: number of crossings after which the search ends; None finds all.
+    """Find the faces of a welded mesh that cut through each other; neighbours that only meet do not
+    count. The search ends after `limit` crossings.
     """
     one, other = overlapping_pairs(*mesh.face_bounds)
     solid = (mesh.face_areas[one] > 0.0) & (mesh.face_areas[other] > 0.0)
@@ -45,11 +41,8 @@ def self_crossings(mesh: TriangleMesh, limit: int | None = None) -> Crossings:
 
 
 def crossings(first: TriangleMesh, second: TriangleMesh, limit: int | None = None) -> Crossings:
-    """Find the faces of two meshes that cut through each other; coincident faces do not count.
-
-    Args:
-        first, second: the meshes.
-        limit: number of crossings after which the search ends; None finds all.
+    """Find the faces of two meshes that cut through each other; coincident faces do not count. The
+    search ends after `limit` crossings.
     """
     return _crossings(first, second, *near_pairs(first, second), limit)
 
@@ -142,14 +135,8 @@ def overlapping_boxes(
     """Return the pairs of boxes of two sets that overlap or touch, in no particular order.
 
     A tree of rectangles finds the pairs that overlap when seen along the axis over which the boxes
-    extend least, and few of these lie behind one another.
-
-    Args:
-        low_1, high_1: (n, 3) lower and upper corners of the first set.
-        low_2, high_2: (k, 3) lower and upper corners of the second set.
-
-    Returns:
-        The numbers (p,) in the first set and (p,) in the second set.
+    extend least, and few of these lie behind one another. The corners are (n, 3) and (k, 3), and
+    the results the numbers (p,) in the first set and (p,) in the second.
     """
     from shapely import STRtree, box
 
@@ -171,13 +158,8 @@ def overlapping_boxes(
 
 
 def overlapping_pairs(low: FloatArray, high: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return the pairs of boxes of one set that overlap or touch; each pair once.
-
-    Args:
-        low, high: (n, 3) lower and upper corners.
-
-    Returns:
-        The smaller (p,) and the larger number (p,) of each pair.
+    """Return the pairs of boxes with corners (n, 3) that overlap or touch, each pair once: the
+    smaller (p,) and the larger number (p,) of each.
     """
     one, other = overlapping_boxes(low, high, low, high)
     ordered = one < other

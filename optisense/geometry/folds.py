@@ -61,9 +61,7 @@ def find_fold(
 
     Args:
         mesh: the mesh at rest, mm.
-        box: (2, 3) lower and upper corner of the cage, mm.
-        resolution: number of its points along x, y, z.
-        points: (nx * ny * nz, 3) its control points, mm.
+        box, resolution, points: the cage; see `optisense.geometry.cage.deformed`.
     """
     vanished = bent.face_areas <= COLLAPSED * mesh.face_areas
     vanished &= mesh.face_areas > 0.0
@@ -72,14 +70,19 @@ def find_fold(
         return Fold("collapsed", bent.vertices[vertex], vertex, int(vanished.sum()))
     if is_one_to_one(box, resolution, points):
         return None
-    if mesh.is_closed:
+    in_view = not mesh.is_closed and is_in_full_view(mesh, bent)
+    if in_view and mesh.face_vectors.sum(axis=0) @ bent.face_vectors.sum(axis=0) >= 0.0:
+        return None
+    if mesh.is_closed or in_view:
         stretch = np.linalg.det(jacobians(mesh.vertices, box, resolution, points))
         turned = stretch <= 0.0
-        if turned.any():
+        # A rotation in space also changes the direction that a sheet faces, but keeps the
+        # determinants positive; those of a mirror image are negative.
+        if turned.any() if mesh.is_closed else (stretch < 0.0).all():
             vertex = int(np.argmin(stretch))
             return Fold("inside out", bent.vertices[vertex], vertex, int(turned.sum()))
-    elif is_in_full_view(mesh, bent):
-        return _turned_over(mesh, bent, box, resolution, points)
+        if in_view:
+            return None
     crossed = self_crossings(bent.welded())
     # A part at rest may consist of shells that cut through each other.
     if len(crossed.pairs) and len(self_crossings(mesh.welded(), limit=1).pairs) == 0:
@@ -87,28 +90,6 @@ def find_fold(
         vertex = int(np.argmin(np.linalg.norm(bent.vertices - place, axis=1)))
         return Fold("through itself", place, vertex, len(crossed.pairs))
     return None
-
-
-def _turned_over(
-    mesh: TriangleMesh,
-    bent: TriangleMesh,
-    box: ArrayLike,
-    resolution: Resolution,
-    points: ArrayLike,
-) -> Fold | None:
-    """Return the defect of a sheet that has become its mirror image and so faces the wrong side.
-
-    A rotation in space also changes the direction that a sheet faces, but keeps the Jacobian
-    determinants positive.
-    """
-    before, after = mesh.face_vectors.sum(axis=0), bent.face_vectors.sum(axis=0)
-    if before @ after >= 0.0:
-        return None
-    stretch = np.linalg.det(jacobians(mesh.vertices, box, resolution, points))
-    if (stretch >= 0.0).any():
-        return None
-    vertex = int(np.argmin(stretch))
-    return Fold("inside out", bent.vertices[vertex], vertex, len(stretch))
 
 
 def is_in_full_view(mesh: TriangleMesh, bent: TriangleMesh) -> bool:
@@ -163,34 +144,18 @@ def _single_outline(mesh: TriangleMesh) -> NDArray[np.int64]:
     return np.array(outline, dtype=np.int64) if len(outline) == len(follow) else none
 
 
-class ChordError(NamedTuple):
-    """The largest distance of a bent mesh from the exact shape that its cage gives.
-
-    Attributes:
-        distance: distance at the middle of the worst edge, mm.
-        place: (3,) this place in the bent shape, mm.
-    """
-
-    distance: float
-    place: FloatArray
-
-
 def chord_error(
     mesh: TriangleMesh,
     bent: TriangleMesh,
     box: ArrayLike,
     resolution: Resolution,
     points: ArrayLike,
-) -> ChordError:
-    """Return the largest distance of the middles of long edges from their exact deformed positions.
+) -> tuple[float, FloatArray]:
+    """Return the largest distance (mm) of a bent mesh from the exact shape that its cage gives, and
+    the place (3,), mm, of the exact shape there.
 
-    The cage moves vertices only; between them a mesh stays straight.
-
-    Args:
-        mesh: the mesh at rest, mm, with faces.
-        box: (2, 3) lower and upper corner of the cage, mm.
-        resolution: number of its points along x, y, z.
-        points: (nx * ny * nz, 3) its control points, mm.
+    The cage moves vertices only; between them a mesh stays straight. The distance is measured at
+    the middles of long edges. The arguments are those of `find_fold`.
     """
     edges = _longest.get(mesh)
     if edges is None:
@@ -199,7 +164,7 @@ def chord_error(
     wanted = deform(cage_weights(middles, box, resolution), points)
     off = np.linalg.norm(bent.vertices[edges].mean(axis=1) - wanted, axis=1)
     worst = int(np.argmax(off))
-    return ChordError(float(off[worst]), wanted[worst])
+    return float(off[worst]), wanted[worst]
 
 
 def _longest_edges(mesh: TriangleMesh) -> NDArray[np.int32]:

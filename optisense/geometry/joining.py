@@ -97,10 +97,8 @@ def join(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> Join:
 def _flat_moves(
     mover: TriangleMesh, fixed: TriangleMesh, pairs: NDArray[np.int64]
 ) -> tuple[FloatArray, float, NDArray[np.int64]]:
-    """Move flat patches into the planes that they lie against.
-
-    Returns:
-        The vertices, the widest gap closed (mm), and the pairs of faces that are not flat.
+    """Move flat patches into the planes that they lie against; return the vertices, the widest gap
+    closed (mm), and the pairs of faces that are not flat.
     """
     vertices, widest = mover.vertices.copy(), 0.0
     done = np.zeros(len(pairs), dtype=bool)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.errors import MeshError
-from optisense.geometry._grid_welding import WELD_DISTANCE, welded
+from optisense.geometry._grid_welding import WELD_DISTANCE, first_faces, welded
 from optisense.untrusted_files import MOST_MESH, read_bytes
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def read_mesh(path: Path) -> MeshArrays:
             where=str(path),
             hint="Check the unit of the file, or export it again",
         )
-    twice = _faces_twice(mesh)
+    twice = len(mesh.faces) - len(first_faces(mesh.faces, len(mesh.vertices)))
     if twice > MOST_TWICE:
         raise MeshError(
             f"{twice:,} faces of the mesh occur more than once",
@@ -102,20 +102,6 @@ def _refuse_many(triangles: int, path: Path) -> None:
             where=str(path),
             hint="Export it with a larger deviation, or simplify it in a modelling program",
         )
-
-
-def _faces_twice(mesh: MeshArrays) -> int:
-    """Return the number of faces that repeat the corners and the winding of an earlier face."""
-    if len(mesh.faces) <= MOST_TWICE:
-        return 0
-    corners = mesh.faces.astype(np.uint64)
-    first = np.argmin(corners, axis=1)  # a face may start at any of its corners
-    a, b, c = (np.take_along_axis(corners, (first[:, None] + k) % 3, 1)[:, 0] for k in range(3))
-    # Sums of products with large odd numbers differ for different corners, except with a
-    # probability of 1e-6 among a million faces.
-    keys = a * np.uint64(0x9E3779B97F4A7C15) + b * np.uint64(0xC2B2AE3D27D4EB4F)
-    keys += c * np.uint64(0x165667B19E3779F9)
-    return len(keys) - len(np.unique(keys))
 
 
 def obj_text(mesh: TriangleMesh, name: str | None = None) -> str:

@@ -23,10 +23,7 @@ _SLACK = 1e-4
 
 
 def closest_place(mesh: TriangleMesh, point: ArrayLike) -> tuple[int, FloatArray]:
-    """Return the place of a mesh that is nearest to a point: the face, and its point (3,), mm.
-
-    Args:
-        point: (3,) the point, mm.
+    """Return the place of a mesh that is nearest to a point (3,): the face, and its point (3,), mm.
 
     Raises:
         ContactError: a coordinate is not a finite number.
@@ -82,11 +79,8 @@ def distance_within(mesh: TriangleMesh, point: FloatArray, reach: float) -> floa
 def surface_samples(
     vertices: FloatingArray, faces: NDArray[np.integer], spacing: float
 ) -> tuple[FloatingArray, NDArray[np.integer], FloatingArray]:
-    """Spread sample points evenly over a mesh, about one per ``spacing`` squared.
-
-    Returns:
-        Points (3, n), mm; the face (n,) that each lies on; and its share (n,), mm^2, of the area of
-        the face.
+    """Spread points evenly over a mesh, about one per ``spacing`` squared. Return the points (3,
+    n), mm, the face (n,) that each lies on, and its share (n,), mm^2, of the area of the face.
     """
     a, b, c = (vertices[faces[:, k]].T.copy() for k in range(3))
     area = np.linalg.norm(np.cross((b - a).T, (c - a).T), axis=1) / 2
@@ -127,16 +121,8 @@ class Anchors:
 def anchored(
     points: FloatArray, mesh: TriangleMesh, tolerance: float
 ) -> tuple[Anchors, NDArray[np.bool_]]:
-    """Find points (n, 3) on a mesh.
-
-    Args:
-        points: (n, 3) points, mm.
-        mesh: the mesh, mm.
-        tolerance: largest distance of a point from the mesh, mm.
-
-    Returns:
-        The anchors, and a mask (n,) of the points that were found; the anchors of others are
-        arbitrary.
+    """Return the anchors of points (n, 3), mm, on a mesh, and a mask (n,) of those that are within
+    a tolerance (mm) of it; the anchors of others are arbitrary.
     """
     from scipy.spatial import cKDTree  # takes a tenth of a second to load
 

@@ -77,22 +77,8 @@ def touching_vertices(mesh: TriangleMesh, other: TriangleMesh) -> NDArray[np.int
         rows = np.flatnonzero(near)
         if len(rows) > MOST_PROBED:
             rows = rows[np.linspace(0, len(rows) - 1, MOST_PROBED).astype(np.int64)]
-        rows = beside[other] = rows[np.isfinite(touching(mesh, rows, other))]
+        rows = beside[other] = rows[np.isfinite(near_surface(mesh.vertices[rows], other))]
     return rows
-
-
-def touching(mesh: TriangleMesh, vertices: NDArray[np.int64], other: TriangleMesh) -> FloatArray:
-    """Return the distances of vertices of a mesh from another one, up to `CONTACT`.
-
-    Args:
-        mesh: the mesh, mm.
-        vertices: (k,) numbers of its vertices.
-        other: the other mesh, mm.
-
-    Returns:
-        The distances (k,), mm; infinite where they are larger than `CONTACT`.
-    """
-    return near_surface(mesh.vertices[vertices], other)
 
 
 def near_surface(points: FloatArray, other: TriangleMesh) -> FloatArray:

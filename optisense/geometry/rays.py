@@ -92,14 +92,8 @@ def _hits(
     reach: NDArray[np.float64],
     first: int,
 ) -> RayHits:
-    """Return the intersections of rays, numbered from ``first``, with triangles (t, 3, 3).
-
-    Args:
-        start: (r, 3) origins, or (1, 3).
-        way: (r, 3) directions.
-        middle: (t, 3) centres of the triangles' bounding spheres.
-        reach: (t,) squares of their radii.
-        first: number of the first ray.
+    """Return the intersections of rays from (r, 3) or (1, 3) along (r, 3), numbered from `first`,
+    with triangles (t, 3, 3), whose bounding spheres have centres (t, 3) and squared radii (t,).
     """
     unit = way / np.linalg.norm(way, axis=1, keepdims=True)
     along = _products(unit, middle) - np.einsum("ri,ri->r", unit, start)[:, None]

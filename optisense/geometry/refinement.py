@@ -112,14 +112,10 @@ class _Edges:
         longest: IntArray,
         cut: NDArray[np.bool_],
     ) -> tuple[IntArray, FloatArray]:
-        """Cut marked edges, the longest of each face first; return faces and corner normals.
+        """Cut the edges of a mask (n,), the longest of each face first; return faces and normals.
 
-        Args:
-            vertices: the vertices, of which the last are the middles of the marked edges.
-            faces: (m, 3) faces.
-            normals: (m, 3, 3) normals of their corners.
-            longest: (m,) corner at which the longest edge of each face begins.
-            cut: (n,) mask of the edges.
+        The last vertices are the middles of these edges, `normals` (m, 3, 3) those of the corners
+        of `faces` (m, 3), and `longest` (m,) the corner at which the longest edge of each begins.
         """
         number = np.cumsum(cut) - 1
         middle = number + len(vertices) - int(cut.sum())

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from optisense.array_types import BoolArray, FloatArray
 from optisense.errors import MeshError
+from optisense.geometry._grid_welding import first_faces
 from optisense.geometry._mesh_checks import with_consistent_winding
 from optisense.geometry._welding import merged_vertices
 from optisense.geometry.coincidence import boxes_overlap, find_coincident
@@ -76,7 +77,7 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
         mended = _closed(mended, where, notes)
         _refuse_crossings(mended, where)
         mended = _outward(mended, where, notes)
-    elif (_edges(mended)[1] == 2).all():
+    elif (mended.edges[1] == 2).all():
         turned = outward(with_consistent_winding(mended))
         _tell_of_turned((turned.faces != mended.faces).any(axis=1), notes)
         mended = turned
@@ -125,14 +126,9 @@ def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
 
 def _without_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
     """Drop duplicate faces (same corners, same winding); return the mesh and their number."""
-    start = mesh.faces.argmin(axis=1)
-    turned = np.take_along_axis(mesh.faces, (start[:, None] + np.arange(3)) % 3, axis=1)
-    # Rows are coded as single numbers, which sort ten times faster.
-    count = len(mesh.vertices)
-    _, ends = np.unique(turned[:, 0].astype(np.int64) * count + turned[:, 1], return_inverse=True)
-    _, first = np.unique(ends * count + turned[:, 2], return_index=True)
+    first = first_faces(mesh.faces, len(mesh.vertices))
     dropped = len(mesh.faces) - len(first)
-    return (mesh.with_faces(mesh.faces[np.sort(first)]), dropped) if dropped else (mesh, 0)
+    return (mesh.with_faces(mesh.faces[first]), dropped) if dropped else (mesh, 0)
 
 
 def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
@@ -266,16 +262,11 @@ def _shapes_of(mesh: TriangleMesh, labels: NDArray[np.int64]) -> list[TriangleMe
 
 
 def _within(bodies: list[TriangleMesh], where: str | None) -> BoolArray:
-    """Return a mask (n, n) of the bodies (rows) that lie inside others (columns); bodies may touch
-    from outside.
+    """Return a mask (n, n) of the bodies (rows) that lie inside others (columns).
 
-    Args:
-        bodies: closed shells of either winding.
-        where: part for messages; None if bodies may overlap.
-
-    Raises:
-        MeshError: `where` is given, and two bodies overlap in part, or have a part of their
-            surfaces in common, so that one is no cavity of the other.
+    The bodies are closed shells of either winding, and may touch from outside. With `where`, the
+    part for messages, two that overlap in part, or have a part of their surfaces in common, so that
+    one is no cavity of the other, raise MeshError.
     """
     solids = [as_manifold(body if body.volume > 0.0 else body.flipped()) for body in bodies]
     result = np.zeros((len(bodies), len(bodies)), dtype=bool)

@@ -22,39 +22,24 @@ _rests: weakref.WeakKeyDictionary[TriangleMesh, Rests] = weakref.WeakKeyDictiona
 
 
 def common_space(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
-    """Return the middle of a space that two solids share; cached for the next call with the same
-    solids.
+    """Return the middle (3,), mm, of a space that two closed meshes share; None if they share none,
+    or if one is not a valid volume.
 
     Facets of two parts that touch overlap slightly. A common space counts if its mean thickness,
-    twice its volume over its surface, is larger than `CONTACT`.
-
-    Args:
-        first, second: closed meshes, mm.
-
-    Returns:
-        The middle (3,), mm; None if they share no space, or if a mesh is not a valid volume.
+    twice its volume over its surface, is larger than `CONTACT`. The result is kept for the next
+    call with the same meshes.
     """
     beside = _places.setdefault(first, weakref.WeakKeyDictionary())
     if second not in beside:
-        beside[second] = _found(first, second)
+        meet = find_overlap(first, second) is not None
+        common = as_manifold(first) ^ as_manifold(second) if meet else None
+        beside[second] = None if common is None else thick_place(common, CONTACT)
     return beside[second]
 
 
-def _found(first: TriangleMesh, second: TriangleMesh) -> FloatArray | None:
-    if find_overlap(first, second) is None:
-        return None
-    return thick_place(as_manifold(first) ^ as_manifold(second), CONTACT)
-
-
 def thick_place(common: Any, thinnest: float) -> FloatArray | None:
-    """Return the middle of a piece of a common space that is thicker than a contact.
-
-    Args:
-        common: the common space, a manifold3d object.
-        thinnest: smallest mean thickness (twice the volume over the surface), mm.
-
-    Returns:
-        The middle (3,), mm; None if all pieces are thinner.
+    """Return the middle (3,), mm, of a piece of a common space, a manifold3d object, whose mean
+    thickness (twice the volume over the surface) is above `thinnest`, mm; None if there is none.
     """
     for piece in common.decompose():
         if 2.0 * piece.volume() > thinnest * piece.surface_area():
@@ -81,14 +66,11 @@ def of_manifold(solid: Any) -> TriangleMesh:
 
 
 def without(first: TriangleMesh, second: TriangleMesh) -> TriangleMesh:
-    """Return a solid without the space that it shares with another one, or the solid itself if they
-    share none or nothing would be left; cached for the next call with the same solids.
+    """Return a closed mesh without the space that it shares with another one, or the mesh itself if
+    they share none or nothing would be left; kept for the next call with the same meshes.
 
     Unlike `common_space`, this also finds solids that share space without crossing each other's
     surfaces, as those with sides in one plane. Bodies of one solid may overlap.
-
-    Args:
-        first, second: closed meshes, mm.
     """
     beside = _rests.setdefault(first, weakref.WeakKeyDictionary())
     if second not in beside:
@@ -130,12 +112,9 @@ def _grouped(pieces: list[TriangleMesh]) -> list[list[TriangleMesh]]:
 
 
 def united(mesh: TriangleMesh) -> TriangleMesh:
-    """Return a closed mesh in which bodies that share space are one body.
+    """Return a closed mesh, whose bodies have outward normals, with bodies that share space as one.
 
     Bodies that only touch stay apart. The mesh itself is returned if none share space.
-
-    Args:
-        mesh: closed mesh whose bodies have outward normals, mm.
     """
     # Other than patches, pieces of a manifold are apart where bodies meet in an edge.
     pieces = [of_manifold(piece) for piece in as_manifold(mesh).decompose()]

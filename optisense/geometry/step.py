@@ -111,12 +111,7 @@ def read_step(path: str | Path) -> list[StepBody]:
 
 
 def _read_apart(path: Path) -> list[StepBody]:
-    """Read the bodies of a STEP file in a separate process.
-
-    Raises:
-        SetupError: Open CASCADE cannot be imported there.
-        MeshError: the file cannot be read, or the process has crashed.
-    """
+    """Read the bodies of a STEP file in a separate process, and raise the error that it tells."""
     with tempfile.TemporaryDirectory(prefix="optisense-") as folder:
         search = os.pathsep.join(each or str(Path.cwd()) for each in sys.path)
         done = subprocess.run(

@@ -175,15 +175,11 @@ class SensingSurface:
 
     def _surface_point(self, face: int, point: FloatArray) -> SurfacePoint:
         """Return the place with the smooth normal, which is nearly that of neighbouring places."""
-        smooth = self._smooth
+        smooth = self.mesh.vertex_normals()  # kept by the mesh
         assert smooth.normals is not None
         share = _barycentric(self.mesh.triangles[face], point)
         normal = share @ smooth.normals[smooth.faces[face]]
         return SurfacePoint(point, normal / np.linalg.norm(normal))
-
-    @cached_property
-    def _smooth(self) -> TriangleMesh:
-        return self.mesh.vertex_normals()
 
     @cached_property
     def _neighbours(self) -> dict[tuple[int, int], list[int]]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from optisense.design import LightGroup, SensorDesign
-from optisense.design.looks import ROLE_LOOKS
+from optisense.design.colour import ROLE_LOOKS
 from optisense.design.projection import directions
 from optisense.errors import OptiSenseError
 from optisense.geometry import TriangleMesh

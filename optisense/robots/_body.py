@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 
 from optisense.array_types import FloatArray
 from optisense.design import Role, SensorDesign
-from optisense.design.looks import ROLE_LOOKS
+from optisense.design.colour import ROLE_LOOKS
 from optisense.design.projection import image_edges
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from optisense.design.looks import ROLE_LOOKS
+from optisense.design.colour import ROLE_LOOKS
 from optisense.errors import OutputError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.solids import bodies

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from optisense.design import Cage, Role, SensorDesign
-from optisense.design.priorities import carved
+from optisense.design.arrangement import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.repair import outward

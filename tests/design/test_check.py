@@ -14,9 +14,9 @@ from optisense.design import Diagnostic, SensorDesign, check_design, set_value
 from optisense.design.arrangement import may_overlap
 from optisense.design.cage_checks import _overlap
 from optisense.design.camera_checks import view_shares
-from optisense.design.check import inside
 from optisense.errors import DesignError, MeshError
 from optisense.geometry import TriangleMesh
+from optisense.geometry.containment import inside
 from optisense.search.space.constraints import NoCrossings
 
 LIGHTS = ["smd-3528", "generic-spot"]

@@ -6,7 +6,7 @@ import pytest
 
 from optisense import sensors
 from optisense.design import SensorDesign, set_value
-from optisense.design.priorities import carved
+from optisense.design.arrangement import carved
 from optisense.geometry import TriangleMesh
 from optisense.optics.scene.assembly import assemble
 from optisense.workshop.shapes import shapes

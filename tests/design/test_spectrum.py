@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import optisense as ots
-from optisense.design._spectrum import LightSpectra, Spectrum
+from optisense.design.lights import LightSpectra, Spectrum
 from optisense.design.materials.optical_constants import CHANNEL_WAVELENGTHS
 from optisense.errors import DesignError
 from optisense.optics import OpticalModel

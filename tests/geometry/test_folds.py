@@ -8,7 +8,7 @@ import pytest
 from optisense.geometry import TriangleMesh, cage_points
 from optisense.geometry.cage import deformed
 from optisense.geometry.folds import Fold, find_fold, is_in_full_view
-from optisense.geometry.overlaps import find_overlap, touching, touching_vertices
+from optisense.geometry.overlaps import find_overlap, near_surface, touching_vertices
 
 BOX = np.array([[-5.0, -4.0, -1.0], [5.0, 4.0, 1.0]])
 LATTICE = (3, 3, 3)
@@ -126,6 +126,6 @@ class TestMeeting:
         rows = touching_vertices(self.block, table)
         assert set(rows) == set(np.flatnonzero(self.block.vertices[:, 2] == 0.0))
         lifted = self.block.with_vertices(self.block.vertices + [0, 0, 0.01])
-        assert np.isinf(touching(lifted, rows, table)).all()
+        assert np.isinf(near_surface(lifted.vertices[rows], table)).all()
         slid = self.block.with_vertices(self.block.vertices + [2.0, 1.0, 0.0])
-        assert np.isfinite(touching(slid, rows, table)).all()
+        assert np.isfinite(near_surface(slid.vertices[rows], table)).all()

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from optisense.array_types import FloatArray, FloatingArray
 from optisense.design.fields import DEGREES, Number
-from optisense.design.kinds import KindModel, are_numbers, fills
+from optisense.design.kinds import KindModel, Limits, fills
 from optisense.errors import DesignError, LibraryError
 from optisense.registry import Registry
 from optisense.text import brief
@@ -30,6 +30,9 @@ DARK = 1e-6
 
 POLAR_ANGLES = 1025
 """Number of polar angles of a table over the beam; over 90 degrees they are 0.09 degrees apart."""
+
+ABOVE_0 = Limits("two numbers above 0", (2,), above=0.0)
+"""Limits of the width and height of a window, mm."""
 
 AZIMUTHS = 145
 """Number of azimuths of an unsymmetric lamp's table: every 2.5 degrees, with 0 and 360."""
@@ -94,7 +97,7 @@ class Window:
     def is_valid(self) -> bool:
         """True if the shape is known and the size is positive."""
         known = self.shape in ("disc", "rectangle")
-        return known and isinstance(self.size, tuple) and are_numbers(self.size, (2,), above=0.0)
+        return known and isinstance(self.size, tuple) and ABOVE_0.allow(self.size)
 
 
 class LightModel(KindModel):
@@ -198,7 +201,7 @@ class LightModel(KindModel):
                 hint="Return None, or a Window of shape 'disc' or 'rectangle', with a width and a "
                 "height above 0 mm",
             )
-        if power is not None and not are_numbers(power, low=0.0):
+        if power is not None and not Limits("a number from 0 up", low=0.0).allow(power):
             raise LibraryError(
                 f"the cosine power of an emitter of kind '{self.kind}' is {brief(repr(power))}",
                 hint="Return None, or a number that is not negative",
@@ -212,7 +215,8 @@ class LightModel(KindModel):
                 hint="Return an array in the shape of the angles",
             )
         values = np.concatenate([np.ravel(around), np.ravel(self.intensity().values)])
-        if not are_numbers(values, values.shape, low=0.0) or values.max() <= 0.0:
+        from_0 = Limits("numbers from 0 up", values.shape, low=0.0)
+        if not from_0.allow(values) or values.max() <= 0.0:
             raise LibraryError(
                 f"the intensity of an emitter of kind '{self.kind}' must be finite and not "
                 "negative from 0 to 180 degrees, and above 0 somewhere",

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from optisense import library
 from optisense.design import LightGroup, LightModel, SensorDesign
+from optisense.design.arrangement import carved
 from optisense.design.materials import CoatingModel, Material, Medium, Reflection
 from optisense.design.parts import TRANSPARENT_SOLIDS, Role
-from optisense.design.priorities import carved
 from optisense.errors import DesignError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.coplanar import merge_coplanar
