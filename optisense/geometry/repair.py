@@ -1,8 +1,8 @@
 """Repair of meshes from CAD files, as far as it needs no guessing.
 
-Repaired are vertices that differ by rounding, duplicate faces, and faces and whole shells that are
-turned inside out. Refused, with the place, are holes, edges of more than two faces, faces that cut
-through each other, and bodies that overlap; these must be corrected in the CAD tool.
+Repaired are vertices that differ by rounding, faces that coincide, and faces and whole shells that
+are turned inside out. Refused, with the place, are holes, edges of more than two faces, faces that
+cut through each other, and bodies that overlap; these must be corrected in the CAD tool.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from optisense.geometry.connected import connected_components
 from optisense.geometry.containment import inside
 from optisense.geometry.crossings import TOUCH, near_pairs, self_crossings
 from optisense.geometry.mesh import IntArray, TriangleMesh
-from optisense.geometry.patches import inner_edges
+from optisense.geometry.patches import inner_edges, sides_of_faces
 from optisense.geometry.solids import as_manifold, thick_place
 
 WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
@@ -30,6 +30,10 @@ closed: from the rounding of single precision to a tenth of the usual tolerance 
 FLAT = 1e-9
 """Volume of a shell, as a share of its area to the power of 1.5, below which it encloses none: a
 sphere has a tenth, and a square sheet as thin as a millionth of its side 4e-7."""
+
+SAME_AREA = 1e-6
+"""Largest difference of the areas of two pieces of a surface that coincide, as a share of them: the
+rounding of single precision."""
 
 _UNITE = (
     "In the CAD tool: combine the overlapping bodies into one (Boolean union), or export each to "
@@ -125,10 +129,48 @@ def shells(mesh: TriangleMesh) -> NDArray[np.int64]:
 
 
 def _without_doubles(mesh: TriangleMesh) -> tuple[TriangleMesh, int]:
-    """Drop duplicate faces (same corners, same winding); return the mesh and their number."""
+    """Drop faces that coincide; return the mesh and the number of dropped faces.
+
+    Of faces with the same corners and the same winding, one is kept. If edges then still belong to
+    more than two faces, pieces of the surface that coincide are dropped: all but one, as for a
+    surface that is drawn from both sides, or else all, as for the wall between bodies that touch.
+    """
     first = first_faces(mesh.faces, len(mesh.vertices))
-    dropped = len(mesh.faces) - len(first)
-    return (mesh.with_faces(mesh.faces[first]), dropped) if dropped else (mesh, 0)
+    best = once = mesh.with_faces(mesh.faces[first])
+    if (once.edges[1] > 2).any():
+        kept = [mesh.with_faces(mesh.faces[k]).compacted() for k in _without_coincident(mesh)]
+        best = next((each for each in kept if 0 < each.edges[1].max(initial=0) <= 2), once)
+    return best, len(mesh.faces) - len(best.faces)
+
+
+def _without_coincident(mesh: TriangleMesh) -> tuple[BoolArray, BoolArray]:
+    """Return masks (m,) of the faces that remain if all but one of the pieces of the surface that
+    coincide are dropped, and if all are; the pieces are bounded by edges of more than two faces.
+    """
+    count, face = mesh.edges[1], sides_of_faces(mesh)[1]
+    edge, times = np.repeat(np.arange(len(count)), count), np.repeat(count, count)
+    labels = connected_components(len(mesh.faces), *face[times == 2].reshape(-1, 2).T)
+    area = np.bincount(labels, mesh.face_areas)
+    weighted = mesh.face_areas[:, None] * mesh.triangles.mean(axis=1)
+    sums = np.stack([np.bincount(labels, each) for each in weighted.T], axis=1)
+    middle = sums / np.maximum(area, np.finfo(np.float64).tiny)[:, None]
+    rims: dict[bytes, list[int]] = {}
+    crowded = np.flatnonzero(times > 2)
+    crowded = crowded[np.argsort(labels[face[crowded]], kind="stable")]
+    owner, begin = np.unique(labels[face[crowded]], return_index=True)
+    extra, every = np.zeros(len(area), dtype=bool), np.zeros(len(area), dtype=bool)
+    for piece, rim in zip(owner.tolist(), np.split(edge[crowded], begin[1:]), strict=True):
+        others = rims.setdefault(rim.tobytes(), [])
+        twins = [
+            each
+            for each in others
+            if np.abs(middle[each] - middle[piece]).max() < TOUCH
+            and abs(area[each] - area[piece]) < SAME_AREA * area[piece]
+        ]
+        extra[piece] = bool(twins)
+        every[[*twins, piece]] |= bool(twins)
+        others.append(piece)
+    return ~extra[labels], ~every[labels]
 
 
 def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:

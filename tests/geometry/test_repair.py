@@ -113,9 +113,32 @@ def test_doubled_faces_are_dropped() -> None:
     assert "4 duplicate faces" in notes[0]
 
 
+@pytest.mark.parametrize("closed", [True, False])
+def test_a_solid_that_is_drawn_from_both_sides_is_one(closed: bool) -> None:
+    for count in (4, len(BLOCK.faces)):
+        faces = np.concatenate([BLOCK.faces, BLOCK.faces[:count, ::-1]])
+        mesh, notes = repaired(BLOCK.with_faces(faces), "housing", closed=closed)
+        assert mesh.volume == pytest.approx(VOLUME)
+        assert len(mesh.faces) == len(BLOCK.faces)
+        assert notes[0] == f"{count} duplicate faces were dropped"
+
+
+@pytest.mark.parametrize("closed", [True, False])
+def test_bodies_with_a_common_wall_are_one(closed: bool) -> None:
+    beside = TriangleMesh.box((10, 0, 0), (20, 8, 4), (3, 3, 3))
+    # A reflection has the other diagonals in the squares of the wall.
+    mirrored = BLOCK.with_vertices(BLOCK.vertices * (-1, 1, 1) + (20, 0, 0)).flipped()
+    for other in (beside, beside.flipped(), mirrored, mirrored.flipped()):
+        mesh, notes = repaired(TriangleMesh.joined([BLOCK, other]), "gel", closed=closed)
+        assert mesh.volume == pytest.approx(2.0 * VOLUME)
+        assert shells(mesh).max() == 0
+        assert notes[0] == "36 duplicate faces were dropped"
+
+
 def faulty(kind: str) -> TriangleMesh:
+    beside = TriangleMesh.box((10, 0, 0), (20, 8, 4), (3, 3, 3))
     second = {
-        "wall": TriangleMesh.box((10, 0, 0), (20, 8, 4), (3, 3, 3)),
+        "wall": beside.with_faces(beside.faces[(beside.triangles[..., 0] > 10.0).any(axis=1)]),
         "edge": TriangleMesh.box((10, 8, 0), (20, 18, 4), (3, 3, 3)),
         "overlap": TriangleMesh.box((5, 1, 1), (20, 9, 9), (3, 3, 3)),
         "stack": TriangleMesh.box((0, 0, 2), (10, 8, 6), (2, 4, 2)),
