@@ -3,6 +3,7 @@
 from optisense.design.materials import flake_lobe, specularity_to_roughness
 from optisense.library._designs import (
     OVERDRIVEN,
+    nominal_flux,
     typical_colour,
     unused_imaging,
     unusual_fluxes,
@@ -51,6 +52,7 @@ __all__ = [
     "light",
     "material",
     "names",
+    "nominal_flux",
     "own_folder",
     "parse_colour",
     "specularity_to_roughness",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -140,6 +140,47 @@ def typical_colour(model: str, colour: Colour) -> tuple[str, TypicalLight] | Non
     return None
 
 
+class NominalFlux(NamedTuple):
+    """Flux of a light at its nominal current, in one colour.
+
+    Attributes:
+        flux: radiant flux, mW. That of a mixed colour is the largest at which none of its red,
+            green and blue dies exceeds its own nominal flux.
+        light: the light in words, such as "red smd-3528".
+        die: name of the colour in the library; that of the die that limits a mixed colour.
+        words: the flux in words, with the current if it is known.
+    """
+
+    flux: float
+    light: str
+    die: str
+    words: str
+
+
+def nominal_flux(model: str, colour: Colour) -> NominalFlux | None:
+    """Return the nominal flux of a light of the library that has these shares of R, G and B, or
+    None if the library does not state that of one of its dies.
+    """
+    dies = [(1.0, typical_colour(model, colour))]
+    mixed = dies[0][1] is None
+    if mixed:
+        shares = np.array(colour) / sum(colour)
+        unit = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        dies = [(float(shares[k]), typical_colour(model, unit[k])) for k in np.flatnonzero(shares)]
+    limits: list[tuple[float, str, TypicalLight]] = []
+    for share, die_known in dies:
+        if die_known is None or die_known[1].flux is None:
+            return None
+        limits.append((die_known[1].flux / share, *die_known))
+    flux, die, typical = min(limits, key=lambda limit: limit[0])
+    at = f" at {typical.current:g} mA" if typical.current else ""
+    if not mixed:
+        return NominalFlux(flux, f"{die} {model}", die, f"{flux:g} mW{at}")
+    flux = float(f"{flux:.9g}")  # without the rounding of the division
+    words = f"{flux:g} mW, of which its {die} die gives {typical.flux:g} mW{at}"
+    return NominalFlux(flux, f"{model} of this colour", die, words)
+
+
 def unusual_fluxes(design: SensorDesign) -> list[str]:
     """Return a sentence for each light group whose flux is above the nominal flux that the library
     names for its light and colour, or far below that of the other groups that are on.
@@ -153,15 +194,11 @@ def unusual_fluxes(design: SensorDesign) -> list[str]:
                 f"median of the groups, {usual:g} mW: fluxes are in mW; 0 switches a group off"
             )
             continue
-        colour = typical_colour(group.model, group.colour)
-        if colour is None or colour[1].flux is None:
-            continue
-        times = group.flux / colour[1].flux
-        if times > OVERDRIVEN:
-            at = f" at {colour[1].current:g} mA" if colour[1].current else ""
+        nominal = nominal_flux(group.model, group.colour)
+        if nominal is not None and group.flux > OVERDRIVEN * nominal.flux:
             found.append(
-                f"lights {name}: {group.flux:g} mW each is {times:.2g} times the nominal flux of "
-                f"a {colour[0]} {group.model}, which is {colour[1].flux:g} mW{at}: "
+                f"lights {name}: {group.flux:g} mW each is {group.flux / nominal.flux:.2g} times "
+                f"the nominal flux of a {nominal.light}, which is {nominal.words}: "
                 "lower it, or use a brighter light"
             )
     return found

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from optisense.design import Role, SensorDesign, Status
-from optisense.library import OVERDRIVEN, AnyEntry, typical_colour
+from optisense.library import OVERDRIVEN, AnyEntry, nominal_flux, typical_colour
 from optisense.library.facts import summary
 from optisense.text import cell, markdown
 from optisense.workshop._placement import what_to_order
@@ -119,14 +119,14 @@ def _lights(design: SensorDesign) -> list[Item]:
         note = f"{group.flux:g} mW each"
         if colour is not None:
             note = f"{colour[0]}, {note}"
-            if colour[1].flux is not None:
-                at = f" at {colour[1].current:g} mA" if colour[1].current else ""
-                known = entry.source(f"flux.{colour[0]}") if entry is not None else None
-                assumed = known is not None and known.status is Status.ASSUMED
-                note += f"; nominal {colour[1].flux:g} mW{at}{' (assumed)' if assumed else ''}"
-                times = group.flux / colour[1].flux
-                if times > OVERDRIVEN:
-                    note += f": {times:.2g} times its nominal flux is asked of it"
+        nominal = nominal_flux(group.model, group.colour)
+        if nominal is not None:
+            known = entry.source(f"flux.{nominal.die}") if entry is not None else None
+            assumed = known is not None and known.status is Status.ASSUMED
+            note += f"; nominal {nominal.words}{' (assumed)' if assumed else ''}"
+            times = group.flux / nominal.flux
+            if times > OVERDRIVEN:
+                note += f": {times:.2g} times its nominal flux is asked of it"
         items.append(
             Item(
                 kind="light",

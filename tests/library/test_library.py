@@ -220,3 +220,21 @@ def test_specularity_runs_from_diffuse_to_nearly_a_mirror() -> None:
     assert library.specularity_to_roughness(1.0) == 0.05
     with pytest.raises(ValueError, match="within 0"):
         library.specularity_to_roughness(1.1)
+
+
+@pytest.mark.parametrize(
+    ("colour", "flux", "die"),
+    [
+        ((2.0, 0.0, 0.0), 1.5, "red"),
+        ((1.0, 1.0, 1.0), 4.5, "red"),
+        ((1.0, 0.02, 0.0), 1.53, "red"),
+        ((0.1, 0.9, 0.0), 2.2 / 0.9, "green"),
+    ],
+)
+def test_the_nominal_flux_of_a_colour_is_that_of_its_weakest_die(
+    colour: tuple[float, float, float], flux: float, die: str
+) -> None:
+    found = library.nominal_flux("smd-0805", colour)
+    assert found is not None and found.die == die
+    assert found.flux == pytest.approx(flux, abs=1e-6)
+    assert library.nominal_flux("round-5mm-15", (1.0, 1.0, 0.0)) is None  # it has no red die

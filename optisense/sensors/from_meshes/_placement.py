@@ -92,20 +92,16 @@ def _flux(choice: LightChoice, colour: tuple[float, float, float]) -> tuple[floa
     if choice.flux is not None:
         source = "from the recipe; see the LED's datasheet and current"
         return choice.flux, Provenance(status=Status.ASSUMED, source=source)
-    known = library.typical_colour(choice.model, colour)
-    if known is None or known[1].flux is None:
+    nominal = library.nominal_flux(choice.model, colour)
+    if nominal is None:
         source = "a bright LED; neither the recipe nor the library states a flux"
         return USUAL_FLUX, Provenance(status=Status.ASSUMED, source=source)
-    name, typical = known
-    assert typical.flux is not None
-    found = library.entry("light", choice.model).source(f"flux.{name}")
+    found = library.entry("light", choice.model).source(f"flux.{nominal.die}")
     status = Status.ASSUMED if found is None else found.status
-    source = f"nominal flux of a {name} {choice.model} in the library"
-    if typical.current is not None:
-        source += f", at {typical.current:g} mA"
+    source = f"nominal flux of a {nominal.light} in the library, {nominal.words}"
     if found is not None:
         source += f": {found.source}"
-    return typical.flux, Provenance(status=status, source=source)
+    return nominal.flux, Provenance(status=status, source=source)
 
 
 def _note_beyond(state: RecipeState, name: str, group: LightGroup, row: LightRow) -> None:
