@@ -27,6 +27,10 @@ WELDS = (1e-6, 1e-5, 1e-4, 1e-3)
 """Distances (mm) below which vertices are merged, tried in ascending order until the mesh is
 closed: from the rounding of single precision to a tenth of the usual tolerance of a part."""
 
+NARROWER = 1e-6
+"""Share of the width of a surface by which an opening in it is narrower at least: the rounding of
+single precision."""
+
 FLAT = 1e-9
 """Volume of a shell, as a share of its area to the power of 1.5, below which it encloses none: a
 sphere has a tenth, and a square sheet as thin as a millionth of its side 4e-7."""
@@ -77,17 +81,40 @@ def repaired(mesh: TriangleMesh, name: str, closed: bool) -> tuple[TriangleMesh,
     mended, doubled = _without_doubles(mesh.welded())
     if doubled:
         notes.append(f"{doubled} duplicate faces were dropped")
+    sealed = _sealed(mended, notes)
     if closed:
-        mended = _closed(mended, where, notes)
-        _refuse_crossings(mended, where)
-        mended = _outward(mended, where, notes)
-    elif (mended.edges[1] == 2).all():
-        turned = outward(with_consistent_winding(mended))
-        _tell_of_turned((turned.faces != mended.faces).any(axis=1), notes)
-        mended = turned
+        if sealed is None:
+            raise _hole(merged_vertices(mended, WELDS[0]), where)
+        _refuse_crowded_edges(sealed, where)
+        _refuse_crossings(sealed, where)
+        mended = _outward(sealed, where, notes)
+    elif sealed is not None and (sealed.edges[1] == 2).all():
+        mended = outward(with_consistent_winding(sealed))
+        _tell_of_turned((mended.faces != sealed.faces).any(axis=1), notes)
     else:
-        mended = _consistent(mended, notes)
-    return (mended if notes or closed else mesh), notes
+        mended = _consistent(mended if sealed is None else sealed, notes)
+    as_read = not (closed or notes) and (sealed is None or mesh.is_closed)
+    return (mesh if as_read else mended), notes
+
+
+def narrow_openings(mesh: TriangleMesh) -> str | None:
+    """Return a clause that tells the openings of a surface that are narrower than it, so that the
+    surface may be meant to be closed; None if there are none. The rim of a plain sheet is as wide
+    as the sheet.
+
+    Args:
+        mesh: welded mesh, mm.
+    """
+    labels = shells(mesh)
+    owner = np.zeros(len(mesh.vertices), dtype=np.int64)
+    owner[mesh.faces] = labels[:, None]
+    widths = np.array([_width(each.vertices) for each in _shapes_of(mesh, labels)])
+    found = [
+        edges
+        for edges in _openings(mesh)
+        if _width(mesh.vertices[edges]) < (1.0 - NARROWER) * widths[owner[edges[0, 0]]]
+    ]
+    return _told(mesh, found) if found else None
 
 
 def outward(mesh: TriangleMesh) -> TriangleMesh:
@@ -173,37 +200,47 @@ def _without_coincident(mesh: TriangleMesh) -> tuple[BoolArray, BoolArray]:
     return ~extra[labels], ~every[labels]
 
 
-def _closed(mesh: TriangleMesh, where: str, notes: list[str]) -> TriangleMesh:
-    """Weld as far as needed to close the mesh."""
+def _sealed(mesh: TriangleMesh, notes: list[str]) -> TriangleMesh | None:
+    """Return a mesh, welded as far as needed to close it; None if it has holes."""
     for distance in WELDS:
         welded = merged_vertices(mesh, distance)
         if not len(welded.open_edges):
             if distance > WELDS[0]:
                 notes.append(f"vertices up to {distance:g} mm apart were joined")
-            _refuse_crowded_edges(welded, where)
             return welded
-    welded = merged_vertices(mesh, WELDS[0])
-    raise _hole(welded, welded.open_edges, where)
+    return None
 
 
-def _hole(mesh: TriangleMesh, edges: IntArray, where: str) -> MeshError:
+def _hole(mesh: TriangleMesh, where: str) -> MeshError:
     """Return the error for open edges, with the number of holes and the place of the widest one."""
-    group = connected_components(len(mesh.vertices), edges[:, 0], edges[:, 1])
-    rims = np.unique(group[edges[:, 0]])
-    sizes, middles = [], []
-    for rim in rims:
-        points = mesh.vertices[np.unique(edges[group[edges[:, 0]] == rim])]
-        sizes.append(float(np.linalg.norm(np.ptp(points, axis=0))))
-        middles.append(points.mean(axis=0))
-    widest = int(np.argmax(sizes))
-    holes = "a hole" if len(rims) == 1 else f"{len(rims)} holes, the widest"
     return MeshError(
-        f"the solid is not closed: it has {holes} of {sizes[widest]:.3g} mm near "
-        f"{_point(middles[widest])} mm ({len(edges)} edges have a face on one side only)",
+        f"the solid is not closed: it has {_told(mesh, _openings(mesh))}",
         where=where,
         hint="In the CAD tool: close the opening (knit or thicken the surfaces into a solid body) "
         "and export the solid again",
     )
+
+
+def _openings(mesh: TriangleMesh) -> list[IntArray]:
+    """Return the open edges (k, 2) of each opening of a mesh."""
+    edges = mesh.open_edges
+    group = connected_components(len(mesh.vertices), edges[:, 0], edges[:, 1])[edges[:, 0]]
+    return [edges[group == rim] for rim in np.unique(group)]
+
+
+def _told(mesh: TriangleMesh, openings: list[IntArray]) -> str:
+    """Return the number of openings, and the size and the place of the widest one, as text."""
+    widest = max((mesh.vertices[np.unique(edges)] for edges in openings), key=_width)
+    holes = "a hole" if len(openings) == 1 else f"{len(openings)} holes, the widest"
+    return (
+        f"{holes} of {_width(widest):.3g} mm near {_point(widest.mean(axis=0))} mm "
+        f"({sum(map(len, openings))} edges have a face on one side only)"
+    )
+
+
+def _width(points: FloatArray) -> float:
+    """Return the diagonal of the box around points (..., 3), mm."""
+    return float(np.linalg.norm(np.ptp(points.reshape(-1, 3), axis=0)))
 
 
 def _refuse_crowded_edges(mesh: TriangleMesh, where: str) -> None:

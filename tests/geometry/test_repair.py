@@ -8,7 +8,7 @@ import pytest
 from optisense.errors import MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry._mesh_checks import with_consistent_winding
-from optisense.geometry.repair import refuse_bad_sheet, repaired, shells
+from optisense.geometry.repair import narrow_openings, refuse_bad_sheet, repaired, shells
 
 BLOCK = TriangleMesh.box((0, 0, 0), (10, 8, 4), (3, 3, 3))
 VOLUME = 320.0
@@ -100,10 +100,11 @@ def test_loose_triangles_are_joined(noise: float) -> None:
     corners = BLOCK.triangles.reshape(-1, 3)
     off = np.random.default_rng(7).uniform(-noise, noise, corners.shape)
     loose = TriangleMesh(corners + off, np.arange(len(corners)).reshape(-1, 3))
-    mesh, notes = repaired(loose, "gel", closed=True)
-    assert mesh.is_closed
-    assert mesh.volume == pytest.approx(VOLUME, abs=1000 * noise)
-    assert ("joined" in " ".join(notes)) == (noise > 1e-6)
+    for closed in (True, False):
+        mesh, notes = repaired(loose, "gel", closed=closed)
+        assert mesh.is_closed
+        assert mesh.volume == pytest.approx(VOLUME, abs=1000 * noise)
+        assert ("joined" in " ".join(notes)) == (noise > 1e-6)
 
 
 def test_doubled_faces_are_dropped() -> None:
@@ -185,6 +186,16 @@ def test_what_can_not_be_mended_is_told_with_part_place_and_remedy(
     assert place in error.value.message
     assert error.value.where == "part gel"
     assert advice in (error.value.hint or "")
+
+
+def test_a_hole_in_a_surface_is_told_from_the_rim_of_a_sheet() -> None:
+    sheet = TriangleMesh.grid((4, 4), (3, 3))
+    plates = TriangleMesh.joined([sheet, sheet.with_vertices(sheet.vertices + (9, 0, 0))])
+    for mesh in (BLOCK, sheet, plates):
+        assert narrow_openings(mesh) is None
+    for mesh in (faulty("hole"), TriangleMesh.joined([plates, faulty("hole")])):
+        told = narrow_openings(mesh)
+        assert told is not None and told.startswith("a hole of 4.27 mm near (2.222, 0.889, 4.000)")
 
 
 def test_in_an_open_sheet_the_majority_decides_where_it_looks() -> None:

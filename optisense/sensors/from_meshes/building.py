@@ -19,13 +19,14 @@ from optisense.design import (
     SensorDesign,
     Status,
 )
+from optisense.design.check import OPAQUE_ROLES
 from optisense.design.materials import kinds_for
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error
 from optisense.errors import DesignError, LibraryError, MeshError
 from optisense.geometry import TriangleMesh
 from optisense.geometry.plane_cuts import cut_along_planes
-from optisense.geometry.repair import refuse_bad_sheet, repaired
+from optisense.geometry.repair import narrow_openings, refuse_bad_sheet, repaired
 from optisense.geometry.step import SUFFIXES
 from optisense.sensors.from_meshes._part_poses import laid_on, resting_order
 from optisense.sensors.from_meshes._placement import (
@@ -143,6 +144,13 @@ class _Builder(RecipeState):
                 mended, notes = repaired(mesh, name, closed=solid)
             except MeshError as error:
                 raise MeshError(error.message, where=where, hint=error.hint) from None
+            if part.role in OPAQUE_ROLES and part.towards is None:
+                gaps = narrow_openings(mended.welded())
+                if gaps is not None:
+                    notes.append(
+                        f"it is a sheet without mass, as it has {gaps}; if it is to be solid, "
+                        "close the opening in the CAD tool"
+                    )
             self.notes += [f"{name}: {note}" for note in notes]
             mended = mended if part.towards is None else self._chosen(name, mended)
             self.meshes[name] = self._cut(name, mended)

@@ -60,6 +60,12 @@ class TestFiles:
         assert "part gel (gel.stl)" in str(error.where)
         assert "In the CAD tool" in str(error.hint) and advice in str(error.hint)
 
+    def test_an_opaque_part_with_a_hole_is_told(self, cad: Any) -> None:
+        text = cad.recipe.replace("lights:\n", "  case: {file: case.stl, role: blocker}\nlights:\n")
+        case = holed(cad).apply_translation((0, 0, -20))
+        (note,) = design_from_meshes(cad.write(text, case=case)).notes
+        assert note.startswith("case: it is a sheet without mass, as it has a hole of")
+
     def test_a_file_without_faces(self, cad: Any) -> None:
         file = cad.write()
         (cad.folder / "gel.stl").write_text("solid gel\nendsolid gel\n")
