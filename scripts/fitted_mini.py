@@ -29,7 +29,7 @@ from optisense.design import SensorDesign, Status, get_value
 from optisense.design.camera import ImagingModel
 from optisense.design.yaml_writer import to_yaml
 from optisense.library import CameraModel, Source
-from optisense.library.own_parts import HEADS
+from optisense.library.storage import HEADS
 from optisense.sensors._gelsight_mini import FITTED_CAMERA, FITTED_NUMBERS, unfitted_design
 
 UNIT = "one GelSight Mini, calibration pictures of GelSLAM (commit e0ea7de, MIT)"

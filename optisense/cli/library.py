@@ -100,8 +100,8 @@ def show_entry(
         entry = library.entry(kind, name)
         if as_yaml:
             from optisense.design.yaml_writer import to_yaml
-            from optisense.library.own_parts import HEADS
-            from optisense.library.reading import KINDS as MODELS
+            from optisense.library.storage import HEADS
+            from optisense.library.storage import KINDS as MODELS
 
             head = next(HEADS[each] for each in MODELS if each == kind)
             output.print(to_yaml(entry, head), end="")

@@ -102,7 +102,7 @@ def _from_ies(file: Path, given: IesOptions, name: str | None, description: str 
     from optisense import library
     from optisense.design.ies import read_ies
     from optisense.library.adding import check_new_name
-    from optisense.library.own_parts import own_folder
+    from optisense.library.storage import own_folder
 
     check_new_name(file.stem if name is None else name)
     profile = read_ies(file)

@@ -14,17 +14,12 @@ from optisense.design.fields import Model, Name
 class Components(dict[str, Any]):
     """Components of a design by name.
 
-    A value that is set becomes an object of its class, as in a design file, unless it is one.
+    A value that is set becomes an object of its class, as in a design file, unless it is one; a
+    DesignError is raised if it does not describe one.
     """
 
     def __init__(self, section: str, model: type[Model], given: Mapping[str, Any]) -> None:
-        """Store the components.
-
-        Args:
-            section: name of the design's field.
-            model: class of the components.
-            given: the first components, by name.
-        """
+        """Store the first components, of a class, for the design's field `section`."""
         self._section, self._model = section, model
         super().__init__(given)
 
@@ -32,29 +27,17 @@ class Components(dict[str, Any]):
         return type(self), (self._section, self._model, dict(self))
 
     def __setitem__(self, name: str, value: Any) -> None:
-        """Set a component.
-
-        Raises:
-            DesignError: the value does not describe one.
-        """
+        """Set a component."""
         super().__setitem__(name, self._component(name, value))
 
     def setdefault(self, name: str, default: Any = None) -> Any:
-        """Set a component if there is none of its name, and return that of this name.
-
-        Raises:
-            DesignError: the value does not describe one.
-        """
+        """Set a component if there is none of its name, and return that of this name."""
         if name not in self:
             self[name] = default
         return self[name]
 
     def update(self, *given: Any, **named: Any) -> None:
-        """Set several components, or none.
-
-        Raises:
-            DesignError: a value does not describe one.
-        """
+        """Set several components, or none."""
         values = dict(*given, **named)
         super().update({name: self._component(name, value) for name, value in values.items()})
 

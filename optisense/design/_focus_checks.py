@@ -16,8 +16,7 @@ from optisense.geometry.rays import ray_hits
 SHARP = 2.0
 """Diameter of the largest circle of confusion that counts as sharp, in pixels. A disc that is two
 pixels wide has a standard deviation of half a pixel, little more than that of a pixel itself
-(0.29).
-"""
+(0.29)."""
 
 
 def focus_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:

@@ -23,8 +23,7 @@ from optisense.geometry.solids import common_space, without
 
 EQUAL_INDEX = 1e-6
 """Largest difference of refractive indices for which solids count as one medium; it covers rounding
-of numbers in files.
-"""
+of numbers in files."""
 
 COINCIDENCE_TOLERANCE = 0.002
 """Distance (mm) below which faces touch, and thickness below which an overlap is a contact: a tenth
@@ -42,9 +41,8 @@ change by about as much."""
 SAMPLES, SAMPLES_TURN = 89, 55
 """Number of points of the picture at which the sensing surface is looked for, and the step by which
 they go round it downwards. They are two Fibonacci numbers, so that the points are a lattice whose
-rows are not parallel to the edges of the picture: of 3000 rectangles of any size and angle, the
-shares of nine in ten are right to 0.02, of 99 in 100 to 0.04, and of all to 0.08. With 8 by 6
-points, a whole row is counted or not, which is 0.17."""
+rows are not parallel to the edges of the picture: of rectangles of any size and angle, the shares
+of nine in ten are right to 0.02, and of all to 0.08."""
 
 
 def one_medium(design: SensorDesign, name: str, other: str) -> bool:

@@ -13,8 +13,7 @@ from optisense.design.fields import Count, Fraction, Model, Name, Number, Vector
 
 MAX_POINTS = 20_000
 """Largest number of control points of one cage. The weights of a mesh of 10,000 vertices take 1.6
-GB with so many.
-"""
+GB with so many."""
 MOST_ALONG = 64
 """Largest number of control points along an axis; no shape needs polynomials of a higher degree."""
 

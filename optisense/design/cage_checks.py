@@ -31,18 +31,15 @@ AT_REST = 1e-9
 
 COARSE = 0.1
 """Largest distance, mm, between the straight edges of a mesh and the smooth shape that its cage
-gives; a larger one is reported.
-"""
+gives; a larger one is reported."""
 
 BESIDE = 1.0
 """Largest distance of a light from a part that it lies beside, mm: the height of an LED's package,
-whose window is that far from the board or the part on which it stands.
-"""
+whose window is that far from the board or the part on which it stands."""
 
 LEFT_BEHIND = 1.0
 """Least motion of a part, mm, after which a warning names lights that did not move with it: by less
-than the height of its package, a light still lies at the part.
-"""
+than the height of its package, a light still lies at the part."""
 
 FOLDS = {
     "inside out": "is turned inside out by cage '{cage}' near {place}: {count} of its vertices",
@@ -228,10 +225,8 @@ def _has_moved(cage: Cage) -> bool:
 
 
 def _overlap(design: SensorDesign, name: str, other: str) -> Overlap:
-    """Return whether two parts may overlap.
-
-    Solids of one medium may ("yes"); solids of different priority are cut out of each other, which
-    is unusual ("odd"); others may not ("no").
+    """Return whether two parts may overlap: solids of one medium may ("yes"), solids of different
+    priority are cut out of each other, which is unusual ("odd"), and others may not ("no").
     """
     if one_medium(design, name, other):
         return "yes"

@@ -28,8 +28,7 @@ THINNEST = 0.5
 
 SAME_SHARE = 1e-9
 """Length of a box along an axis, relative to its largest length, below which it counts as flat
-along this axis; a margin for rounding.
-"""
+along this axis; a margin for rounding."""
 
 
 def add_cage(
@@ -254,10 +253,8 @@ def select_points(resolution: Resolution, which: str) -> list[int]:
 
 
 def _counts(resolution: Iterable[int]) -> Resolution:
-    """Return the numbers of control points along x, y, z as Python's integers.
-
-    Raises:
-        DesignError: they are not three integers, or out of range.
+    """Return the numbers of control points along x, y, z; refuse what is no three integers in
+    range.
     """
     hint = f"Give 2 to {MOST_ALONG} along each axis, {MAX_POINTS} in all at most"
     try:

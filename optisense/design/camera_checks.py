@@ -23,19 +23,14 @@ from optisense.geometry.mesh_points import distance_within, surface_samples
 from optisense.geometry.rays import ray_hits
 
 WIDEST_PERSPECTIVE = 135.0
-"""Angle from corner to corner of the widest lens that keeps straight lines straight, degrees.
-Goerz's Hypergon of 1900 has 130 (H. H. Nasse, "Distagon, Biogon and Hologon", Carl Zeiss 2011). A 9
-mm lens for 24 x 36 mm, the shortest on sale (Venus Optics' Laowa 9 mm f/5.6; assumed, as its data
-sheet was not at hand), has 2 atan(21.6 / 9) = 135. At 179 degrees a pixel at the edge of the
-picture would get less than a hundred-millionth of the light of one in the middle (the fourth power
-of the cosine).
-"""
+"""Angle from corner to corner of the widest lens that keeps straight lines straight, degrees: 2
+atan(21.6 / 9) of a 9 mm lens for 24 x 36 mm, the shortest on sale (Venus Optics' Laowa 9 mm f/5.6;
+assumed, as its data sheet was not at hand). Goerz's Hypergon of 1900 has 130 (H. H. Nasse,
+"Distagon, Biogon and Hologon", Carl Zeiss 2011)."""
 
 WIDEST_FISHEYE = 280.0
-"""Angle across the image of the widest fisheye, degrees. C-4 Optics' 4.9 mm f/3.5 has 270
-(Lensrentals, "Assembling the C-4 Optics 4.9mm f3.5 Hyperfisheye Prototype", 2019). Entaniya's M12
-280, a lens for small cameras, has 280 by its name (assumed, as its data sheet was not at hand).
-"""
+"""Angle across the image of the widest fisheye, degrees: that of Entaniya's M12 280, a lens for
+small cameras, by its name (assumed, as its data sheet was not at hand)."""
 
 ROUNDED = 1e-9
 """Rounding error of an angle, degrees, by which it may exceed its limit."""
@@ -43,8 +38,7 @@ ROUNDED = 1e-9
 NARROWEST = 1.0
 """Smallest angle across the image, degrees. A sensing surface as wide as a fingertip, 17 mm, fills
 one degree from 1000 mm away, the farthest that a camera of a design may be (`limits.LARGEST`); a
-telecentric lens, which has no angle, can be given as a pinhole at that distance.
-"""
+telecentric lens, which has no angle, can be given as a pinhole at that distance."""
 
 SMALLEST_CAMERA = 0.65
 """Width of the smallest camera module on sale, mm: OmniVision's OVM6948 of 0.65 x 0.65 x 1.158 mm
@@ -52,16 +46,13 @@ SMALLEST_CAMERA = 0.65
 """
 
 LEAST_SKIN = 0.25
-"""Share of the sensing surface's area that the camera must see for a score. The built-in sensors
-see 0.45 (GelBelt) to 0.75 (GelSight360). Scores reward a camera that looks at one spot, the more
-the smaller the spot, so without a limit a search would end at a field of view of nearly nothing.
-"""
+"""Share of the sensing surface's area that the camera must see for a score. Scores reward a camera
+that looks at a small spot. The built-in sensors see 0.45 (GelBelt) to 0.75 (GelSight360)."""
 
 LEAST_PICTURE = 0.2
-"""Share of the picture that must show the sensing surface for a score. The built-in sensors have
-0.31 (GelSight Svelte) to 1. 2to3PW does not count the other pixels, so without a limit the best
-camera would be far away and show the sensor as a few pixels.
-"""
+"""Share of the picture that must show the sensing surface for a score. 2to3PW does not count the
+other pixels, and rewards a camera that is far away. The built-in sensors have 0.31 (GelSight
+Svelte) to 1."""
 
 
 VIEW_POINTS = 1000
@@ -79,10 +70,8 @@ ends at the skin does not. It covers rounding."""
 
 
 def lens_problems(camera: Camera, where: str) -> list[Diagnostic]:
-    """Return the problem of a field of view that no lens has; that of fisheyes is the true one.
-
-    Args:
-        where: place of the field of view in the design.
+    """Return the problem of a field of view, at a place of the design, that no lens has; that of
+    fisheyes is the true one.
     """
     if camera.fov < NARROWEST:
         return [
@@ -238,10 +227,8 @@ def view_problems(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
 
 
 def view_shares(design: SensorDesign, meshes: Meshes) -> ViewShares | None:
-    """Return the shares of the camera's view along straight rays.
-
-    Returns:
-        The shares; None if there is no sensing surface, or a mirror.
+    """Return the shares of the camera's view along straight rays; None if there is no sensing
+    surface, or a mirror.
     """
     skins = [meshes[name] for name in design.parts_of(Role.SENSING_SURFACE) if name in meshes]
     total = sum(skin.area for skin in skins)

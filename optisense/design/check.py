@@ -35,8 +35,7 @@ PROBE = 0.05
 
 PROBES = 64
 """Number of faces, spread over the sensing surface, beside which its medium is looked up; all faces
-of a sound surface have the same one.
-"""
+of a sound surface have the same one."""
 
 
 def check_design(

@@ -24,8 +24,7 @@ SAME_PLACE = 1e-5
 
 MOST_SHOWN = 8
 """Largest number of differences that an error lists; the others are counted, so that the message
-fits on a screen.
-"""
+fits on a screen."""
 
 
 def design_values(design: SensorDesign) -> dict[str, Any]:

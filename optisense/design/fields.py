@@ -22,8 +22,7 @@ Steps = tuple[str | int, ...]
 
 LARGEST_NUMBER = 1e12
 """Largest magnitude of a number in a design, in any unit. No meaningful number comes near, and its
-cube is still far from the largest floating-point number.
-"""
+cube is still far from the largest floating-point number."""
 
 
 class NotTooLarge:

@@ -145,18 +145,11 @@ class KindModel(Model):
         """
 
     def _check_results(self) -> None:
-        """Check type and range of what the methods of a kind return; interfaces override it.
-
-        Raises:
-            OptiSenseError: a result can't be used.
-        """
+        """Raise OptiSenseError if its methods return what can't be used; interfaces override it."""
 
     def _check_own_kind(self) -> None:
-        """Check what the methods of a kind of another package return, where those of this package
-        need no check; interfaces override it.
-
-        Raises:
-            OptiSenseError: a result can't be used.
+        """Do as `_check_results` for kinds of other packages, where those of this one need no
+        check.
         """
 
     def _require(self, method: str, result: object, limits: Limits) -> None:

@@ -12,8 +12,7 @@ from optisense.errors import DesignError
 
 LARGEST = 1000.0
 """Largest size of a part, and largest distance of a light or camera from the origin, mm; larger
-numbers come from a wrong unit.
-"""
+numbers come from a wrong unit."""
 
 PLACE_HINT = "Give positions in millimetres"
 """Remedy for places that are too far away."""
@@ -64,14 +63,8 @@ def unit_slips(design: SensorDesign, meshes: Meshes) -> list[Diagnostic]:
 
 
 def refuse_far(label: str, position: ArrayLike) -> None:
-    """Refuse a place that no light or camera of a sensor has.
-
-    Args:
-        label: name of the light or camera in the message.
-        position: position (3,), mm.
-
-    Raises:
-        DesignError: the place is farther from the origin than `LARGEST`, or not finite.
+    """Raise DesignError if a light or camera, named by `label`, is at a place (3,), mm, farther
+    from the origin than `LARGEST`, or not finite.
     """
     slip = place_slip(position)
     if slip is not None:
@@ -79,11 +72,7 @@ def refuse_far(label: str, position: ArrayLike) -> None:
 
 
 def place_slip(position: ArrayLike) -> str | None:
-    """Return a text that says how a light or camera is too far away, or None.
-
-    Args:
-        position: position (3,), mm.
-    """
+    """Return a text that says how a light or camera at (3,), mm, is too far away, or None."""
     distance = float(np.linalg.norm(position))
     if distance <= LARGEST:
         return None

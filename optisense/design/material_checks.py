@@ -17,25 +17,21 @@ MOST_OF_A_GAS = 1.002
 LEAST_OF_A_SOLID = 1.29
 """Smallest refractive index of a clear solid, that of the fluoropolymer Teflon AF 2400 (assumed:
 its data sheet was not at hand). Water has 1.33. Aerogels have less, but they scatter light, and
-media are simulated as clear.
-"""
+media are simulated as clear."""
 
 MOST_OF_A_SOLID = 2.15
 """Largest refractive index of a clear glass on sale, Sumita's K-PSFn214P, whose name gives 2.14
-(its data sheet was not at hand; K-PSFn2 has 1.997 in the maker's catalogue of 2017 by
-refractiveindex.info). Crystals such as diamond, 2.42, have more, but nobody makes a sensor of them.
-"""
+(its data sheet was not at hand). Crystals such as diamond, 2.42, have more, but nobody makes a
+sensor of them."""
 
 MOST_OF_AN_ELASTOMER = 1.65
 """Largest refractive index of a clear elastomer. Silicones for lamps reach 1.62 at 633 nm: Mosley
 et al., "High refractive index thermally stable phenoxyphenyl and phenylthiophenyl silicones for
-light-emitting diode applications", J. Appl. Polym. Sci. 131, 39824 (2014).
-"""
+light-emitting diode applications", J. Appl. Polym. Sci. 131, 39824 (2014)."""
 
 LEAST_TRANSMITTED = 1.0 / 255.0
 """Smallest share of the light that a useful transparent part transmits over its smallest extent:
-one level of a picture of eight bits whose brightest level is the light without absorption.
-"""
+one level of a picture of eight bits whose brightest level is the light without absorption."""
 
 MOST_ABSORPTION_OF_A_GEL = 0.25
 """Largest absorption coefficient (1/mm) of a gel with which the images of contacts are accurate:

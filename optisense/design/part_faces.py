@@ -62,13 +62,7 @@ def finished_faces(
     mesh: TriangleMesh, finish: FaceFinish, name: str, where: str
 ) -> NDArray[np.int64]:
     """Return the indices (k,) of the triangles of a part at rest that a finish selects, at least
-    one.
-
-    Args:
-        mesh: mesh of the part at rest.
-        finish: finish and the faces that it applies to.
-        name: name of part and faces, for messages.
-        where: file and line, for messages.
+    one; messages have the name of part and faces, and the place in the file.
 
     Raises:
         DesignError: the finish selects no face; the message has the direction of the nearest.

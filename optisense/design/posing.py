@@ -34,12 +34,7 @@ def with_lights(
 
 
 def moved(light: Light, shift: FloatArray, turn: FloatArray = UNTURNED) -> Light:
-    """Return a light that is turned about the origin, and then shifted.
-
-    Args:
-        shift: vector (3,), mm.
-        turn: rotation matrix (3, 3).
-    """
+    """Return a light that is turned about the origin by a matrix (3, 3), and shifted by (3,), mm."""
     return light.model_copy(
         update={
             "position": triple(turn @ np.array(light.position) + shift),

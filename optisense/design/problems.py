@@ -21,8 +21,7 @@ MAX_SHOWN = 8
 
 MAX_EXAMINED = 100
 """Largest number of problems of one file that are put into words; a damaged file may have hundreds
-of thousands.
-"""
+of thousands."""
 
 NOT_INSTALLED = "It may be a kind of a package that is not installed here"
 """Last sentence of the hint about an unknown kind."""

@@ -1,6 +1,7 @@
 """Projection of points into a design's camera, and its pixels' directions, without refraction.
 
-A position in the picture is given by shares: 0 to 1 across from the left and down from the top.
+A position in the picture is given by shares of its width and height: 0 to 1 `across` from the left
+and `down` from the top, as arrays of one shape (...).
 """
 
 from __future__ import annotations
@@ -13,16 +14,14 @@ from optisense.design.camera import Camera
 
 FOLD_PLACES = 13
 """Number of positions along the picture's width and its height at which a lens is tested for
-folding; the borders and the corners, where lenses fold first, are among them.
-"""
+folding; the borders and the corners, where lenses fold first, are among them."""
 
 FOLD_STEPS = 24
 """Number of steps from the axis to each of the positions where a lens is tested for folding."""
 
 UNDISTORTED_TO = 1e-9
 """Largest error on the image plane of a position that is undistorted and distorted again; a lens
-that folds has a larger one, or no such position.
-"""
+that folds has a larger one, or no such position."""
 
 
 def image_edges(camera: Camera) -> tuple[float, float]:
@@ -33,22 +32,14 @@ def image_edges(camera: Camera) -> tuple[float, float]:
 
 
 def shown_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """Return x and y (2, ...) on the image plane, as the lens shows them, of positions.
-
-    Args:
-        across, down: positions (...) in the picture, in shares of its width and height.
-    """
+    """Return x and y (2, ...) on the image plane, as the lens shows them, of positions (...)."""
     edge, tall = image_edges(camera)
     middle = (0.5, 0.5) if camera.distortion is None else camera.distortion.centre
     return np.array([2.0 * edge * (across - middle[0]), 2.0 * tall * (down - middle[1])])
 
 
 def ideal_places(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArray:
-    """Return x and y (2, ...) on the image plane of an ideal lens for positions in the picture.
-
-    Args:
-        across, down: positions (...) in the picture, in shares of its width and height.
-    """
+    """Return x and y (2, ...) on the image plane of an ideal lens for positions in the picture."""
     shown = shown_places(camera, across, down)
     lens = camera.distortion
     if lens is None:
@@ -62,9 +53,6 @@ def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArr
 
     A fisheye shows nothing at positions that would be more than 180 degrees off its axis; they get
     the direction at 180 degrees.
-
-    Args:
-        across, down: positions (...) in the picture, in shares of its width and height.
     """
     x, y = ideal_places(camera, across, down)
     height = np.hypot(x, y)
@@ -77,22 +65,16 @@ def directions(camera: Camera, across: FloatArray, down: FloatArray) -> FloatArr
 def within_view(camera: Camera, across: FloatArray, down: FloatArray) -> NDArray[np.bool_]:
     """Return a mask (...) of the positions that show something: a fisheye shows nothing at those
     that would be more than 180 degrees off its axis.
-
-    Args:
-        across, down: positions (...) in the picture, in shares of its width and height.
     """
     height = np.hypot(*ideal_places(camera, across, down))
     return np.asarray((height <= np.pi) | (camera.projection != "equidistant"))
 
 
 def picture_places(camera: Camera, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the positions across (n,) and down (n,) of points, in shares of the picture's size.
+    """Return the positions across (n,) and down (n,) of points (n, 3), mm.
 
     Positions outside of the picture are below 0 or above 1; those of points that the lens can't
     show are NaN.
-
-    Args:
-        points: points (n, 3), mm.
     """
     right, up, depth = camera.axes() @ (np.asarray(points) - np.array(camera.position)).T
     aside = np.hypot(right, up)
@@ -132,13 +114,11 @@ def angle_across(camera: Camera) -> float:
 
 
 def folding_angle(camera: Camera) -> float | None:
-    """Return the angle off the axis at which a lens folds within the picture, degrees.
+    """Return the angle off the axis, degrees, at which a lens folds within the picture; None for a
+    lens that shows each point of the picture once.
 
     Beyond this angle the distortion has no inverse: two directions are shown at one position, and
     others nowhere.
-
-    Returns:
-        Angle, or None for a lens that shows each point of the picture once.
     """
     if camera.distortion is None:
         return None

@@ -46,22 +46,17 @@ def fresnel_metal(cosine: ArrayLike, eta: ArrayLike, k: ArrayLike) -> FloatArray
 
 
 def ggx_density(cosine: ArrayLike, alpha: float) -> FloatArray:
-    """Return the GGX density (...) of facet normals, 1/sr (Walter et al. 2007, equation 33).
-
-    Args:
-        cosine: cosine (...) of the angle between facet normal and mean normal.
+    """Return the GGX density (...) of facet normals, 1/sr (Walter et al. 2007, equation 33), by the
+    cosine (...) of their angle with the mean normal.
     """
     cos2 = np.square(np.asarray(cosine, dtype=np.float64))
     return np.asarray(alpha**2 / (np.pi * np.square(cos2 * (alpha**2 - 1.0) + 1.0)))
 
 
 def smith_shadowing(cosine: ArrayLike, alpha: float) -> FloatArray:
-    """Return the share (...) of the facets that is visible from a direction.
-
-    The formula is Smith's masking function for GGX (Walter et al. 2007, equation 34).
-
-    Args:
-        cosine: cosine (...) of the angle between direction and mean normal.
+    """Return the share (...) of the facets that is visible from a direction, by the cosine (...) of
+    its angle with the mean normal: Smith's masking function for GGX (Walter et al. 2007, equation
+    34).
     """
     cos2 = np.maximum(np.square(np.asarray(cosine, dtype=np.float64)), 1e-12)
     tan2 = (1.0 - cos2) / cos2

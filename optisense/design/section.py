@@ -122,15 +122,8 @@ def along_rows(design: SensorDesign) -> bool:
 
 
 def cut(mesh: TriangleMesh, origin: FloatArray, normal: FloatArray) -> list[FloatArray]:
-    """Return the intersection of a plane with a mesh.
-
-    Args:
-        mesh: open or closed mesh.
-        origin: point (3,) of the plane, mm.
-        normal: normal (3,) of the plane.
-
-    Returns:
-        Polylines (n, 3) mm; closed ones repeat their first point at the end.
+    """Return the intersection of an open or closed mesh with the plane of a point (3,), mm, and a
+    normal (3,): polylines (n, 3), mm, of which closed ones repeat their first point at the end.
     """
     welded = mesh.welded()
     height = (welded.vertices - origin) @ normal

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
 
 WIDTH, LABELS, MARGIN, LINE = 440.0, 190.0, 24.0, 17.0
 """Sizes in pixels: width of the drawing, width of the labels beside it, margin around both, and
-distance between labels; a drawing of this size fits a page of text.
-"""
+distance between labels; a drawing of this size fits a page of text."""
 
 TALLEST = 520.0
 """Largest height of the drawing in pixels, so that it fits a screen below the page's heading."""

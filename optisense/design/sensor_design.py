@@ -41,8 +41,7 @@ SCHEMA_VERSION = 1
 MOST_OF_A_KIND = 1000
 """Largest number of materials, parts, light groups or cages of one design; the built-in sensors
 have at most some dozens, and checks of parts against each other take time that grows with their
-square.
-"""
+square."""
 
 MOST_NOTES = 20_000
 """Largest number of values of one design with a source, each in three lines of the file."""
@@ -339,11 +338,7 @@ class SensorDesign(Model):
         return place_of(path, "" if self._source is None else str(self._source), self._lines)
 
     def _data(self) -> dict[str, Any]:
-        """Return the values as in a design file; they are not checked.
-
-        Raises:
-            DesignError: a value is of a type that no design file holds.
-        """
+        """Return the values as in a design file, which must have the types that it holds."""
         try:
             return self.model_dump(mode="json", warnings=False)
         except PydanticSerializationError as error:
@@ -352,12 +347,7 @@ class SensorDesign(Model):
     def _replaced(self, data: dict[str, Any], where: str = "") -> SensorDesign:
         """Return a design of these values with this one's meshes and files.
 
-        Args:
-            where: place of the values in errors; by default the lines of this design's file or, if
-                there is none, the dotted paths.
-
-        Raises:
-            DesignError: the values don't fit.
+        Errors name the place `where`, or else the lines of this design's file or the dotted paths.
         """
         try:
             design = type(self).model_validate(data)

@@ -10,13 +10,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from optisense.design._yaml_comments import with_comments
 from optisense.design.limits import unit_slips
 from optisense.design.parts import TRANSPARENT_SOLIDS
 from optisense.design.problems import design_error, raise_problems
 from optisense.design.sensor_design import SCHEMA_VERSION, SensorDesign, dotted
 from optisense.design.yaml_reader import Lines, read_yaml
-from optisense.design.yaml_writer import to_yaml
+from optisense.design.yaml_writer import to_yaml, with_comments
 from optisense.errors import DesignError, MeshError, OutputError
 from optisense.folders import begun, held
 from optisense.geometry import TriangleMesh

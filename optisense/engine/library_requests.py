@@ -16,8 +16,7 @@ from optisense.errors import LibraryError
 from optisense.library import AnyEntry
 from optisense.library.adding import check_new_name
 from optisense.library.loader import kind_named
-from optisense.library.own_parts import write_own
-from optisense.library.reading import files_of, make_entry
+from optisense.library.storage import files_of, make_entry, write_own
 
 BALL_PIXELS = 160
 """Width and height of the picture of a single ball, in pixels: that of an icon in a front end,

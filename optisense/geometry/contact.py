@@ -36,8 +36,7 @@ on another tessellation of a curved surface are nearer, and a mistyped number is
 
 SMALL = 0.1
 """Largest extent, mm, below which an indenter is probably in another unit: two to three pixels of
-the built-in sensors.
-"""
+the built-in sensors."""
 
 COARSE = 0.01
 """Error of facets, mm, with which the extent is measured: a tenth of `SMALL`."""

@@ -17,8 +17,7 @@ from optisense.geometry.mesh import IntArray, TriangleMesh
 
 SNAP = 0.1
 """Distance of a vertex from a plane, as a share of the distance of the planes, up to which the cut
-goes through the vertex: no triangle becomes much thinner than that.
-"""
+goes through the vertex: no triangle becomes much thinner than that."""
 
 
 def cut_along_planes(mesh: TriangleMesh, spacing: float, max_faces: int) -> TriangleMesh:

@@ -29,7 +29,7 @@ from optisense.library.loader import (
     material,
     names,
 )
-from optisense.library.own_parts import own_folder
+from optisense.library.storage import own_folder
 
 __all__ = [
     "OVERDRIVEN",

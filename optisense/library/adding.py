@@ -24,8 +24,17 @@ from optisense.library._entries import (
     TypicalLight,
 )
 from optisense.library.loader import entry, is_own, kind_named, names
-from optisense.library.own_parts import WHERE_TO_STORE, own_folder, write_own
-from optisense.library.reading import KINDS, Kind, files_of, kind_of, make_entry, read_entry
+from optisense.library.storage import (
+    KINDS,
+    WHERE_TO_STORE,
+    Kind,
+    files_of,
+    kind_of,
+    make_entry,
+    own_folder,
+    read_entry,
+    write_own,
+)
 from optisense.library.tuning import DAYLIGHT, read_tuning
 from optisense.near import suggestion
 from optisense.untrusted_files import MOST_DATA, read_bytes

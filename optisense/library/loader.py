@@ -13,8 +13,7 @@ from optisense.design.materials import CoatingModel, Material
 from optisense.design.yaml_reader import read_yaml
 from optisense.errors import LibraryError
 from optisense.library._entries import AnyEntry, CameraModel
-from optisense.library.own_parts import own_files
-from optisense.library.reading import KINDS, Kind, make_entry, read_entry
+from optisense.library.storage import KINDS, Kind, make_entry, own_files, read_entry
 from optisense.near import suggestion
 
 FOLDER = Path(__file__).parent

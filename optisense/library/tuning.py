@@ -22,13 +22,11 @@ FULL = 65536.0
 
 TABLE_SIZES = {192: (12, 16), 1024: (32, 32)}
 """Rows and columns of shading tables by their number of entries: those of the Raspberry Pi's
-processors VC4 and PiSP.
-"""
+processors VC4 and PiSP."""
 
 DAYLIGHT = 5000.0
 """Colour temperature for which tables and matrices are taken, K: that of neutral white LEDs for
-room lighting. Tactile sensors have no white light of their own to balance by.
-"""
+room lighting. Tactile sensors have no white light of their own to balance by."""
 
 LARGEST_FILE = 4_000_000
 """Largest size of a tuning file, bytes: forty times that of libcamera's largest, 100,000."""

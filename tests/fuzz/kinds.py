@@ -27,8 +27,8 @@ from optisense.design import SensorDesign, check_design, save_design
 from optisense.design.ies import read_ies
 from optisense.geometry import TriangleMesh
 from optisense.geometry.step import read_step
-from optisense.library.reading import KINDS as ENTRY_KINDS
-from optisense.library.reading import read_entry
+from optisense.library.storage import KINDS as ENTRY_KINDS
+from optisense.library.storage import read_entry
 from optisense.library.tuning import read_tuning
 from optisense.search import Study
 from optisense.search.study.applied import design_of

@@ -13,7 +13,7 @@ from optisense.design import IesEmitter, LightGroup, SensorDesign, load_design
 from optisense.design.yaml_writer import to_yaml
 from optisense.errors import DesignError, LibraryError, OutputError
 from optisense.library.loader import FOLDER
-from optisense.library.own_parts import HEADS
+from optisense.library.storage import HEADS
 
 GEL = """\
 description: Our gel
@@ -96,8 +96,6 @@ class TestAdding:
     def test_every_kind_of_entry_survives_being_written_and_added(
         self, own: Path, tmp_path: Path, kind: str, name: str
     ) -> None:
-        from optisense.design.yaml_writer import to_yaml
-
         original = library.entry(kind, name)
         if isinstance(original.value, IesEmitter):
             (tmp_path / original.value.file).write_bytes(original.value.path("file").read_bytes())

@@ -15,8 +15,7 @@ from optisense.design.ies import IesProfile, read_ies
 
 FALL_ANGLES = 65
 """Number of polar angles of the table between the beam and the cut-off, where the intensity is a
-cubic: linear interpolation between them is off by less than 1e-4 of the peak.
-"""
+cubic: linear interpolation between them is off by less than 1e-4 of the peak."""
 
 
 class AreaEmitter(LightModel):
@@ -42,12 +41,7 @@ class AreaEmitter(LightModel):
         return self
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Return the radiant intensity over its peak: the cosine (Lambert's law).
-
-        Args:
-            polar: angle (...) from the light's direction, degrees.
-            azimuth: angle about it, degrees, of a shape that broadcasts with `polar`.
-        """
+        """Return the cosine (Lambert's law); see `LightModel.relative_intensity`."""
         cosine = np.cos(np.radians(np.asarray(polar, dtype=np.float64)))
         return np.maximum(cosine, 0.0) + 0.0 * np.asarray(azimuth)
 
@@ -85,25 +79,13 @@ class IesEmitter(LightModel):
         return read_ies(self.path("file"))
 
     def intensity(self) -> Intensity:
-        """Return the file's own table.
-
-        Raises:
-            LibraryError: the file is missing or malformed.
-        """
+        """Return the file's own table; see `LightModel.intensity`."""
         table = self.intensity_table()
         whole = Intensity(table.vertical_angles, table.horizontal_angles, table.candela)
         return whole.without_azimuth()
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Return the radiant intensity over its peak, linear between the file's angles.
-
-        Args:
-            polar: angle (...) from the light's direction, degrees.
-            azimuth: angle about it, degrees, of a shape that broadcasts with `polar`.
-
-        Raises:
-            LibraryError: the file is missing or malformed.
-        """
+        """Return the intensity, linear between the file's angles; see the method of `LightModel`."""
         table = self.intensity()
         polar, turn = np.broadcast_arrays(np.asarray(polar, np.float64), np.mod(azimuth, 360.0))
         return np.asarray(table.at(polar, turn) / table.values.max())
@@ -133,13 +115,8 @@ class SpotEmitter(LightModel):
         return self
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Return the radiant intensity over its peak.
-
-        It is a smooth step, 3 t^2 - 2 t^3, with t from 0 at the cut-off to 1 at the beam.
-
-        Args:
-            polar: angle (...) from the light's direction, degrees.
-            azimuth: angle about it, degrees, of a shape that broadcasts with `polar`.
+        """Return a smooth step, 3 t^2 - 2 t^3, with t from 0 at the cut-off to 1 at the beam; see
+        `LightModel.relative_intensity`.
         """
         angle = np.asarray(polar, dtype=np.float64)
         if self.cutoff > self.beam:

@@ -22,8 +22,7 @@ HalfAngle = Annotated[Number, Field(gt=0.0, le=90.0, json_schema_extra=DEGREES)]
 
 COARSE_POLAR = 0.25
 """Step of the polar angles at which the end of a beam is searched, degrees: beams are rarely
-narrower than this, and for narrower ones the axis is kept.
-"""
+narrower than this, and for narrower ones the axis is kept."""
 
 DARK = 1e-6
 """Smallest share of the peak intensity that counts as light, far below the noise of any picture."""
@@ -188,11 +187,8 @@ class LightModel(KindModel):
         return f"{self.kind}, half at {self.half_angle():.3g} degrees"
 
     def _check_results(self) -> None:
-        """Check whether the lamp can be simulated.
-
-        Raises:
-            OptiSenseError: its intensity is not finite, is negative, or is 0 everywhere; its window
-                or the exponent of its cosine can't be used; or a file of it can't be read.
+        """Refuse an intensity that is not finite, is negative or is 0 everywhere, and a window or
+        an exponent that can't be used.
         """
         window, power = self.window(), self.cosine_power()
         if window is not None and not (isinstance(window, Window) and window.is_valid):

@@ -27,8 +27,7 @@ LEAST_WIDTH = 0.05
 STEPS = 6
 """Number of widths from which a blur that varies over the picture is interpolated. Between two of
 them the variance is exact, as it is that of a mixture; only the shape of the spread is
-interpolated.
-"""
+interpolated."""
 
 LARGEST = 0.25
 """Largest standard deviation of a blur, as a share of the picture's width; it leaves no detail."""
@@ -73,11 +72,7 @@ class LensBlur(KindModel):
     """Whether it depends on the distance of the scene."""
 
     def _check_own_kind(self) -> None:
-        """Check the deviation from afar up to 10 mm.
-
-        Raises:
-            LibraryError: it is not finite, is negative, or has another shape.
-        """
+        """Check the deviation from afar up to 10 mm."""
         vergence = np.linspace(0.0, 0.1, 20).reshape(4, 5) if self.by_depth else np.zeros((1, 1))
         found = np.asarray(self.deviation(_SomeView(), vergence))
         if fills(found, vergence.shape):
@@ -137,30 +132,19 @@ class Defocus(LensBlur):
     )
 
     def circle(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
-        """Return the diameter (...) of the circle of confusion, as a share of the picture's width.
-
-        Args:
-            vergence: inverse (...) of the apparent distance, 1/mm.
-        """
+        """Return the diameter (...) of the circle of confusion, as a share of the picture's width."""
         pupil = self.focal_length / self.f_number
         angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
         return np.asarray(angle * camera.angle_scale)
 
     def deviation(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
-        """Return the standard deviation (...) of the disc: a quarter of the circle's diameter.
-
-        Args:
-            vergence: inverse (...) of the apparent distance, 1/mm.
-        """
+        """Return the standard deviation (...) of the disc: a quarter of the circle's diameter."""
         return DISC_DEVIATION * self.circle(camera, vergence)
 
 
 def reach_of(deviation: float, width: int) -> int:
-    """Return the radius, pixels, within which a blur is computed.
-
-    Args:
-        deviation: standard deviation, as a share of the picture's width.
-        width: width of the picture, pixels.
+    """Return the radius, pixels, within which a blur is computed, by its standard deviation as a
+    share of the picture's width, and this width, pixels.
     """
     return int(np.ceil(REACH * min(deviation, LARGEST) * width)) + 1
 

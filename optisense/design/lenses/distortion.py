@@ -25,8 +25,7 @@ from optisense.registry import Registry
 
 NEWTON_STEPS = 16
 """Number of Newton steps in `undistort`, with those that are halved. Of 4,000 random lenses that do
-not fold up to the picture's corners, all are inverted to 1e-9 with 16, and 2 are not with 12.
-"""
+not fold up to the picture's corners, all are inverted to 1e-9 with 16, and 2 are not with 12."""
 
 TRIED_WITHIN = 0.3
 """Largest coordinate of the points at which own kinds are tried: some 17 degrees off the axis."""
@@ -71,11 +70,7 @@ class LensDistortion(KindModel):
     )
 
     def _check_own_kind(self) -> None:
-        """Check its coefficients, and its derivatives against difference quotients near the axis.
-
-        Raises:
-            LibraryError: a number is not finite, or the derivatives are not those of `distort`.
-        """
+        """Check its coefficients, and its derivatives against difference quotients near the axis."""
         numbers = self.coefficients()
         kept = np.asarray(numbers)
         self._require("coefficients", kept, Limits("a tuple of finite numbers", (kept.size,)))

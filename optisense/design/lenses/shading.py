@@ -52,11 +52,7 @@ class LensShading(KindModel):
     )
 
     def _check_own_kind(self) -> None:
-        """Check the transmission over a small picture, and its correction.
-
-        Raises:
-            LibraryError: a number is not above 0, or the result is of another shape.
-        """
+        """Check the transmission over a small picture, and its correction."""
         found = self.transmission(film_places(*ABOVE_0.shape[:2]))
         self._require("transmission", found, ABOVE_0)
         self._require("correction", self.correction(found), ABOVE_0)

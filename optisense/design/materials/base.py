@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -79,15 +79,8 @@ class Reflection:
 
     def in_medium(self, ior: float) -> Reflection:
         """Return the same surface in a medium with this index, by which the metal's is divided."""
-        red, green, blue = (value / ior for value in self.eta)
-        k_red, k_green, k_blue = (value / ior for value in self.k)
-        return Reflection(
-            self.reflectance,
-            self.specularity,
-            self.roughness,
-            (red, green, blue),
-            (k_red, k_green, k_blue),
-        )
+        eta, k = ([value / ior for value in index] for index in (self.eta, self.k))
+        return replace(self, eta=eta, k=k)  # type: ignore[arg-type]  # made tuples
 
     def normal_reflectance(self) -> NDArray[np.float64]:
         """Return the reflectance at normal incidence at R, G, B, (3,)."""
@@ -180,11 +173,7 @@ class Material(KindModel):
         return Reflection()
 
     def _check_results(self) -> None:
-        """Check its medium, or its reflection if it is opaque.
-
-        Raises:
-            LibraryError: a number in it is beyond its limits, or it is of another type.
-        """
+        """Check its medium, or its reflection if it is opaque."""
         medium = self.medium()
         if medium is None:
             _check_result(self, "reflection", self.reflection(), Reflection)
@@ -222,11 +211,7 @@ class CoatingModel(KindModel):
         """Return its reflection, with the metal's index as in air."""
 
     def _check_results(self) -> None:
-        """Check its reflection.
-
-        Raises:
-            LibraryError: a number in it is beyond its limits, or it is of another type.
-        """
+        """Check its reflection."""
         _check_result(self, "reflection", self.reflection(), Reflection)
 
     def in_words(self) -> str:

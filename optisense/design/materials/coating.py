@@ -18,12 +18,10 @@ from optisense.design.materials.base import CoatingModel, Reflection
 
 SMALLEST_ROUGHNESS = 0.05
 """GGX alpha of a coating with specularity 1. Smaller values describe polished mirrors, which no
-sprayed or rubbed coating is.
-"""
+sprayed or rubbed coating is."""
 FIXED_ROUGHNESS = 0.1
 """GGX alpha of the flake if specularity does not change it: the default of Mitsuba's
-`roughconductor` (its documentation), as the paper names that model and no roughness.
-"""
+`roughconductor` (its documentation), as the paper names that model and no roughness."""
 
 Scattering = Literal["blend", "blend-fixed-roughness", "conductor"]
 """Model that the specularity of a coating controls; see `flake_lobe`."""
@@ -138,9 +136,7 @@ def flake_lobe(specularity: float, scattering: Scattering = "blend") -> tuple[fl
 def specularity_to_roughness(specularity: float) -> float:
     """Return the GGX alpha of the metal-flake lobe of a coating with this specularity (0..1).
 
-    This is an assumption: the OptiSense paper varies one specularity of a rough conductor from 0 to
-    1 but does not state how it maps to a roughness. Here alpha = max(0.05, 1 - s), so that 0 is
-    diffuse and 1 is nearly a mirror. The lobe that the flake is blended with is described at
+    It is max(0.05, 1 - s), so that 0 is diffuse and 1 is nearly a mirror: an assumption; see
     `optisense.design.materials.flake_lobe`.
 
     Raises:

@@ -38,8 +38,7 @@ PER_MM: dict[str, Any] = {"unit": "1/mm"}
 
 INDEX_AGREEMENT = 0.02
 """Largest difference between `ior` and a formula of the index at 589 nm. The literature's indices
-of one silicone differ by as much as 0.04, and errors of a digit or a unit by far more.
-"""
+of one silicone differ by as much as 0.04, and errors of a digit or a unit by far more."""
 
 ROUNDING = 1e-9
 """Largest absorption coefficient, 1/mm, that a plate's transmittance can give by rounding alone."""
@@ -49,8 +48,7 @@ ABSORPTIONS = ("absorption", "extinction", "transmittance")
 
 MAX_POISSON_RATIO = 0.4999
 """Largest Poisson ratio of a material. At 0.5 it would be incompressible and its bulk modulus
-infinite; measured values of silicones are 0.48 to 0.4999.
-"""
+infinite; measured values of silicones are 0.48 to 0.4999."""
 
 
 class GelElasticity(Model):

@@ -11,8 +11,7 @@ from optisense.design.reflectance import fresnel_dielectric
 
 CHANNEL_WAVELENGTHS = (630.0, 528.0, 465.0)
 """Wavelengths in vacuum at which R, G and B are simulated, nm, near the dominant wavelengths of
-common red, green and blue LEDs. Metals of the library are given at the same ones.
-"""
+common red, green and blue LEDs. Metals of the library are given at the same ones."""
 
 SODIUM_LINE = 589.3
 """Wavelength of the yellow sodium line, nm, at which refractive indices are stated."""

@@ -19,8 +19,7 @@ from optisense.registry import Registry
 
 EXPOSURE_TARGET = 0.55
 """Level (of 1, before the transfer curve) to which automatic exposure maps the 95th percentile of
-the brightest channel; it leaves room for highlights.
-"""
+the brightest channel; it leaves room for highlights."""
 
 RAMP = (4, 5, 3)
 """Shape of the small picture by which own kinds are tried."""
@@ -33,8 +32,7 @@ LEVELS = Limits("an array in the shape of the levels, 0 to 1", RAMP, 0.0, 1.0 + 
 
 MAX_EXCESS = 4.0
 """Largest excess over the full well that the mask counts, as a multiple of a full pixel, so that a
-lamp in view does not whiten the whole picture.
-"""
+lamp in view does not whiten the whole picture."""
 
 BLUR_REACH = 4.0
 """Radius at which the blur of overexposure is cut off, in standard deviations (SciPy's default)."""
@@ -62,11 +60,7 @@ class CameraResponse(KindModel):
     )
 
     def _check_own_kind(self) -> None:
-        """Check what it makes of a ramp from the dark to twice a full pixel.
-
-        Raises:
-            LibraryError: a level is beyond its limits, or the result is of another shape.
-        """
+        """Check what it makes of a ramp from the dark to twice a full pixel."""
         exposed = ramp(2.0)
         reading = self.respond(exposed, RAMP[1])
         self._require("respond", reading, LEVELS)
@@ -88,11 +82,7 @@ class CameraResponse(KindModel):
         """Return the levels (h, w, 3) of light in the sensor's pixels, from 0 up, before a pixel or
         the converter cuts them off at 1: their noise is that of all this light.
 
-        A kind that does not say has its reading.
-
-        Args:
-            exposed: exposed levels (h, w, 3) of the picture or a part of it.
-            width: number of pixels across the whole picture, if `exposed` is a part of it.
+        A kind that does not say has its reading. The arguments are those of `respond`.
         """
         return self.respond(exposed, width)
 
@@ -101,10 +91,6 @@ class CameraResponse(KindModel):
 
         They are those of `filled`, or of `respond` if a subclass of another kind overrides only
         that: the inherited `filled` would leave the override out.
-
-        Args:
-            exposed: exposed levels (h, w, 3) of the picture or a part of it.
-            width: number of pixels across the whole picture, if `exposed` is a part of it.
         """
         last = next(kind for kind in type(self).__mro__ if vars(kind).keys() & _READINGS)
         reading = self.filled if "filled" in vars(last) else self.respond
@@ -115,11 +101,8 @@ class CameraResponse(KindModel):
         return 1.0
 
     def reach(self, width: int) -> int:
-        """Return the distance, in pixels, over which light in one pixel changes others; 0 if it
-        changes none.
-
-        Args:
-            width: number of pixels across the whole picture.
+        """Return the distance, in pixels, over which light in one pixel of a picture of a width, in
+        pixels, changes others; 0 if it changes none.
         """
         return 0
 
@@ -179,21 +162,11 @@ class FullWellResponse(CameraResponse):
         return bool(exposed.max() > self.full_well)
 
     def respond(self, exposed: FloatingArray, width: int | None = None) -> NDArray[np.float32]:
-        """Return the reading (h, w, 3), with overexposure spread over the channels, and clipped.
-
-        Args:
-            exposed: exposed levels (h, w, 3) of the picture or a part of it.
-            width: number of pixels across the whole picture, if `exposed` is a part of it.
-        """
+        """Return the reading (h, w, 3), with overexposure spread over the channels, and clipped."""
         return np.clip(self.filled(exposed, width), 0.0, 1.0, dtype=np.float32)
 
     def filled(self, exposed: FloatingArray, width: int | None = None) -> FloatingArray:
-        """Return the levels (h, w, 3), with overexposure spread over the channels.
-
-        Args:
-            exposed: exposed levels (h, w, 3) of the picture or a part of it.
-            width: number of pixels across the whole picture, if `exposed` is a part of it.
-        """
+        """Return the levels (h, w, 3), with overexposure spread over the channels."""
         exposed = np.asarray(exposed, dtype=np.float32)
         excess = np.clip(brightest(exposed) - self.full_well, 0.0, MAX_EXCESS)
         if excess.any():

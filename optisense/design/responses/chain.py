@@ -39,8 +39,7 @@ from optisense.design.responses.tone_curve import ToneCurve
 
 LEAST_ROOM = 0.2
 """Smallest share of its target that automatic exposure gives to the light, where stray light and
-black level leave less: the picture is then brighter than the target, but still shows the light.
-"""
+black level leave less: the picture is then brighter than the target, but still shows the light."""
 
 USUAL_RESPONSE = FullWellResponse()
 """Response of a camera whose design names none."""
@@ -257,10 +256,8 @@ class PictureChain:
         return self.response.full_level()
 
     def reach(self, width: int) -> int:
-        """Return the distance, pixels, over which light in one pixel changes others.
-
-        Args:
-            width: width of the whole picture, pixels.
+        """Return the distance, pixels, over which light in one pixel changes others, in a picture
+        of a width, pixels.
         """
         own = self.response.reach(width)
         return own if not self._softens(width) else own + reach_of(self._largest, width)
@@ -306,14 +303,8 @@ def _with_room(lit: FloatingArray, dark: FloatingArray, target: float) -> Floati
 class _Shown:
     """Shading that is compared by its numbers."""
 
-    shading: LensShading
+    shading: LensShading = field(compare=False)
     data: str
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Shown) and self.data == other.data
-
-    def __hash__(self) -> int:
-        return hash(self.data)
 
 
 @lru_cache(maxsize=4)

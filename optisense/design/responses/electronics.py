@@ -50,10 +50,8 @@ class BlackLevel(Model):
         return (1.0 - self.level) / (1.0 - self.subtracted * self.level)
 
     def subtract(self, read: FloatingArray) -> FloatingArray:
-        """Return the levels (...) above the assumed black, scaled so that a full pixel stays at 1.
-
-        Args:
-            read: output (...) of the converter, 0 to 1.
+        """Return the levels (...) above the assumed black of the converter's output (...), 0 to 1,
+        scaled so that a full pixel stays at 1.
         """
         off = self.subtracted * self.level
         return (read - off) / (1.0 - off)
@@ -87,12 +85,7 @@ class SensorNoise(Model):
         return np.sqrt((shot + (self.read_noise * per_electron) ** 2) / self.binning)
 
     def add(self, level: FloatingArray, normal: FloatingArray) -> FloatingArray:
-        """Return levels with noise.
-
-        Args:
-            level: level (...) of each pixel and channel.
-            normal: numbers (...) of the standard normal distribution.
-        """
+        """Return levels (...) with noise from numbers (...) of the standard normal distribution."""
         return level + self.deviation(level) * normal
 
 

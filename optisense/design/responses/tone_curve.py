@@ -33,11 +33,7 @@ class ToneCurve(KindModel):
     )
 
     def _check_own_kind(self) -> None:
-        """Check the stored levels of a ramp.
-
-        Raises:
-            LibraryError: a level is not within 0 to 1, or they are of another shape.
-        """
+        """Check the stored levels of a ramp."""
         self._require("curve", self.curve(ramp(1.0)), LEVELS)
 
     @abstractmethod
