@@ -1,11 +1,14 @@
-"""A small design that uses every field of the format."""
+"""A small design that uses every field of the format, its folder, and an ideal GelSight Mini."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from optisense.design import Camera, SensorDesign
+from optisense import sensors
+from optisense.design import Camera, SensorDesign, save_design
 from optisense.design.ies import parse_ies
 from optisense.geometry import TriangleMesh
 
@@ -203,3 +206,14 @@ def design(data: dict[str, object], tmp_path_factory: pytest.TempPathFactory) ->
     assert parse_ies(LAMP, "lamp").candela[0, 0] == 20.0
     made.lights["own-ies"].emitter._folder = lamps.parent
     return made
+
+
+@pytest.fixture
+def folder(design: SensorDesign, tmp_path: Path) -> Path:
+    save_design(design, tmp_path / "sensor")
+    return tmp_path / "sensor"
+
+
+@pytest.fixture(scope="session")
+def mini() -> SensorDesign:
+    return sensors.gelsight_mini_ideal()

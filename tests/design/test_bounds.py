@@ -10,19 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from optisense.design import SensorDesign, load_design, save_design
+from optisense.design import load_design
 from optisense.design import storage as design_files
 from optisense.design.ies import read_ies
 from optisense.errors import OptiSenseError
 
 GIBIBYTE = 2**30
 """Number of bytes of a gibibyte, in which sizes of files are given here."""
-
-
-@pytest.fixture
-def folder(design: SensorDesign, tmp_path: Path) -> Path:
-    save_design(design, tmp_path / "sensor")
-    return tmp_path / "sensor"
 
 
 def more(section: str, entry: str, count: int) -> Callable[[Path], None]:

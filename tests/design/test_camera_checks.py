@@ -20,11 +20,6 @@ BARREL = {"kind": "kannala-brandt", "k1": -0.0305, "k2": 0.001}
 """Distortion by which a fisheye of 230 degrees sees 266 across the picture."""
 
 
-@pytest.fixture(scope="module")
-def mini() -> SensorDesign:
-    return sensors.gelsight_mini_ideal()
-
-
 def errors(design: SensorDesign) -> list[Diagnostic]:
     return [problem for problem in check_design(design) if problem.severity == "error"]
 

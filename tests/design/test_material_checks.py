@@ -12,11 +12,6 @@ from optisense.design.materials import Dielectric
 from optisense.errors import DesignError
 
 
-@pytest.fixture(scope="module")
-def mini() -> SensorDesign:
-    return sensors.gelsight_mini_ideal()
-
-
 @pytest.mark.parametrize("name", sensors.SENSORS.names())
 def test_materials_of_the_built_in_sensors_are_fine(name: str) -> None:
     assert index_problems(sensors.load(name)) == []

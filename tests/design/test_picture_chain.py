@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import optisense as ots
-from optisense.design import load_design, save_design
 from optisense.design.lenses.blur import GaussianBlur
 from optisense.design.lenses.film import PictureWindow, film_places
 from optisense.design.lenses.shading import RadialShading
@@ -272,33 +271,3 @@ def test_numbers_that_no_camera_has_are_refused(value: dict[str, Any], says: str
     design = ots.load("builtin:gelsight-mini-ideal")
     with pytest.raises(DesignError, match=says):
         ots.set_value(design, "camera", design.camera.model_dump(mode="json") | value)
-
-
-def test_a_camera_with_all_of_it_is_saved_and_read_and_its_numbers_can_be_set(
-    tmp_path: Any,
-) -> None:
-    design = ots.load("builtin:gelsight-mini-ideal")
-    imaging: dict[str, Any] = {
-        "distortion": {"kind": "brown-conrady", "k1": -0.1},
-        "shading": {"kind": "table", "gain": [[1.0, 1.2], [1.3, 1.1]], "corrected": 0.5},
-        "blur": {"kind": "defocus", "focal_length": 3.0, "f_number": 2.0, "focus_distance": 20.0},
-        "crosstalk": [[0.8, 0.1, 0.1], [0.1, 0.8, 0.1], [0.1, 0.1, 0.8]],
-        "noise": {"full_well": 4866.0, "gain": 2.0},
-        "black_level": {"level": 0.0625},
-        "white_balance": [1.5, 1.0, 1.6],
-        "colour_matrix": [list(row) for row in MATRIX],
-        "tone_curve": {"kind": "gamma", "gamma": 2.0},
-    }
-    design = ots.set_value(design, "camera", design.camera.model_dump(mode="json") | imaging)
-    save_design(design, tmp_path / "camera")
-    read = load_design(tmp_path / "camera")
-    assert read.camera == design.camera
-    for path, value in {
-        "camera.distortion.k1": -0.05,
-        "camera.noise.gain": 3.0,
-        "camera.white_balance.r": 1.4,
-        "camera.colour_matrix[0][1]": -0.35,
-        "camera.shading.gain[1][0]": 1.4,
-        "camera.blur.focus_distance": 18.0,
-    }.items():
-        assert ots.get_value(ots.set_value(read, path, value), path) == value

@@ -20,12 +20,6 @@ from optisense.geometry import TriangleMesh
 ASSET = Path(__file__).parents[1] / "assets" / "design-v1"
 
 
-@pytest.fixture
-def folder(design: SensorDesign, tmp_path: Path) -> Path:
-    save_design(design, tmp_path / "sensor")
-    return tmp_path / "sensor"
-
-
 def edit(folder: Path, old: str, new: str) -> int:
     """Replace the first `old` in the design file; returns its line."""
     file = folder / "design.yaml"
@@ -163,22 +157,21 @@ class TestErrors:
             load_design(folder)
         return str(caught.value)
 
-    def test_a_misspelt_field_names_line_and_near_match(self, folder: Path) -> None:
-        line = edit(folder, "flux: 12.5", "flx: 12.5")
+    @pytest.mark.parametrize(
+        ("old", "new", "field", "near"),
+        [
+            ("flux: 12.5", "flx: 12.5", "'lights.red.flx'", "flux"),
+            ("roughness: 0.125", "roughnes: 0.125", "'materials.gel.roughnes'", "roughness"),
+            ("up: [0.0, 0.0, 1.0]", "upp: [0.0, 0.0, 1.0]", "'lights.red.lights[0].upp'", "up"),
+        ],
+    )
+    def test_a_misspelt_field_names_line_and_near_match(
+        self, folder: Path, old: str, new: str, field: str, near: str
+    ) -> None:
+        line = edit(folder, old, new)
         message = self.fails(folder)
-        assert f"design.yaml:{line}" in message
-        assert "'lights.red.flx'" in message and "Did you mean 'flux'?" in message
-        assert "missing" not in message
-
-    def test_a_misspelt_field_inside_a_material(self, folder: Path) -> None:
-        line = edit(folder, "roughness: 0.125", "roughnes: 0.125")
-        message = self.fails(folder)
-        assert f"design.yaml:{line}" in message and "Did you mean 'roughness'?" in message
-
-    def test_a_misspelt_field_inside_a_light(self, folder: Path) -> None:
-        line = edit(folder, "up: [0.0, 0.0, 1.0]", "upp: [0.0, 0.0, 1.0]")
-        message = self.fails(folder)
-        assert f"design.yaml:{line}" in message and "Did you mean 'up'?" in message
+        assert f"design.yaml:{line}" in message and "missing" not in message
+        assert field in message and f"Did you mean '{near}'?" in message
 
     def test_a_missing_field_names_its_section(self, folder: Path) -> None:
         edit(folder, "    flux: 12.5", "    #")
@@ -237,14 +230,17 @@ class TestErrors:
     def test_a_folder_without_a_design(self, tmp_path: Path) -> None:
         assert "no sensor design" in self.fails(tmp_path)
 
-    def test_a_mesh_without_triangles_names_the_part(self, folder: Path) -> None:
-        (folder / "meshes/gel.obj").write_text("v 0 0 0\n")
-        with pytest.raises(MeshError, match="gel"):
-            load_design(folder)
-
-    def test_an_open_solid_names_part_and_place(self, folder: Path) -> None:
-        (folder / "meshes/gel.obj").write_text("v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n")
-        with pytest.raises(MeshError, match=r"'gel'.*not closed.*design\.yaml:\d+"):
+    @pytest.mark.parametrize(
+        ("text", "told"),
+        [
+            ("v 0 0 0\n", "'gel'.*no triangles"),
+            ("v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n", r"'gel'.*not closed.*design\.yaml:\d+"),
+            ("v 0 0 nan\nv 9 0 0\nv 0 9 0\nf 1 2 3\n", "'gel'.*not finite"),
+        ],
+    )
+    def test_a_bad_mesh_names_part_and_place(self, folder: Path, text: str, told: str) -> None:
+        (folder / "meshes/gel.obj").write_text(text)
+        with pytest.raises(MeshError, match=told):
             load_design(folder)
 
     def test_a_solid_turned_inside_out_is_turned_back(
@@ -252,11 +248,6 @@ class TestErrors:
     ) -> None:
         design.meshes["gel"].flipped().save_obj(folder / "meshes/gel.obj")
         assert load_design(folder).meshes["gel"].volume == pytest.approx(10 * 8 * 2)
-
-    def test_a_mesh_with_nan_names_the_part(self, folder: Path) -> None:
-        (folder / "meshes/gel.obj").write_text("v 0 0 nan\nv 9 0 0\nv 0 9 0\nf 1 2 3\n")
-        with pytest.raises(MeshError, match="gel"):
-            load_design(folder)
 
 
 class TestStrangers:
@@ -271,16 +262,10 @@ class TestStrangers:
         with pytest.raises(DesignError, match=r"design\.yaml:\d+"):
             load_design(folder)
 
-    def test_no_link_leaves_the_folder(self, folder: Path) -> None:
-        TriangleMesh.box((0, 0, 0), (5, 5, 5)).save_obj(folder.parent / "secret.obj")
-        (folder / "meshes/gel.obj").unlink()
-        (folder / "meshes/gel.obj").symlink_to(folder.parent / "secret.obj")
-        with pytest.raises(DesignError, match="leads out of the design folder"):
-            load_design(folder)
-
-    def test_no_ies_file_leaves_the_folder(self, folder: Path) -> None:
-        (folder / "lamps/lamp.ies").rename(folder.parent / "lamp.ies")
-        (folder / "lamps/lamp.ies").symlink_to(folder.parent / "lamp.ies")
+    @pytest.mark.parametrize("file", ["meshes/gel.obj", "lamps/lamp.ies"])
+    def test_no_link_leaves_the_folder(self, folder: Path, file: str) -> None:
+        (folder / file).rename(folder.parent / "moved")
+        (folder / file).symlink_to(folder.parent / "moved")
         with pytest.raises(DesignError, match="leads out of the design folder"):
             load_design(folder)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from optisense.errors import ContactError
+from optisense.errors import ContactError, MeshError
 from optisense.geometry import (
     Contact,
     Cylinder,
@@ -59,8 +59,9 @@ def test_lists_and_arrays_of_numbers_are_kept_as_tuples() -> None:
 @pytest.mark.parametrize(
     "given",
     [
-        {"at": 1.0}, {"at": "ab"}, {"at": np.zeros((2, 2))}, {"at": (1, math.nan)},
-        {"point": (1, 2)}, {"along": (1, 0)}, {"along": (0, 0, 0)}, {"along": "abc"},
+        {"at": 1.0}, {"at": (0, 0, 0)}, {"at": "ab"}, {"at": np.zeros((2, 2))},
+        {"at": (1, math.nan)}, {"point": (1, 2)}, {"along": (1, 0)}, {"along": (0, 0, 0)},
+        {"along": "abc"},
         {"shift": (1, [2])}, {"depth": "1"}, {"depth": 0}, {"force": "1"}, {"force": 0},
         {"rotation": None}, {"twist": "1"}, {"indenter": "sphere"}, {"indenter": Sphere},
         {"indenter": GEL},
@@ -155,8 +156,6 @@ def test_an_indenter_lies_along_a_direction_of_the_frame() -> None:
     along = (math.cos(math.radians(50)), math.sin(math.radians(50)), 0.3)  # as the surface allows
     told = Contact(Cylinder(1.0, 10.0), at=(1, 2), depth=0.4, rotation=20.0, along=along)
     np.testing.assert_allclose(place(told, FLAT, GEL).vertices, turned.vertices, atol=1e-9)
-    with pytest.raises(ContactError, match="direction"):
-        Contact(Cylinder(1.0), along=(0.0, 0.0, 0.0))
 
 
 def test_on_a_dome_the_way_in_is_the_inward_normal() -> None:
@@ -194,8 +193,6 @@ def test_contact_arguments_are_checked() -> None:
         Contact(Sphere(1.5), at=(0.0, 0.0), depth=0.3, force=2.0)
     with pytest.raises(ContactError, match="both"):
         Contact(Sphere(1), at=(0, 0), point=(0, 0, 0))
-    with pytest.raises(ContactError, match="2 finite numbers"):
-        Contact(Sphere(1), at=(0, 0, 0))  # type: ignore[arg-type]
 
 
 def test_gel_thickness_along_slanted_normals() -> None:
@@ -227,8 +224,6 @@ def test_a_gap_ends_a_gel_of_several_elastomers_and_a_film_of_glue_does_not() ->
 
 
 def test_a_missing_mesh_file_is_named(tmp_path: Path) -> None:
-    from optisense.errors import MeshError
-
     contact = parse_contact(f"mesh:{tmp_path}/none.stl@0,0:0.2")
     with pytest.raises(MeshError, match=r"none\.stl"):
         place(contact, FLAT, GEL)
