@@ -15,7 +15,7 @@ from optisense.design.cage import MAX_POINTS, MOST_ALONG, Cage, Share, as_array
 from optisense.design.limits import LARGEST
 from optisense.design.sensor_design import SensorDesign
 from optisense.errors import DesignError
-from optisense.geometry.cage_map import refined_points
+from optisense.geometry.cage import refined_points
 from optisense.keyword_types import is_real
 from optisense.near import suggestion
 

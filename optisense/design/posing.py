@@ -18,11 +18,8 @@ UNTURNED: FloatArray = np.eye(3)
 def with_lights(
     design: SensorDesign, group: str, change: Callable[[Light], Light], only: int | None = None
 ) -> SensorDesign:
-    """Return a design with changed lights of a group; the given design stays as it is.
-
-    Args:
-        change: function that returns a light in its new pose.
-        only: number of the light that changes; None changes all of the group.
+    """Return a design in which the lights of a group, or `only` the one of a number, are changed by
+    a function that returns a light in its new pose.
     """
     own = design.lights[group]
     lights = [
@@ -34,7 +31,7 @@ def with_lights(
 
 
 def moved(light: Light, shift: FloatArray, turn: FloatArray = UNTURNED) -> Light:
-    """Return a light that is turned about the origin by a matrix (3, 3), and shifted by (3,), mm."""
+    """Return a light turned about the origin by a matrix (3, 3), and then shifted by (3,), mm."""
     return light.model_copy(
         update={
             "position": triple(turn @ np.array(light.position) + shift),

@@ -50,11 +50,7 @@ class Diagnostic:
 
 
 def raise_problems(problems: list[Diagnostic], source: str) -> None:
-    """Raise one DesignError for all problems of severity "error"; return if there are none.
-
-    Args:
-        source: file, or other source of the problems.
-    """
+    """Raise one DesignError for all problems of severity "error" of a file or another source."""
     errors = [problem for problem in problems if problem.severity == "error"]
     if errors:
         raise _in_one(errors, source)
@@ -82,9 +78,8 @@ def design_error(
 ) -> DesignError:
     """Return the DesignError for an error of pydantic.
 
-    Args:
-        where: file, or dotted path that was set; empty for the dotted paths of the problems.
-        lines: line of each path in the file, if there is one.
+    The place `where` is a file, with `lines`, or the dotted path that was set; if it is empty, each
+    problem has its own dotted path.
     """
     problems = _problems(error, data, where, lines or {}, model)
     unseen = max(error.error_count() - MAX_EXAMINED, 0)
@@ -111,9 +106,7 @@ def invalid_values(design: SensorDesign) -> list[Diagnostic]:
 
 def kind_problems(design: SensorDesign, before: SensorDesign | None = None) -> list[Diagnostic]:
     """Return the problems of emitters, materials and others, and those that their classes have.
-
-    Args:
-        before: a design whose values have none; equal values are not checked again.
+    Values that are equal to those of a design without problems, `before`, are not checked again.
     """
     known = {} if before is None else before.values_of_kinds()
     problems: list[Diagnostic] = []

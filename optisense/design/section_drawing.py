@@ -50,12 +50,9 @@ class DrawnRay(NamedTuple):
 
 
 def section_svg(design: SensorDesign, rays: Sequence[DrawnRay] = ()) -> str:
-    """Return a labelled section through a design as an SVG element.
+    """Return a labelled section through a design, with chief rays of the camera, as an SVG element.
 
     The camera's view points upward. Lights and rays are projected onto the plane of the section.
-
-    Args:
-        rays: chief rays of the camera to draw, if any.
     """
     found = section(design)
     low, high = found.bounds

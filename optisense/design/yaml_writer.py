@@ -1,4 +1,4 @@
-"""Writer of a design as YAML, with the unit of each number in a comment, and the user's comments."""
+"""Writer of a design as YAML, with the units of numbers and the user's remarks in comments."""
 
 from __future__ import annotations
 

@@ -64,13 +64,10 @@ class Overlay:
 def find_coincident(
     first: TriangleMesh, second: TriangleMesh, tolerance: float, facing: bool
 ) -> Overlay:
-    """Find the pairs of faces that coincide within a tolerance.
+    """Find the pairs of faces of two meshes that coincide within a tolerance, mm.
 
-    Args:
-        first, second: any meshes.
-        tolerance: largest distance between coincident faces, mm.
-        facing: whether only faces with opposite normals count (solids that touch); otherwise
-            normals may also agree.
+    With `facing`, only faces with opposite normals count (solids that touch); otherwise normals may
+    also agree.
     """
     if not boxes_overlap(first, second, -tolerance):
         return Overlay(first, second, np.zeros((0, 2), dtype=np.int64))
@@ -115,12 +112,9 @@ class Seam:
 
 
 def sample_seam(one: TriangleMesh, other: TriangleMesh, reach: float) -> Seam:
-    """Measure the distance of two solids where they face each other, at points spread evenly over
-    the faces of one of them that are near the other: of the one with less area there.
-
-    Args:
-        one, other: closed meshes, mm, whose normals point outward.
-        reach: largest absolute height, mm.
+    """Measure the distance of two closed meshes with outward normals where they face each other, up
+    to a reach, mm, at points spread evenly over the faces of one of them that are near the other:
+    of the one with less area there.
     """
     near = np.flatnonzero(_in_reach(one, other, reach))
     facing = np.flatnonzero(_in_reach(other, one, reach))
@@ -164,15 +158,10 @@ def boxes_overlap(first: TriangleMesh, second: TriangleMesh, depth: float) -> bo
 
 
 def cut(mesh: TriangleMesh, overlays: list[Overlay]) -> list[TriangleMesh]:
-    """Divide a mesh into the patches that coincide with other meshes, and the rest.
+    """Return the part of a mesh that each overlay, whose `first` it is, covers, and last the part
+    that nothing covers; where several overlays overlap, the first one counts.
 
-    Args:
-        mesh: the mesh that is `first` in each overlay.
-        overlays: the coincidences; where several overlap, the first one counts.
-
-    Returns:
-        One mesh per overlay, the part that it covers, and last the part that nothing covers.
-        Together they form `mesh`; completely covered or free faces are kept, others are cut.
+    Together the parts form the mesh; completely covered or free faces are kept, others are cut.
     """
     state = _Remainder(mesh)
     return [*(state.take(overlay) for overlay in overlays), state.rest()]

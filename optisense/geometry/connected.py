@@ -9,19 +9,10 @@ from numpy.typing import NDArray
 def connected_components(
     count: int, one: NDArray[np.integer], other: NDArray[np.integer]
 ) -> NDArray[np.int64]:
-    """Return the number of the connected component, from 0, that each of `count` nodes belongs to.
-
-    Args:
-        count: number of nodes (n).
-        one, other: (k,) numbers of the two nodes of each edge, in either order.
-
-    Returns:
-        (n,) int64; nodes without edges are components of their own.
+    """Return the number (count,), from 0, of the connected component that each node belongs to, by
+    the numbers (k,) of the two nodes of each edge. A node without edges is a component of its own.
     """
-    from scipy.sparse import (
-        coo_array,  # takes a tenth of a second to load
-        csgraph,
-    )
+    from scipy.sparse import coo_array, csgraph  # takes a tenth of a second to load
 
     edges = coo_array((np.ones(len(one), dtype=bool), (one, other)), shape=(count, count))
     return np.asarray(csgraph.connected_components(edges, directed=False)[1], dtype=np.int64)

@@ -10,8 +10,13 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from optisense.array_types import FloatArray
-from optisense.geometry.cage import Resolution, cage_weights, deform
-from optisense.geometry.cage_map import is_one_to_one, jacobians
+from optisense.geometry.cage import (
+    Resolution,
+    cage_weights,
+    deform,
+    is_one_to_one,
+    jacobians,
+)
 from optisense.geometry.crossings import self_crossings
 from optisense.geometry.mesh import TriangleMesh
 

@@ -70,12 +70,8 @@ def join(mover: TriangleMesh, fixed: TriangleMesh, distance: float) -> Join:
 
     Flat faces move along their normals into the other's plane. Curved faces, whose triangles may
     differ from the other's, move to `distance` below its surface, so that cutting `fixed` out of
-    the mover leaves them without a gap.
-
-    Args:
-        mover: the solid to move, closed and welded, with outward face normals.
-        fixed: the other solid, closed, with outward face normals.
-        distance: largest distance (mm) of faces that are joined.
+    the mover leaves them without a gap. Both have outward face normals, and the mover is welded;
+    `distance` is the largest one (mm) of faces that are joined.
     """
     wide = find_coincident(mover, fixed, distance, facing=True).pairs
     if len(wide) == 0:

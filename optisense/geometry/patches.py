@@ -31,12 +31,8 @@ def angle_to_nearest(mesh: TriangleMesh, direction: ArrayLike) -> float:
 
 
 def smoothly_joined(mesh: TriangleMesh, start: Faces, sharp: float = SHARP) -> Faces:
-    """Return the faces `start` and all that are connected to them without a sharp edge.
-
-    Args:
-        mesh: a welded mesh, so that neighbours share vertices.
-        start: some of its faces.
-        sharp: smallest angle (degrees) between the normals of neighbours across a sharp edge.
+    """Return the faces `start` of a welded mesh and all that are connected to them without an edge
+    between normals at an angle of `sharp` degrees or more.
     """
     one, other = inner_edges(mesh)[1].T
     cosine = np.einsum("ij,ij->i", mesh.face_normals[one], mesh.face_normals[other])

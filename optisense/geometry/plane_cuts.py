@@ -24,15 +24,11 @@ def cut_along_planes(mesh: TriangleMesh, spacing: float, max_faces: int) -> Tria
     """Return a mesh of the same shape whose triangles are cut along planes normal to x, y and z.
 
     The cut mesh is welded and has no shading normals. Faces beside each other share the vertices of
-    a cut, so that a closed mesh stays closed.
-
-    Args:
-        mesh: mesh, mm.
-        spacing: largest distance of neighbouring planes, mm.
-        max_faces: largest number of faces.
+    a cut, so that a closed mesh stays closed. `spacing` is the largest distance of neighbouring
+    planes, mm.
 
     Raises:
-        MeshError: the cut mesh would have more faces.
+        MeshError: the cut mesh would have more than `max_faces`.
     """
     whole = mesh.welded()
     vertices, faces = whole.vertices, whole.faces
@@ -61,11 +57,7 @@ class _Cuts:
         self._of_edge: dict[tuple[int, int, int], int] = {}
 
     def cut(self, faces: IntArray) -> tuple[FloatArray, IntArray]:
-        """Return vertices and faces of the cut mesh.
-
-        Raises:
-            MeshError: it would have too many faces.
-        """
+        """Return vertices and faces of the cut mesh."""
         places = self._places[faces]
         slabs = np.ceil(places.max(axis=1)) - np.floor(places.min(axis=1))
         if slabs.sum() > self._max_faces:

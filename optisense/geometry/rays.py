@@ -66,17 +66,10 @@ def ray_hits(mesh: TriangleMesh, origins: ArrayLike, directions: ArrayLike) -> R
     corners = mesh.triangles
     middle, reach = mesh.face_spheres
     step = max(1, _PAIRS_AT_ONCE // max(1, len(corners)))
-    found = [
-        _hits(
-            corners,
-            start if len(start) == 1 else start[i : i + step],
-            way[i : i + step],
-            middle,
-            reach,
-            i,
-        )
-        for i in range(0, count, step)
-    ]
+    found = []
+    for i in range(0, count, step):
+        origin = start if len(start) == 1 else start[i : i + step]
+        found.append(_hits(corners, origin, way[i : i + step], middle, reach, i))
     if not found:
         found = [RayHits(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))]
     ray, distance, face = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -135,12 +128,9 @@ def exits(solids: Sequence[TriangleMesh], starts: FloatArray, ways: FloatArray) 
     last of those that follow it without a gap above `GLUE`; infinite if they leave none.
 
     Layers of a gel thus count as one body, whether their meshes touch, overlap or differ a little
-    at a curved face between them. A gap within a single solid always ends it.
-
-    Args:
-        solids: at least one mesh, mm, with outward face normals.
-        starts: (n, 3) points of the skin, mm.
-        ways: (n, 3) unit vectors into the gel.
+    at a curved face between them. A gap within a single solid always ends it. The lines start at
+    points (n, 3) of the skin, mm, along unit vectors (n, 3) into the gel; the solids are one or
+    more meshes, mm, with outward face normals.
     """
     found = [_stretches(solid, starts, ways) for solid in solids]
     line, start, end = (np.concatenate(parts) for parts in zip(*found, strict=True))

@@ -23,9 +23,8 @@ def smooth_corners(
     """Compute corner normals, and split the vertices whose corners disagree.
 
     Args:
-        triangles: (m, 3, 3) corners of the faces (face, corner, coordinate), mm.
-        faces: (m, 3) vertex numbers.
-        normals: (m, 3) unit face normals.
+        triangles, faces, normals: (m, 3, 3) corners, mm, (m, 3) vertices and (m, 3) unit normals of
+            the faces.
         crease: angle (degrees) above which faces around a vertex are not averaged.
 
     Returns:

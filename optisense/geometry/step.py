@@ -72,11 +72,8 @@ class StepBody:
 
 
 def no_step(error: ImportError, action: str, instead: str, where: Path | None = None) -> SetupError:
-    """Return the error to raise if Open CASCADE cannot be imported.
-
-    Args:
-        action: "reading" or "writing".
-        instead: hint for what a user can do without it.
+    """Return the error to raise if Open CASCADE cannot be imported for "reading" or "writing", with
+    the hint what a user can do instead.
     """
     place = None if where is None else str(where)
     library = re.match(r"(lib[^:]*\.so[^:]*):", str(error))
@@ -298,12 +295,10 @@ def _bodies(shape: Any) -> Iterator[tuple[bool, Any]]:
 
 
 def triangles(shape: Any, chord: float = CHORD, bend: float = BEND) -> TriangleMesh:
-    """Triangulate the faces of a shape; face normals point out of a solid.
+    """Triangulate the faces of a shape of Open CASCADE, mm; face normals point out of a solid.
 
-    Args:
-        shape: shape of Open CASCADE, mm.
-        chord: largest distance of triangles from the exact surface, mm.
-        bend: largest angle (degrees) between neighbouring triangles on a curved surface.
+    `chord` is the largest distance (mm) of triangles from the exact surface, and `bend` the largest
+    angle (degrees) between neighbouring ones on a curved surface.
     """
     from OCP.BRep import BRep_Tool
     from OCP.BRepMesh import BRepMesh_IncrementalMesh

@@ -81,12 +81,9 @@ def files_of(value: Model) -> dict[str, bytes]:
 def make_entry(kind: Kind, name: str, data: Any, lines: Lines, source: str) -> AnyEntry:
     """Check the data of an entry, and return the entry.
 
-    Args:
-        lines: line of each value in the data; the first line of all is under ().
-        source: file, for messages.
-
     Raises:
-        LibraryError: the data are no entry of this kind; the message names the line.
+        LibraryError: the data are no entry of this kind; the message names the file `source`, and
+            the line of the value.
     """
     adapter: TypeAdapter[AnyEntry] = TypeAdapter(KINDS[kind])
     try:
@@ -131,13 +128,8 @@ def own_files(kind: Kind) -> dict[str, Path]:
 def write_own(
     kind: Kind, name: str, entry: AnyEntry, files: Mapping[str, bytes] = MappingProxyType({})
 ) -> Path:
-    """Write an entry into the user's folder, whose lock is held, whole or not at all.
-
-    Args:
-        files: contents of the files that the entry names; they are written beside it first.
-
-    Returns:
-        The path of the entry's file.
+    """Write an entry, and before it the files that it names, into the user's folder, whose lock is
+    held, whole or not at all; return the path of the entry's file.
 
     Raises:
         OutputError: the folder can't be written.

@@ -55,12 +55,10 @@ class Tuning:
 
 
 def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
-    """Read a tuning file.
+    """Read a tuning file, JSON of format 1 or 2.
 
-    Args:
-        file: JSON file, of format 1 or 2.
-        temperature: colour temperature, K; white balance and colour matrix are interpolated to it,
-            and the colours' shading is that of the nearest temperature in the file.
+    White balance and colour matrix are interpolated to a colour temperature, K, and the colours'
+    shading is that of the nearest temperature in the file.
 
     Raises:
         LibraryError: the file can't be read, is no tuning file, or has a table of another size.
@@ -71,7 +69,7 @@ def read_tuning(file: str | Path, temperature: float = DAYLIGHT) -> Tuning:
     derived: dict[str, str] = {}
     readers: dict[str, Callable[[dict[str, Any], float], dict[str, Any]]] = {
         "black_level": _black_level,
-        "noise": lambda section, temperature: _noise(section, _black_of(values)),
+        "noise": lambda section, _: _noise(section, values.get("black_level")),
         "alsc": _shading,
         "awb": _white_balance,
         "ccm": _colour_matrix,
@@ -141,18 +139,14 @@ def _black_level(section: dict[str, Any], temperature: float) -> dict[str, Any]:
     return {"black_level": {"level": _rounded(_number(section["black_level"]) / FULL)}}
 
 
-def _black_of(values: dict[str, Any]) -> float:
-    """Return the black level among the values that are read, a share of the range."""
-    return float(values["black_level"]["level"]) if "black_level" in values else 0.0
-
-
-def _noise(section: dict[str, Any], black: float) -> dict[str, Any]:
+def _noise(section: dict[str, Any], black_level: dict[str, float] | None) -> dict[str, Any]:
     """Return the noise. Its standard deviation is constant + slope sqrt(level), with levels above
     black, so a full pixel holds FULL (1 - black) / slope^2 electrons.
     """
     slope, constant = (_number(section[f"reference_{name}"]) for name in ("slope", "constant"))
     if slope <= 0.0 or constant < 0.0:
         raise LibraryError(f"the noise has a slope of {slope:g} and a constant of {constant:g}")
+    black = 0.0 if black_level is None else black_level["level"]
     electrons = FULL * (1.0 - black) / slope**2
     read = constant / slope**2
     return {"noise": {"full_well": round(electrons, 1), "read_noise": round(read, 2)}}

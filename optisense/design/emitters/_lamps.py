@@ -85,7 +85,7 @@ class IesEmitter(LightModel):
         return whole.without_azimuth()
 
     def relative_intensity(self, polar: ArrayLike, azimuth: ArrayLike = 0.0) -> FloatArray:
-        """Return the intensity, linear between the file's angles; see the method of `LightModel`."""
+        """Return the intensity, linear between the file's angles; see `LightModel`."""
         table = self.intensity()
         polar, turn = np.broadcast_arrays(np.asarray(polar, np.float64), np.mod(azimuth, 360.0))
         return np.asarray(table.at(polar, turn) / table.values.max())

@@ -132,7 +132,7 @@ class Defocus(LensBlur):
     )
 
     def circle(self, camera: LensView, vergence: FloatingArray) -> FloatingArray:
-        """Return the diameter (...) of the circle of confusion, as a share of the picture's width."""
+        """Return the diameter (...) of the circle of confusion, a share of the picture's width."""
         pupil = self.focal_length / self.f_number
         angle = pupil * np.abs(vergence - 1.0 / self.focus_distance)
         return np.asarray(angle * camera.angle_scale)
@@ -152,11 +152,9 @@ def reach_of(deviation: float, width: int) -> int:
 def blurred(
     levels: FloatingArray, deviation: FloatingArray, span: tuple[float, float] | None = None
 ) -> FloatingArray:
-    """Return levels (h, w, 3), blurred by a width that may vary over the picture.
+    """Return levels (h, w, 3), blurred by a standard deviation, a scalar or (h, w), pixels.
 
     Args:
-        levels: levels (h, w, 3).
-        deviation: standard deviation, a scalar or (h, w), pixels.
         span: smallest and largest deviation in the whole picture, if the levels are a part of it,
             which is then blurred as it is in the whole.
     """

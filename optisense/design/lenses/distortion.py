@@ -70,7 +70,7 @@ class LensDistortion(KindModel):
     )
 
     def _check_own_kind(self) -> None:
-        """Check its coefficients, and its derivatives against difference quotients near the axis."""
+        """Check its coefficients, and its derivatives against differences near the axis."""
         numbers = self.coefficients()
         kept = np.asarray(numbers)
         self._require("coefficients", kept, Limits("a tuple of finite numbers", (kept.size,)))

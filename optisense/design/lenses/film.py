@@ -60,9 +60,7 @@ def film_coordinates(
     """Return the coordinates across (width,) and down (height,) of a picture's pixels on the film.
 
     A picture is as wide as the film, and of another shape it shows less or more above and below.
-
-    Args:
-        film: height of the film over its width; that of the picture if None.
+    `film` is the height of the film over its width; that of the picture if None.
     """
     across, down = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
     if film is not None:
@@ -71,11 +69,7 @@ def film_coordinates(
 
 
 def film_places(height: int, width: int, film: float | None = None) -> FilmPlaces:
-    """Return the centres (height, width) of the pixels of a picture.
-
-    Args:
-        film: height of the film over its width; that of the picture if None.
-    """
+    """Return the centres (height, width) of the pixels of a picture; see `film_coordinates`."""
     shape = height / width if film is None else film
     across, down = np.meshgrid(*film_coordinates(height, width, film))
     x, y = 2.0 * across - 1.0, (2.0 * down - 1.0) * shape
